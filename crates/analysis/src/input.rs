@@ -1,0 +1,38 @@
+//! What an analysis reads: plain values and one event source.
+
+use skinrig_model::{
+    AnalysisSettings, CameraId, CdEvent, PlannedPress, PressOutcome, RigGeometry, SentMark,
+    TriggerEdge,
+};
+
+/// Everything but the events.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SessionInput {
+    /// Every planned press, in plan order.
+    pub planned: Vec<PlannedPress>,
+    /// The last outcome of each planned press, same order; `None` when it was never attempted.
+    pub outcomes: Vec<Option<PressOutcome>>,
+    /// Trigger edges of each camera, in stream order, all channels.
+    pub edges: [Vec<TriggerEdge>; 2],
+    /// The marks that the trigger box sent.
+    pub marks: Vec<SentMark>,
+    /// Camera-time intervals `(from_us, to_us)` in which bytes of that camera were lost.
+    pub gaps: [Vec<(u64, u64)>; 2],
+    /// The rig.
+    pub rig: RigGeometry,
+    /// The settings.
+    pub settings: AnalysisSettings,
+}
+
+/// Where the events come from. One pass per camera and call; memory stays bounded.
+pub trait EventSource: Sync {
+    /// Calls `each` with consecutive slices of the camera's CD events in stream order, all of them, once.
+    ///
+    /// # Errors
+    /// A message for the user when the stream cannot be read to its end.
+    fn for_each_slice(
+        &self,
+        camera: CameraId,
+        each: &mut dyn FnMut(&[CdEvent]),
+    ) -> Result<(), String>;
+}

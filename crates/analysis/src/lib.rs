@@ -1,0 +1,3 @@
+//! Numbers in, numbers out (being written).
+pub mod input;
+pub mod result;

@@ -1,0 +1,286 @@
+//! The result of an analysis: every number that a report shows, with its n.
+
+use serde::{Deserialize, Serialize};
+use skinrig_model::{
+    AnalysisSettings, Point2, PressId, PressRole, PressTiming, RigGeometry, StereoGeometry,
+};
+
+/// Version of this layout and of the algorithms behind it; part of every result.
+pub const ANALYSIS_VERSION: u32 = 1;
+
+/// The result of analysing one session.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Analysis {
+    /// [`ANALYSIS_VERSION`].
+    pub version: u32,
+    /// The settings used.
+    pub settings: AnalysisSettings,
+    /// The rig as described by the session.
+    pub rig: RigGeometry,
+    /// The camera geometry that located the presses (calibrated, or the nominal one).
+    pub geometry: StereoGeometry,
+    /// How the presses ended: planned = valid + missed + invalid + excluded.
+    pub counts: PressCounts,
+    /// Clock fits, camera 1 and camera 2; `None` where no alignment was possible.
+    pub clocks: [Option<ClockFit>; 2],
+    /// The calibration, when there was one.
+    pub calibration: Option<CalibrationResult>,
+    /// Metrics over the scored presses that are valid and not excluded.
+    pub scored: Metrics,
+    /// Metrics over all scored presses with an estimate, exclusions ignored.
+    pub scored_without_exclusions: Metrics,
+    /// Event-rate course of each camera over the whole session.
+    pub rates: [RateSeries; 2],
+    /// One row per planned press, in plan order.
+    pub presses: Vec<PressResult>,
+    /// Things a reader must know: fallbacks taken, data missing, suspicious residuals.
+    pub warnings: Vec<String>,
+}
+
+/// How the presses ended. Sync presses are counted apart.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct PressCounts {
+    /// Calibrating and scored presses in the plan.
+    pub planned: u32,
+    /// Done, recorded, not excluded.
+    pub valid: u32,
+    /// Never attempted.
+    pub missed: u32,
+    /// Attempted but not as planned, or with data lost.
+    pub invalid: u32,
+    /// Done, but left out by a rule.
+    pub excluded: u32,
+    /// Sync presses in the plan.
+    pub sync: u32,
+}
+
+impl PressCounts {
+    /// True when every planned press is counted exactly once.
+    #[must_use]
+    pub const fn add_up(&self) -> bool {
+        self.planned == self.valid + self.missed + self.invalid + self.excluded
+    }
+}
+
+/// `camera_us = offset_us + (1 + drift_ppm * 1e-6) * host_us`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct ClockFit {
+    /// How it was found.
+    pub method: ClockMethod,
+    /// Camera time at host time 0, µs.
+    pub offset_us: f64,
+    /// Rate difference, parts per million.
+    pub drift_ppm: f64,
+    /// Standard error of the drift, ppm.
+    pub drift_se_ppm: f64,
+    /// Root mean square residual, µs.
+    pub residual_rms_us: f64,
+    /// Largest absolute residual, µs.
+    pub residual_max_us: f64,
+    /// Points used.
+    pub n: u32,
+    /// Points left out as outliers or strays.
+    pub rejected: u32,
+}
+
+/// How a clock fit was found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ClockMethod {
+    /// From coded marks on the trigger line.
+    TriggerMarks,
+    /// From the presses found in the event rates.
+    EventRates,
+}
+
+/// A number with its 95 % bootstrap interval and the n behind it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Estimate {
+    /// The value; `None` when n is too small for it.
+    pub value: Option<f64>,
+    /// Lower end of the 95 % interval.
+    pub low: Option<f64>,
+    /// Upper end.
+    pub high: Option<f64>,
+    /// How many presses (or, for the std between repetitions, locations) it stands on.
+    pub n: u32,
+}
+
+/// Localisation metrics, mm. Intervals come from a bootstrap that resamples locations.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Metrics {
+    /// Root mean square Euclidean error.
+    pub rmse_mm: Estimate,
+    /// Root mean square error along x.
+    pub rmse_x_mm: Estimate,
+    /// Root mean square error along y.
+    pub rmse_y_mm: Estimate,
+    /// Mean error along x (bias).
+    pub bias_x_mm: Estimate,
+    /// Mean error along y (bias).
+    pub bias_y_mm: Estimate,
+    /// Median Euclidean error.
+    pub median_mm: Estimate,
+    /// 95th percentile of the Euclidean error.
+    pub p95_mm: Estimate,
+    /// Mean over locations of the std between repetitions (Euclid, sample std with n-1).
+    pub repeat_std_mm: Estimate,
+    /// Share of the attempted scored presses that got an estimate.
+    pub located_rate: Estimate,
+    /// RMSE as a share of the skin's diagonal, percent.
+    pub rmse_diagonal_percent: Option<f64>,
+}
+
+/// A calibration.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CalibrationResult {
+    /// Where it started.
+    pub start: StereoGeometry,
+    /// Names of the fitted parameters.
+    pub names: Vec<String>,
+    /// Their values.
+    pub values: Vec<f64>,
+    /// Their standard errors; `None` where the data do not determine them.
+    pub standard_errors: Vec<Option<f64>>,
+    /// RMSE over the calibrating presses before, mm.
+    pub rmse_before_mm: f64,
+    /// And after, mm. Always at least as optimistic as the scored RMSE.
+    pub rmse_after_mm: f64,
+    /// Calibrating presses used.
+    pub n: u32,
+    /// Why the optimiser stopped.
+    pub termination: String,
+}
+
+/// An event-rate course.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct RateSeries {
+    /// Host time of the first bin's left edge, s (camera time when there is no clock fit).
+    pub start_s: f64,
+    /// Width of a bin, s. Grows for long sessions so that a series stays below a few thousand bins.
+    pub bin_s: f64,
+    /// Mean rate in each bin, events per second.
+    pub mean_per_s: Vec<f32>,
+    /// Highest rate among the fine bins (`rate_bin_ms`) within each bin, events per second.
+    pub peak_per_s: Vec<f32>,
+}
+
+/// What came out for one press.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PressResult {
+    /// Which press.
+    pub press: PressId,
+    /// What for.
+    pub role: PressRole,
+    /// Repetition, from 0.
+    pub repetition: u32,
+    /// Location, from 0.
+    pub location: u32,
+    /// Planned position.
+    pub planned: Point2,
+    /// Planned depth, mm.
+    pub depth_mm: f64,
+    /// Measured position: the truth.
+    pub truth: Option<Point2>,
+    /// `valid`, `missed`, `invalid` or `excluded`.
+    pub verdict: String,
+    /// The rule or reason, for everything but valid.
+    pub reason: Option<String>,
+    /// Measured moments, host clock.
+    pub timing: Option<PressTiming>,
+    /// What each camera saw.
+    pub views: [Option<PressView>; 2],
+    /// Where the skin says it was touched.
+    pub location_outcome: LocationOutcome,
+}
+
+impl PressResult {
+    /// The estimate, when there is one.
+    #[must_use]
+    pub const fn estimate(&self) -> Option<Point2> {
+        self.location_outcome.estimate()
+    }
+
+    /// Error vector (estimate - truth), mm.
+    #[must_use]
+    pub fn error_mm(&self) -> Option<(f64, f64)> {
+        let (e, t) = (self.estimate()?, self.truth?);
+        Some((e.x_mm - t.x_mm, e.y_mm - t.y_mm))
+    }
+}
+
+/// What one camera saw of one press.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct PressView {
+    /// Events in the window and crop.
+    pub events: u32,
+    /// How many of them ON.
+    pub on_events: u32,
+    /// Clusters found.
+    pub clusters: u32,
+    /// Events in the cluster(s) that make the centroid.
+    pub cluster_events: u32,
+    /// Their mean column, px; `None` without a cluster.
+    pub centroid_u: Option<f64>,
+    /// Their mean row, px.
+    pub centroid_v: Option<f64>,
+    /// Events per second in the window.
+    pub rate_per_s: f64,
+    /// Events per second in the idle time before the press.
+    pub idle_rate_per_s: f64,
+}
+
+/// The result of intersecting the two rays.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "status", rename_all = "snake_case")]
+pub enum LocationOutcome {
+    /// Inside the outline.
+    Located {
+        /// Where, mm.
+        at: Point2,
+        /// Sine of the angle between the rays.
+        sine: f64,
+    },
+    /// The rays meet outside the outline.
+    Outside {
+        /// Where, mm.
+        at: Point2,
+        /// Sine of the angle between the rays.
+        sine: f64,
+    },
+    /// The rays are parallel, or too nearly so.
+    Parallel {
+        /// Sine of the angle between the rays.
+        sine: f64,
+    },
+    /// The lines meet behind a camera.
+    Behind {
+        /// Sine of the angle between the rays.
+        sine: f64,
+    },
+    /// A view has no centroid.
+    Missing,
+}
+
+impl LocationOutcome {
+    /// The estimate of `Located` and `Outside`.
+    #[must_use]
+    pub const fn estimate(&self) -> Option<Point2> {
+        match self {
+            Self::Located { at, .. } | Self::Outside { at, .. } => Some(*at),
+            _ => None,
+        }
+    }
+
+    /// `located`, `outside`, `parallel`, `behind` or `missing`.
+    #[must_use]
+    pub const fn name(&self) -> &'static str {
+        match self {
+            Self::Located { .. } => "located",
+            Self::Outside { .. } => "outside",
+            Self::Parallel { .. } => "parallel",
+            Self::Behind { .. } => "behind",
+            Self::Missing => "missing",
+        }
+    }
+}

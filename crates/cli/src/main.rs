@@ -1,0 +1,2 @@
+//! The `skinrig` command line.
+fn main() {}

@@ -1,0 +1,2 @@
+//! Executes plans (being written).
+pub mod sink;

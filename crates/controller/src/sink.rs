@@ -1,0 +1,18 @@
+//! Where records go.
+
+use skinrig_model::Record;
+
+/// A consumer of records failed; the run must end safely.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("recorder: {0}")]
+pub struct SinkFault(pub String);
+
+/// Takes every record of a run, in order.
+pub trait RecordSink {
+    /// Takes one record. Returns when it has been accepted; for [`Record::Intent`] and
+    /// [`Record::Outcome`] that means durable.
+    ///
+    /// # Errors
+    /// [`SinkFault`] when the record cannot be kept; the controller then retracts, disarms and ends the run.
+    fn accept(&mut self, record: Record) -> Result<(), SinkFault>;
+}

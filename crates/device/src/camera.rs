@@ -1,0 +1,94 @@
+//! An event camera.
+
+use std::collections::BTreeMap;
+
+use skinrig_model::{CameraId, DeviceIdentity, RawChunk, Setting, StreamFormat};
+
+use crate::DeviceError;
+
+/// What a camera is.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct CameraCapabilities {
+    /// Columns.
+    pub width: u16,
+    /// Rows.
+    pub height: u16,
+    /// What its bytes are.
+    pub format: StreamFormat,
+    /// Trigger input channels that can be enabled.
+    pub trigger_channels: Vec<u8>,
+    /// Names of the biases that can be set.
+    pub biases: Vec<String>,
+}
+
+/// A rectangle of pixels that stay on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Roi {
+    /// First column.
+    pub x: u16,
+    /// First row.
+    pub y: u16,
+    /// Columns, at least 1.
+    pub width: u16,
+    /// Rows, at least 1.
+    pub height: u16,
+}
+
+/// What can be set on a camera before it starts. Everything unset keeps the device's default.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct CameraSettings {
+    /// Bias values by name, in the device's own unit.
+    pub biases: BTreeMap<String, i64>,
+    /// Pixels that stay on; all when absent.
+    pub roi: Option<Roi>,
+    /// Trigger input channels to enable.
+    pub trigger_channels: Vec<u8>,
+}
+
+/// A source of raw event bytes.
+///
+/// States: stopped -> [`start`](Self::start) -> streaming -> [`stop`](Self::stop) -> stopped.
+/// Chunk numbers count on through stop and start; bytes are never changed, reordered or dropped in
+/// silence: what is lost is counted in `lost_before` of the next chunk.
+pub trait EventCamera: Send {
+    /// Which of the two it is.
+    fn camera(&self) -> CameraId;
+
+    /// Who it is.
+    fn identity(&self) -> DeviceIdentity;
+
+    /// What it can do.
+    fn capabilities(&self) -> CameraCapabilities;
+
+    /// Writes settings and reads them back; only while stopped.
+    ///
+    /// # Errors
+    /// [`DeviceError::Refused`] for unknown biases, channels or pixels, before anything is written;
+    /// [`DeviceError::ReadBack`]; [`DeviceError::State`] while streaming.
+    fn configure(&mut self, settings: &CameraSettings) -> Result<Vec<Setting>, DeviceError>;
+
+    /// Starts streaming.
+    ///
+    /// # Errors
+    /// [`DeviceError::State`] while streaming; [`DeviceError::Lost`].
+    fn start(&mut self) -> Result<(), DeviceError>;
+
+    /// Appends the chunks that filled up since the last call.
+    ///
+    /// # Errors
+    /// [`DeviceError::Lost`]; chunks already appended stay valid.
+    fn poll(&mut self, chunks: &mut Vec<RawChunk>) -> Result<(), DeviceError>;
+
+    /// Like [`poll`](Self::poll), and closes the chunk under way, so that everything up to the present has
+    /// been handed over.
+    ///
+    /// # Errors
+    /// As [`poll`](Self::poll).
+    fn flush(&mut self, chunks: &mut Vec<RawChunk>) -> Result<(), DeviceError>;
+
+    /// Flushes and stops. Allowed in every state, any number of times.
+    ///
+    /// # Errors
+    /// [`DeviceError::Lost`]; chunks already appended stay valid.
+    fn stop(&mut self, chunks: &mut Vec<RawChunk>) -> Result<(), DeviceError>;
+}

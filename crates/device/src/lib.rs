@@ -1,0 +1,19 @@
+//! What a device promises: small traits, capabilities as data, and a clock.
+//!
+//! All verbs return at once: a real driver owns its device on a named thread of its own and these calls
+//! exchange messages with it; a simulated device computes what happened up to the clock's present. The
+//! controller polls. Positions cross this border in the *robot* frame; the controller knows the skin.
+
+pub mod camera;
+pub mod clock;
+pub mod error;
+pub mod indenter;
+pub mod rig;
+pub mod trigger;
+
+pub use camera::{CameraCapabilities, CameraSettings, EventCamera, Roi};
+pub use clock::Clock;
+pub use error::DeviceError;
+pub use indenter::{Indenter, IndenterCapabilities, MotionLimits, RobotSample};
+pub use rig::Rig;
+pub use trigger::{TriggerBox, TriggerCapabilities};

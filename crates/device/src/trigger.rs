@@ -1,0 +1,28 @@
+//! The box that pulses the cameras' trigger inputs.
+
+use skinrig_model::{DeviceIdentity, HostDuration, Mark, SentMark};
+
+use crate::DeviceError;
+
+/// What a trigger box can do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct TriggerCapabilities {
+    /// How long one mark occupies the line.
+    pub train_duration: HostDuration,
+}
+
+/// Sends coded marks (see `skinrig_model::pulse`) to both cameras at once.
+pub trait TriggerBox: Send {
+    /// Who it is.
+    fn identity(&self) -> DeviceIdentity;
+
+    /// What it can do.
+    fn capabilities(&self) -> TriggerCapabilities;
+
+    /// Starts the pulse train of `mark` now and returns when its first edge rose.
+    ///
+    /// # Errors
+    /// [`DeviceError::State`] while a train is under way; [`DeviceError::Refused`] for a press id that does
+    /// not fit a train; [`DeviceError::Lost`].
+    fn send(&mut self, mark: Mark) -> Result<SentMark, DeviceError>;
+}

@@ -1,0 +1,35 @@
+//! The words that every part of skinrig shares: units, frames, ids, clocks, events and session records.
+//!
+//! Pure values. Nothing here reads a file, a wall clock or a device, and nothing depends on another
+//! skinrig crate. Every quantity names its unit in its type or its name: `*_mm`, `*_us`, `*_n` (newton),
+//! `*_hz`, `*_deg`.
+
+pub mod camera;
+pub mod event;
+pub mod frame;
+pub mod id;
+pub mod pose;
+pub mod press;
+pub mod pulse;
+pub mod record;
+pub mod scene;
+pub mod settings;
+pub mod skin;
+pub mod stream;
+pub mod time;
+
+pub use camera::{CameraModel, LensModel, SENSOR_HEIGHT, SENSOR_WIDTH, StereoGeometry};
+pub use event::{CdEvent, Polarity, TriggerEdge};
+pub use frame::{Point2, Point3, RigidTransform, Robot, Skin};
+pub use id::{AttemptId, CameraId, PressId};
+pub use pose::PoseSample;
+pub use press::{PlannedPress, PressOutcome, PressRole, PressTiming, PressVerdict};
+pub use pulse::{Mark, MarkKind, PulseTrain, SeenMark, SentMark};
+pub use record::{
+    DeviceIdentity, DeviceRole, InterruptionKind, MotionCommand, Record, RunEnd, RunHeader, Setting,
+};
+pub use scene::{SceneNeed, SimLevel};
+pub use settings::{AnalysisSettings, CalibrationModel, CentroidRule, RigGeometry};
+pub use skin::SkinOutline;
+pub use stream::{ChunkFacts, RawChunk, StreamFormat};
+pub use time::{HostDuration, HostTime};

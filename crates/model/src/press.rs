@@ -1,0 +1,109 @@
+//! A press: planned, attempted, and how it ended.
+
+use serde::{Deserialize, Serialize};
+
+use crate::frame::Point2;
+use crate::id::{AttemptId, PressId};
+use crate::time::HostTime;
+
+/// What a press is for. Presses that calibrate never score.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PressRole {
+    /// Marks the start, so that camera clocks can be aligned without triggers.
+    Sync,
+    /// Its truth may be used to fit the camera geometry.
+    Calibrate,
+    /// Its truth is used only to score.
+    Score,
+}
+
+/// One press of the plan.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct PlannedPress {
+    /// Its place in the plan.
+    pub id: PressId,
+    /// What it is for.
+    pub role: PressRole,
+    /// Which repetition, from 0. 0 for sync presses.
+    pub repetition: u32,
+    /// Which location of the path, from 0; the same in every repetition and depth. 0 for sync presses.
+    pub location: u32,
+    /// Where, skin frame.
+    pub at: Point2,
+    /// How deep below the touched surface, mm, positive.
+    pub depth_mm: f64,
+}
+
+/// The measured moments of one press on the host clock, from the pose stream.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct PressTiming {
+    /// The downward motion began.
+    pub approach: HostTime,
+    /// The tip reached the surface on its way down.
+    pub contact: HostTime,
+    /// The tip settled at its depth.
+    pub at_depth: HostTime,
+    /// The upward motion began.
+    pub retract: HostTime,
+    /// The tip left the surface on its way up.
+    pub release: HostTime,
+    /// The tip settled at the clearance height.
+    pub clear: HostTime,
+}
+
+/// How a press ended. Planned = valid + missed + invalid + excluded, always.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(tag = "verdict", content = "reason", rename_all = "snake_case")]
+pub enum PressVerdict {
+    /// Done as planned, and everything it needs was recorded.
+    Valid,
+    /// Never attempted (the run stopped before it).
+    Missed(String),
+    /// Attempted, but what happened is not what was planned, or data were lost in its window.
+    Invalid(String),
+    /// Done, but left out of the metrics by a stated rule.
+    Excluded(String),
+}
+
+impl PressVerdict {
+    /// The verdict's name: `valid`, `missed`, `invalid`, `excluded`.
+    #[must_use]
+    pub const fn name(&self) -> &'static str {
+        match self {
+            Self::Valid => "valid",
+            Self::Missed(_) => "missed",
+            Self::Invalid(_) => "invalid",
+            Self::Excluded(_) => "excluded",
+        }
+    }
+
+    /// Why, for everything but `Valid`.
+    #[must_use]
+    pub fn reason(&self) -> Option<&str> {
+        match self {
+            Self::Valid => None,
+            Self::Missed(r) | Self::Invalid(r) | Self::Excluded(r) => Some(r),
+        }
+    }
+}
+
+/// The measured result of one attempt.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PressOutcome {
+    /// Which attempt at which press.
+    pub attempt: AttemptId,
+    /// How it ended.
+    pub verdict: PressVerdict,
+    /// When; absent when the attempt broke off before its moments were known.
+    pub timing: Option<PressTiming>,
+    /// The mean measured tip position during the hold, skin frame: the ground truth of localisation.
+    pub measured_at: Option<Point2>,
+    /// The mean measured depth during the hold, mm, positive.
+    pub measured_depth_mm: Option<f64>,
+    /// The largest force seen, N, when the device reports forces.
+    pub peak_force_n: Option<f64>,
+    /// True when timing and position come from a schedule (an imported dataset without a pose stream),
+    /// false when they were measured.
+    pub scheduled: bool,
+}

@@ -1,0 +1,241 @@
+//! Records: everything that happens in a run, in the order in which it happened.
+//!
+//! The controller emits them; terminal, log and recorder consume them. They are the only language between
+//! the running experiment and what remembers it.
+
+use serde::{Deserialize, Serialize};
+
+use crate::frame::{Point3, RigidTransform, Robot, Skin};
+use crate::id::{AttemptId, CameraId};
+use crate::pose::PoseSample;
+use crate::press::{PlannedPress, PressOutcome};
+use crate::pulse::SentMark;
+use crate::stream::{RawChunk, StreamFormat};
+use crate::time::HostTime;
+
+/// What a device is for in the rig.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum DeviceRole {
+    /// The robot that presses.
+    Indenter,
+    /// Camera 1.
+    Camera1,
+    /// Camera 2.
+    Camera2,
+    /// The box that pulses the trigger line.
+    TriggerBox,
+}
+
+impl DeviceRole {
+    /// The role of `camera`.
+    #[must_use]
+    pub const fn of_camera(camera: CameraId) -> Self {
+        match camera {
+            CameraId::One => Self::Camera1,
+            CameraId::Two => Self::Camera2,
+        }
+    }
+
+    /// The name used in sessions.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Indenter => "indenter",
+            Self::Camera1 => "camera1",
+            Self::Camera2 => "camera2",
+            Self::TriggerBox => "trigger_box",
+        }
+    }
+}
+
+/// Who a device says it is.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct DeviceIdentity {
+    /// Maker and model, for example `Prophesee EVK1 Gen3.1`; simulated and replayed devices say so.
+    pub model: String,
+    /// Serial number as the device gives it.
+    pub serial: String,
+    /// Firmware or library version.
+    pub firmware: String,
+}
+
+/// A setting as written and as read back.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Setting {
+    /// For example `bias_fo`.
+    pub name: String,
+    /// What was asked for.
+    pub requested: String,
+    /// What the device then reported.
+    pub read_back: String,
+}
+
+/// What is known before anything moves. Written first.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RunHeader {
+    /// The protocol as the user wrote it, byte for byte.
+    pub protocol_text: String,
+    /// Where it came from (a file name, or `built-in`).
+    pub protocol_name: String,
+    /// Lower-case hex SHA-256 of `protocol_text`.
+    pub protocol_sha256: String,
+    /// Values overridden on the command line, in order, as `key=value`.
+    pub overrides: Vec<String>,
+    /// The plan as JSON.
+    pub plan_json: String,
+    /// Lower-case hex SHA-256 of the plan's canonical JSON.
+    pub plan_sha256: String,
+    /// The seed of everything random in this run.
+    pub seed: u64,
+    /// `simulated`, `replayed`, `imported` or `bench`.
+    pub rig_kind: String,
+    /// Name of the rig; for the simulated rig with its level, for example `simulated (geometric)`.
+    pub rig_name: String,
+    /// The geometry and other constants of the rig as JSON.
+    pub rig_json: String,
+    /// Where the skin lies in the robot's frame.
+    pub robot_from_skin: RigidTransform<Robot, Skin>,
+    /// Stream format of each camera (index 0: camera 1).
+    pub stream_formats: [StreamFormat; 2],
+    /// Which prototype is pressed.
+    pub prototype: String,
+    /// Who runs it.
+    pub operator: String,
+    /// Civil time of the start, RFC 3339; for people.
+    pub started_at: String,
+    /// Host name.
+    pub host: String,
+    /// Version of skinrig.
+    pub software: String,
+    /// The command line.
+    pub command_line: String,
+    /// Every planned press, in plan order.
+    pub presses: Vec<PlannedPress>,
+}
+
+/// A motion command as the controller gave it to the indenter.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct MotionCommand {
+    /// Straight-line target, skin frame, mm.
+    pub target: Point3<Skin>,
+    /// Speed along the line, mm/s.
+    pub speed_mm_s: f64,
+}
+
+/// Why a run did not simply go on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum InterruptionKind {
+    /// Wait after the current press.
+    Pause,
+    /// Go on after a pause.
+    Resume,
+    /// Finish cleanly after the current press.
+    Stop,
+    /// Retract now, disarm, keep the data.
+    Abort,
+    /// A device or the recorder failed.
+    Fault,
+}
+
+impl InterruptionKind {
+    /// The name used in sessions.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Pause => "pause",
+            Self::Resume => "resume",
+            Self::Stop => "stop",
+            Self::Abort => "abort",
+            Self::Fault => "fault",
+        }
+    }
+}
+
+/// How a run ended.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(tag = "status", content = "reason", rename_all = "snake_case")]
+pub enum RunEnd {
+    /// Every step of the plan was executed.
+    Completed,
+    /// The operator stopped or aborted it.
+    Stopped(String),
+    /// A device, a limit or the recorder ended it.
+    Faulted(String),
+}
+
+impl RunEnd {
+    /// `completed`, `stopped` or `faulted`.
+    #[must_use]
+    pub const fn name(&self) -> &'static str {
+        match self {
+            Self::Completed => "completed",
+            Self::Stopped(_) => "stopped",
+            Self::Faulted(_) => "faulted",
+        }
+    }
+}
+
+/// One thing that happened.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Record {
+    /// The first record of every run.
+    Started(Box<RunHeader>),
+    /// A device answered and was configured.
+    Device {
+        /// Its role.
+        role: DeviceRole,
+        /// Who it says it is.
+        identity: DeviceIdentity,
+        /// Its settings as read back.
+        settings: Vec<Setting>,
+    },
+    /// A press is about to be attempted. Durable before the robot moves for it.
+    Intent {
+        /// Which attempt.
+        attempt: AttemptId,
+        /// When.
+        t: HostTime,
+    },
+    /// A motion command was given.
+    Command {
+        /// When.
+        t: HostTime,
+        /// What.
+        command: MotionCommand,
+    },
+    /// Samples of the pose stream, in time order.
+    Poses(Vec<PoseSample>),
+    /// The trigger box sent a mark.
+    MarkSent(SentMark),
+    /// Camera bytes.
+    Chunk(RawChunk),
+    /// An attempt ended. Durable together with all chunks up to its end.
+    Outcome(PressOutcome),
+    /// A press of the plan that was not attempted, and why. Emitted at the end of a broken-off run.
+    Missed(AttemptId, String),
+    /// Something broke the normal course.
+    Interruption {
+        /// What.
+        kind: InterruptionKind,
+        /// When.
+        t: HostTime,
+        /// In words.
+        reason: String,
+    },
+    /// A remark by the operator or by skinrig.
+    Note {
+        /// When.
+        t: HostTime,
+        /// The remark.
+        text: String,
+    },
+    /// The last record.
+    Ended {
+        /// When.
+        t: HostTime,
+        /// How.
+        end: RunEnd,
+    },
+}

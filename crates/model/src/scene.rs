@@ -1,0 +1,116 @@
+//! What a simulated scene must be good for, and the cheapest simulation level that is.
+
+use std::fmt;
+use std::str::FromStr;
+
+use serde::{Deserialize, Serialize};
+
+/// How much of the rig is simulated. Ordered from cheap to dear; each level contains the ones before it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SimLevel {
+    /// Robot and trigger box; cameras deliver time base and triggers but no pixel events.
+    Kinematic,
+    /// Events around the projected column of the contact, from rates fitted per press phase.
+    Geometric,
+    /// A light-path model of the waveguide; events follow from log-intensity changes per pixel.
+    Optical,
+}
+
+impl SimLevel {
+    /// All levels, cheapest first.
+    pub const ALL: [Self; 3] = [Self::Kinematic, Self::Geometric, Self::Optical];
+
+    /// The name used in protocols and sessions.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Kinematic => "kinematic",
+            Self::Geometric => "geometric",
+            Self::Optical => "optical",
+        }
+    }
+}
+
+impl fmt::Display for SimLevel {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for SimLevel {
+    type Err = String;
+    fn from_str(s: &str) -> Result<Self, String> {
+        Self::ALL
+            .into_iter()
+            .find(|l| l.name() == s)
+            .ok_or_else(|| format!("expected kinematic, geometric or optical, found `{s}`"))
+    }
+}
+
+/// A property of the simulated session that its user relies on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SceneNeed {
+    /// Trajectories, settling, timing of the presses.
+    Motion,
+    /// Trigger edges and clock fits.
+    Triggers,
+    /// Data volume and event rates of realistic size and course.
+    EventRates,
+    /// Polarity of press and release bursts.
+    Polarity,
+    /// Localisation end to end; errors come from stated, injected-free sampling noise of the centroid.
+    Localisation,
+    /// Localisation errors that emerge from optics: bias over the skin, dependence on depth and distance.
+    OpticalError,
+    /// Detection latency that emerges from light and pixel thresholds.
+    Latency,
+}
+
+impl SceneNeed {
+    /// All needs.
+    pub const ALL: [Self; 7] = [
+        Self::Motion,
+        Self::Triggers,
+        Self::EventRates,
+        Self::Polarity,
+        Self::Localisation,
+        Self::OpticalError,
+        Self::Latency,
+    ];
+
+    /// The name used in protocols.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Motion => "motion",
+            Self::Triggers => "triggers",
+            Self::EventRates => "event_rates",
+            Self::Polarity => "polarity",
+            Self::Localisation => "localisation",
+            Self::OpticalError => "optical_error",
+            Self::Latency => "latency",
+        }
+    }
+
+    /// The cheapest level that has this property.
+    #[must_use]
+    pub const fn level(self) -> SimLevel {
+        match self {
+            Self::Motion | Self::Triggers => SimLevel::Kinematic,
+            Self::EventRates | Self::Polarity | Self::Localisation => SimLevel::Geometric,
+            Self::OpticalError | Self::Latency => SimLevel::Optical,
+        }
+    }
+}
+
+/// The cheapest level that satisfies every need; [`SimLevel::Kinematic`] when there is none.
+#[must_use]
+pub fn cheapest_level(needs: &[SceneNeed]) -> SimLevel {
+    needs
+        .iter()
+        .map(|n| n.level())
+        .max()
+        .unwrap_or(SimLevel::Kinematic)
+}

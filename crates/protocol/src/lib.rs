@@ -1,0 +1,2 @@
+//! YAML to plan (being written).
+pub mod plan;

@@ -1,0 +1,98 @@
+//! The plan: a flat list of small typed steps, each with limits and a deadline, as pure data.
+//!
+//! A plan is compiled from a protocol before any device is opened. It holds everything the controller
+//! needs and nothing that it must compute: seeds are resolved, orders shuffled, positions absolute.
+
+use serde::{Deserialize, Serialize};
+use skinrig_model::{HostDuration, MarkKind, PlannedPress, Point2, Point3, PressId, Skin};
+
+/// Everything a run does, in order.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Plan {
+    /// Version of this layout.
+    pub version: u32,
+    /// Name of the protocol, for people.
+    pub name: String,
+    /// Seed of everything random in the run.
+    pub seed: u64,
+    /// Limits that hold for the whole run.
+    pub limits: RunLimits,
+    /// Every planned press; `presses[i].id == PressId(i)`.
+    pub presses: Vec<PlannedPress>,
+    /// What to do, in order.
+    pub steps: Vec<Step>,
+}
+
+/// Limits that hold for the whole run, skin frame.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct RunLimits {
+    /// Lowest allowed coordinates, mm.
+    pub workspace_min_mm: [f64; 3],
+    /// Highest allowed coordinates, mm.
+    pub workspace_max_mm: [f64; 3],
+    /// Height above the surface at which lateral motion is allowed, mm.
+    pub clearance_mm: f64,
+    /// Deepest allowed indentation, mm, positive.
+    pub max_depth_mm: f64,
+    /// Fastest allowed motion, mm/s.
+    pub max_speed_mm_s: f64,
+    /// A measured force above this ends the run, N.
+    pub max_force_n: f64,
+    /// How close to its target a settled pose must be, mm.
+    pub position_tolerance_mm: f64,
+    /// How long the pose must stay within the tolerance to count as settled.
+    pub settle_time: HostDuration,
+}
+
+/// One step.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "step", rename_all = "snake_case")]
+pub enum Step {
+    /// A repetition begins; its press periods count from this instant. The sync presses, when there are
+    /// any, have their own block with `repetition: None`.
+    Begin {
+        /// Which repetition, from 0; `None` for the sync block.
+        repetition: Option<u32>,
+    },
+    /// Straight motion at clearance height or above.
+    Travel {
+        /// Where to, skin frame, mm.
+        to: Point3<Skin>,
+        /// mm/s.
+        speed_mm_s: f64,
+        /// Longest time the motion may take, settling included.
+        deadline: HostDuration,
+    },
+    /// One press, from clearance height and back to it.
+    Press(PressStep),
+    /// Stay where you are.
+    Pause {
+        /// How long.
+        duration: HostDuration,
+    },
+}
+
+/// One press, from clearance height above `at` and back to it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PressStep {
+    /// Which planned press.
+    pub press: PressId,
+    /// Where, skin frame.
+    pub at: Point2,
+    /// How deep, mm, positive.
+    pub depth_mm: f64,
+    /// The downward motion begins this long after the last `Begin`; at once when that is past or `None`.
+    pub start_after_begin: Option<HostDuration>,
+    /// Speed from clearance height to the surface, mm/s.
+    pub approach_speed_mm_s: f64,
+    /// Speed from the surface to depth, mm/s.
+    pub indent_speed_mm_s: f64,
+    /// Time at depth after settling.
+    pub hold: HostDuration,
+    /// Speed from depth to clearance height, mm/s.
+    pub retract_speed_mm_s: f64,
+    /// Moments that emit a mark on the trigger line.
+    pub marks: Vec<MarkKind>,
+    /// Longest time from the downward motion's begin to settled at clearance height.
+    pub deadline: HostDuration,
+}
