@@ -3,6 +3,8 @@
 //! Lens of the paper (section "Geometric Triangulation", constants of the public code): with
 //! `s = (u - 320) / 320`, the viewing angle is `theta = s * 60° * exp(-W |s|) + skew`. A positive angle turns
 //! the camera's axis, which points at the skin centre, clockwise.
+//!
+//! Transcendental functions come from the `libm` crate, so that simulated bytes are the same on every machine.
 
 use serde::{Deserialize, Serialize};
 
@@ -32,7 +34,7 @@ impl LensModel {
     pub fn angle_deg(&self, s: f64) -> (f64, f64) {
         match *self {
             Self::Exponential { half_fov_deg, w } => {
-                let falloff = (-w * s.abs()).exp();
+                let falloff = libm::exp(-w * s.abs());
                 (
                     s * half_fov_deg * falloff,
                     half_fov_deg * falloff * (1.0 - w * s.abs()),
@@ -70,8 +72,8 @@ impl CameraModel {
             self.aim.x_mm - self.position.x_mm,
             self.aim.y_mm - self.position.y_mm,
         );
-        let length = ax.hypot(ay);
-        let (sin, cos) = angle_deg.to_radians().sin_cos();
+        let length = libm::hypot(ax, ay);
+        let (sin, cos) = libm::sincos(angle_deg.to_radians());
         [
             (ax * cos + ay * sin) / length,
             (ay * cos - ax * sin) / length,
@@ -87,7 +89,7 @@ impl CameraModel {
         );
         let (bx, by) = (p.x_mm - self.position.x_mm, p.y_mm - self.position.y_mm);
         // Clockwise from a to b: the negated counter-clockwise angle.
-        -(ax * by - ay * bx).atan2(ax * bx + ay * by).to_degrees()
+        -libm::atan2(ax * by - ay * bx, ax * bx + ay * by).to_degrees()
     }
 
     /// The fractional column at which `p` appears, or `None` outside the field of view (columns 0..=640).

@@ -35,7 +35,7 @@ impl Point2 {
     /// Euclidean distance to `other` in mm.
     #[must_use]
     pub fn distance_mm(self, other: Self) -> f64 {
-        (self.x_mm - other.x_mm).hypot(self.y_mm - other.y_mm)
+        libm::hypot(self.x_mm - other.x_mm, self.y_mm - other.y_mm)
     }
 
     /// The point `z_mm` above this one (negative: below the surface).

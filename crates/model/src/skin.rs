@@ -46,7 +46,7 @@ impl SkinOutline {
         // Arc about (-hx + r, hy - r), only in its own corner.
         let (dx, dy) = (x - (self.radius_mm - hx), y - (hy - self.radius_mm));
         if dx < 0.0 && dy > 0.0 {
-            clearance = clearance.min(self.radius_mm - dx.hypot(dy));
+            clearance = clearance.min(self.radius_mm - libm::hypot(dx, dy));
         }
         clearance
     }
