@@ -2,7 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 use skinrig_model::{
-    AnalysisSettings, Point2, PressId, PressRole, PressTiming, RigGeometry, StereoGeometry,
+    AnalysisSettings, CameraId, Point2, PressId, PressRole, PressTiming, RigGeometry,
+    StereoGeometry,
 };
 
 /// Version of this layout and of the algorithms behind it; part of every result.
@@ -35,6 +36,12 @@ pub struct Analysis {
     pub presses: Vec<PressResult>,
     /// Things a reader must know: fallbacks taken, data missing, suspicious residuals.
     pub warnings: Vec<String>,
+    /// What the cameras saw of a few scored presses, evenly spaced over the session.
+    #[serde(default)]
+    pub pictures: Vec<PressPicture>,
+    /// The event rates around a few scored presses.
+    #[serde(default)]
+    pub zooms: Vec<RateZoom>,
 }
 
 /// How the presses ended. Sync presses are counted apart.
@@ -125,7 +132,7 @@ pub struct Metrics {
     pub p95_mm: Estimate,
     /// Mean over locations of the std between repetitions (Euclid, sample std with n-1).
     pub repeat_std_mm: Estimate,
-    /// Share of the attempted scored presses that got an estimate.
+    /// Share of the attempted scored presses, invalid ones included, that got an estimate which counts here.
     pub located_rate: Estimate,
     /// RMSE as a share of the skin's diagonal, percent.
     pub rmse_diagonal_percent: Option<f64>,
@@ -155,7 +162,8 @@ pub struct CalibrationResult {
 /// An event-rate course.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct RateSeries {
-    /// Host time of the first bin's left edge, s (camera time when there is no clock fit).
+    /// Host time of the first bin's left edge, s (camera time when there is no clock fit). Only events in
+    /// the rows of the crop are counted.
     pub start_s: f64,
     /// Width of a bin, s. Grows for long sessions so that a series stays below a few thousand bins.
     pub bin_s: f64,
@@ -226,8 +234,58 @@ pub struct PressView {
     pub centroid_v: Option<f64>,
     /// Events per second in the window.
     pub rate_per_s: f64,
-    /// Events per second in the idle time before the press.
+    /// Events per second in the idle time before the press; 0 when `idle_s` is 0.
     pub idle_rate_per_s: f64,
+    /// Length of the idle time that the idle rate stands on, s; 0 when the presses leave none.
+    #[serde(default)]
+    pub idle_s: f64,
+}
+
+/// The events of one press in one camera, counted per pixel: columns all, rows of the crop.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct PressPicture {
+    /// Which press.
+    pub press: PressId,
+    /// Which camera.
+    pub camera: CameraId,
+    /// First and last row of the crop, both included.
+    pub rows: (u16, u16),
+    /// The pixels with events, row by row.
+    pub pixels: Vec<PicturePixel>,
+}
+
+/// One pixel of a [`PressPicture`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct PicturePixel {
+    /// Column, 0..640.
+    pub u: u16,
+    /// Row on the sensor, 0..480.
+    pub v: u16,
+    /// ON events.
+    pub on: u32,
+    /// OFF events.
+    pub off: u32,
+    /// True when the pixel belongs to the cluster(s) that make the centroid.
+    pub clustered: bool,
+}
+
+/// The event rate of one camera around one press, in fine bins.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RateZoom {
+    /// Which press.
+    pub press: PressId,
+    /// Which camera.
+    pub camera: CameraId,
+    /// Time of the first bin's left edge after the measured contact, s (negative: before it).
+    pub start_s: f64,
+    /// Width of a bin, s.
+    pub bin_s: f64,
+    /// ON events per second in each bin, rows of the crop only.
+    pub on_per_s: Vec<f32>,
+    /// OFF events per second in each bin.
+    pub off_per_s: Vec<f32>,
+    /// The measured release after the measured contact, s.
+    pub release_s: f64,
 }
 
 /// The result of intersecting the two rays.

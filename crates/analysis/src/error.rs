@@ -1,0 +1,70 @@
+//! What can keep an analysis from giving a result.
+
+use skinrig_model::CameraId;
+
+/// Why there is no analysis. Everything else that goes wrong is a row, a count or a warning in the result.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum AnalysisError {
+    /// The journal does not fit the plan.
+    #[error(
+        "expected one outcome slot per planned press ({planned}), found {outcomes}; the session's journal and plan do not belong together"
+    )]
+    JournalLength {
+        /// Planned presses.
+        planned: usize,
+        /// Outcome slots.
+        outcomes: usize,
+    },
+    /// An outcome stands in the row of another press.
+    #[error(
+        "expected the outcome of press {expected} in row {expected} of the journal, found that of press {found}"
+    )]
+    JournalOrder {
+        /// Press of the row.
+        expected: u32,
+        /// Press that the outcome names.
+        found: u32,
+    },
+    /// A setting is out of its range.
+    #[error("expected {expected} for the analysis setting `{name}`, found {found}")]
+    Setting {
+        /// Its name in the protocol.
+        name: &'static str,
+        /// What is allowed.
+        expected: &'static str,
+        /// What was given.
+        found: String,
+    },
+    /// The rig's geometry cannot be used.
+    #[error(
+        "expected finite camera positions away from the point they aim at, found {found} for {camera}; check the rig description of the session"
+    )]
+    Geometry {
+        /// Which camera.
+        camera: CameraId,
+        /// What was given.
+        found: String,
+    },
+    /// The events of a camera could not be read to their end.
+    #[error("{camera}: {message}")]
+    Events {
+        /// Which camera.
+        camera: CameraId,
+        /// What the source said.
+        message: String,
+    },
+    /// An event lies off the sensor.
+    #[error(
+        "expected events within 640 x 480 px, found ({x}, {y}) at {t_us} µs of {camera}; the stream was decoded with the wrong format or sensor"
+    )]
+    OffSensor {
+        /// Which camera.
+        camera: CameraId,
+        /// Column.
+        x: u16,
+        /// Row.
+        y: u16,
+        /// Camera time, µs.
+        t_us: u64,
+    },
+}
