@@ -1,1 +1,72 @@
-//! (being written)
+//! Owns the presentation of an analysis: self-contained HTML page, SVG figures, JSON, terminal table.
+//!
+//! The report computes nothing beyond layout. Every number comes from
+//! [`skinrig_analysis::result::Analysis`]; the few summaries that only a drawing needs (bars of a histogram,
+//! means per location) are in one place, [`derive`], with their formulas.
+//!
+//! User strings (prototype, operator, notes, file names) are escaped wherever they land: by minijinja's
+//! auto-escape in HTML, by the [`svg`] builder in figures, and by [`page::script_json`] in script data.
+//!
+//! Hooks for browser tests: every section, figure, button and the press table carries a `data-testid`.
+
+pub mod colour;
+pub mod derive;
+pub mod figures;
+pub mod page;
+pub mod provenance;
+pub mod svg;
+
+mod document;
+mod format;
+mod terminal;
+
+pub use document::{JSON_FORMAT, JSON_VERSION};
+pub use provenance::{DeviceRow, InterruptionRow, NoteRow, Provenance};
+
+use skinrig_analysis::result::Analysis;
+
+/// What a report is made from.
+#[derive(Debug, Clone)]
+pub struct ReportInput<'a> {
+    /// The numbers.
+    pub analysis: &'a Analysis,
+    /// Where they come from.
+    pub provenance: Provenance,
+}
+
+/// Why a report could not be written.
+#[derive(Debug, thiserror::Error)]
+pub enum ReportError {
+    /// The page template failed; a defect of this crate.
+    #[error("expected the report template to render, found: {0}; please report this as a defect")]
+    Template(#[from] minijinja::Error),
+    /// The script data could not be written as JSON; a defect of this crate.
+    #[error("expected report data that JSON can hold, found: {0}; please report this as a defect")]
+    Json(#[from] serde_json::Error),
+}
+
+/// The whole report as one HTML page that needs no network and no other file.
+///
+/// # Errors
+/// [`ReportError`] when the template or the script data cannot be written; no input is known to cause it.
+pub fn html(input: &ReportInput<'_>) -> Result<String, ReportError> {
+    page::render(input)
+}
+
+/// The results as JSON for programs: `format` ([`JSON_FORMAT`]), `format_version` ([`JSON_VERSION`]),
+/// `provenance` ([`Provenance`]) and `analysis` (the fields of [`Analysis`] without the bulk series `rates`, `pictures` and `zooms`).
+///
+/// A field that has no value is `null`. Fields are added without a new version; a field that changes its
+/// meaning or disappears raises the version.
+#[must_use]
+pub fn json(input: &ReportInput<'_>) -> serde_json::Value {
+    document::json(input)
+}
+
+/// The results as a table for a terminal: at most 80 columns, ends with a newline.
+///
+/// `color` adds ANSI escapes (bold and yellow, nothing that changes the layout).
+#[must_use]
+pub fn terminal_table(input: &ReportInput<'_>, color: bool) -> String {
+    terminal::table(input, color)
+}

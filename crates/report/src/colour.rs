@@ -1,0 +1,43 @@
+//! Owns the colour scale of the figures: viridis, readable with every common colour vision.
+//!
+//! Nine anchor colours of matplotlib's viridis table (at 0, 1/8, ... 1), linear in between.
+
+const VIRIDIS: [[u8; 3]; 9] = [
+    [68, 1, 84],
+    [71, 44, 122],
+    [59, 81, 139],
+    [44, 113, 142],
+    [33, 144, 141],
+    [39, 173, 129],
+    [92, 200, 99],
+    [170, 220, 50],
+    [253, 231, 37],
+];
+
+/// The colour at `share` of the scale (0..=1, clamped: the scale's ends are labelled as such), `#rrggbb`.
+#[must_use]
+pub fn viridis(share: f64) -> String {
+    let share = if share.is_finite() { share.clamp(0.0, 1.0) } else { 0.0 };
+    let at = share * (VIRIDIS.len() - 1) as f64;
+    let i = (at as usize).min(VIRIDIS.len() - 2);
+    let t = at - i as f64;
+    let mix = |c: usize| {
+        let (a, b) = (f64::from(VIRIDIS[i][c]), f64::from(VIRIDIS[i + 1][c]));
+        (a + t * (b - a)).round() as u8
+    };
+    format!("#{:02x}{:02x}{:02x}", mix(0), mix(1), mix(2))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::viridis;
+
+    #[test]
+    fn ends_and_middle_are_the_published_colours() {
+        assert_eq!(viridis(0.0), "#440154");
+        assert_eq!(viridis(0.5), "#21908d");
+        assert_eq!(viridis(1.0), "#fde725");
+        assert_eq!(viridis(f64::NAN), "#440154");
+        assert_eq!(viridis(7.0), "#fde725");
+    }
+}

@@ -1,0 +1,30 @@
+//! Owns the JSON document of a report.
+
+use serde_json::{Value, json as object};
+
+use crate::ReportInput;
+
+/// Value of the document's `format` field.
+pub const JSON_FORMAT: &str = "skinrig-report";
+/// Version of the document's layout.
+pub const JSON_VERSION: u32 = 1;
+
+/// Fields of the analysis that are bulk data for figures.
+const BULK: [&str; 3] = ["rates", "pictures", "zooms"];
+
+/// See [`crate::json`].
+pub(crate) fn json(input: &ReportInput<'_>) -> Value {
+    // Both are plain data with string keys; JSON has a place for everything in them (NaN becomes null).
+    let mut analysis = serde_json::to_value(input.analysis).unwrap_or(Value::Null);
+    if let Some(map) = analysis.as_object_mut() {
+        for field in BULK {
+            map.remove(field);
+        }
+    }
+    object!({
+        "format": JSON_FORMAT,
+        "format_version": JSON_VERSION,
+        "provenance": input.provenance,
+        "analysis": analysis,
+    })
+}

@@ -1,0 +1,77 @@
+//! Owns how numbers are written for people: digits, units, intervals, the dash for "no value".
+
+use skinrig_analysis::result::Estimate;
+
+/// What stands where there is no value.
+pub(crate) const NONE: &str = "–";
+
+/// `value` with `digits` decimals, or the dash for a missing or non-finite one.
+pub(crate) fn number(value: Option<f64>, digits: usize) -> String {
+    match value {
+        Some(v) if v.is_finite() => {
+            let text = format!("{v:.digits$}");
+            // A rounded negative zero reads as an error.
+            if text.starts_with('-') && text.bytes().all(|b| matches!(b, b'-' | b'0' | b'.')) {
+                text[1..].to_owned()
+            } else {
+                text
+            }
+        }
+        _ => NONE.to_owned(),
+    }
+}
+
+/// The 95 % interval as `[low, high]`, or the dash.
+pub(crate) fn interval(e: &Estimate, scale: f64, digits: usize) -> String {
+    match (e.low, e.high) {
+        (Some(l), Some(h)) if l.is_finite() && h.is_finite() => format!(
+            "[{}, {}]",
+            number(Some(l * scale), digits),
+            number(Some(h * scale), digits)
+        ),
+        _ => NONE.to_owned(),
+    }
+}
+
+/// A whole number with thin groups of three: `12 345 678`.
+pub(crate) fn grouped(n: u64) -> String {
+    let digits = n.to_string();
+    let mut out = String::with_capacity(digits.len() + digits.len() / 3);
+    for (i, c) in digits.chars().enumerate() {
+        if i > 0 && (digits.len() - i).is_multiple_of(3) {
+            out.push('\u{202f}');
+        }
+        out.push(c);
+    }
+    out
+}
+
+/// The text, or "not recorded" when it is empty.
+pub(crate) fn or_missing(text: &str) -> &str {
+    if text.trim().is_empty() {
+        "not recorded"
+    } else {
+        text
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_read_well() {
+        assert_eq!(number(Some(4.6649), 2), "4.66");
+        assert_eq!(number(Some(-0.0001), 2), "0.00");
+        assert_eq!(number(Some(f64::NAN), 2), NONE);
+        assert_eq!(number(None, 2), NONE);
+        assert_eq!(grouped(1_234_567), "1\u{202f}234\u{202f}567");
+        assert_eq!(grouped(999), "999");
+    }
+
+    #[test]
+    fn half_an_interval_is_none() {
+        let e = Estimate { value: Some(1.0), low: Some(0.5), high: None, n: 3 };
+        assert_eq!(interval(&e, 1.0, 2), NONE);
+    }
+}

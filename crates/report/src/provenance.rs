@@ -1,0 +1,85 @@
+//! Owns the plain description of where a session comes from, as the report shows it.
+
+use serde::{Deserialize, Serialize};
+
+/// Where the numbers of a report come from. Plain strings; empty strings are shown as "not recorded".
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct Provenance {
+    /// Identifier of the session; appears in every figure.
+    pub session_id: String,
+    /// Civil time of the start, RFC 3339.
+    pub started: String,
+    /// Which prototype was pressed.
+    pub prototype: String,
+    /// Who ran the session.
+    pub operator: String,
+    /// Name of the protocol.
+    pub protocol_name: String,
+    /// Lower-case hex SHA-256 of the protocol's text.
+    pub protocol_sha256: String,
+    /// Values overridden on the command line, as `key=value`.
+    pub overrides: Vec<String>,
+    /// Lower-case hex SHA-256 of the plan.
+    pub plan_sha256: String,
+    /// The seed of the run.
+    pub seed: u64,
+    /// `simulated`, `replayed`, `imported` or `bench`.
+    pub rig_kind: String,
+    /// Name of the rig, with the level of a simulated one.
+    pub rig_name: String,
+    /// True when the rig was simulated: the report then says so plainly.
+    pub simulated: bool,
+    /// The devices, in the order in which they were configured.
+    pub devices: Vec<DeviceRow>,
+    /// Version of skinrig that recorded the session.
+    pub software: String,
+    /// Host name of the recording machine.
+    pub host: String,
+    /// The command line of the run.
+    pub command_line: String,
+    /// SHA-256 of the results, hex.
+    pub results_hash: String,
+    /// `completed`, `stopped`, `faulted`, or what the session says instead (for example `not ended`).
+    pub run_end: String,
+    /// Why the run ended, when it did not simply complete.
+    pub run_end_reason: Option<String>,
+    /// Everything that broke the normal course.
+    pub interruptions: Vec<InterruptionRow>,
+    /// Remarks.
+    pub notes: Vec<NoteRow>,
+    /// Bytes known to be lost, camera 1 and camera 2.
+    pub lost_bytes: [u64; 2],
+}
+
+/// One device.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct DeviceRow {
+    /// What it is for, for example `camera1`.
+    pub role: String,
+    /// Maker and model.
+    pub model: String,
+    /// Serial number.
+    pub serial: String,
+    /// Firmware or library version.
+    pub firmware: String,
+}
+
+/// One interruption.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct InterruptionRow {
+    /// Host time, s.
+    pub t_s: f64,
+    /// `pause`, `resume`, `stop`, `abort` or `fault`.
+    pub kind: String,
+    /// In words.
+    pub reason: String,
+}
+
+/// One remark.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct NoteRow {
+    /// Host time, s.
+    pub t_s: f64,
+    /// The remark.
+    pub text: String,
+}

@@ -1,0 +1,326 @@
+//! Owns the writing of SVG: elements with escaped attributes and text, linear axes with readable ticks.
+//!
+//! Why not a plotting crate: figures must follow the page's light and dark theme, so every colour that
+//! means "ink", "grid" or "camera 1" is a CSS class (`assets/figure.css`), not a baked-in value; each figure
+//! needs a title, a description and one element per press that a script can find; and a page of 2,500
+//! presses must stay small. Plotting crates bake colours in, and write neither. What is left is little:
+//! elements, two scales, ticks.
+
+use std::fmt::{self, Display, Write};
+
+/// Style of the figures: classes and theme variables, light by default.
+pub const FIGURE_CSS: &str = include_str!("../assets/figure.css");
+
+/// Writes text with the five XML specials escaped and characters that XML forbids replaced.
+struct Escaping<'a>(&'a mut String);
+
+impl Write for Escaping<'_> {
+    fn write_str(&mut self, s: &str) -> fmt::Result {
+        for c in s.chars() {
+            match c {
+                '&' => self.0.push_str("&amp;"),
+                '<' => self.0.push_str("&lt;"),
+                '>' => self.0.push_str("&gt;"),
+                '"' => self.0.push_str("&quot;"),
+                '\'' => self.0.push_str("&#39;"),
+                '\n' | '\t' => self.0.push(c),
+                c if c.is_control() || c == '\u{fffe}' || c == '\u{ffff}' => {
+                    self.0.push(char::REPLACEMENT_CHARACTER);
+                }
+                c => self.0.push(c),
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A coordinate with two decimals and no trailing zeros; non-finite values become 0 so that no file breaks.
+#[derive(Debug, Clone, Copy)]
+pub struct Px(pub f64);
+
+impl Display for Px {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let hundredths = (self.0 * 100.0).round();
+        if !hundredths.is_finite() || hundredths == 0.0 {
+            return f.write_str("0");
+        }
+        write!(f, "{}", hundredths / 100.0)
+    }
+}
+
+/// Attribute list: name and value, the value is escaped.
+pub type Attributes<'a> = &'a [(&'a str, &'a dyn Display)];
+
+/// An SVG document, or part of one, being written.
+#[derive(Debug, Default)]
+pub struct Svg {
+    out: String,
+    open: Vec<&'static str>,
+}
+
+impl Svg {
+    /// Nothing yet.
+    #[must_use]
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    fn start(&mut self, tag: &str, attributes: Attributes<'_>) {
+        self.out.push('<');
+        self.out.push_str(tag);
+        for (name, value) in attributes {
+            self.out.push(' ');
+            self.out.push_str(name);
+            self.out.push_str("=\"");
+            // Writing to a String cannot fail.
+            let _ = write!(Escaping(&mut self.out), "{value}");
+            self.out.push('"');
+        }
+    }
+
+    /// Opens an element.
+    pub fn open(&mut self, tag: &'static str, attributes: Attributes<'_>) -> &mut Self {
+        self.start(tag, attributes);
+        self.out.push('>');
+        self.open.push(tag);
+        self
+    }
+
+    /// Closes the innermost open element; nothing when none is open.
+    pub fn close(&mut self) -> &mut Self {
+        if let Some(tag) = self.open.pop() {
+            let _ = write!(self.out, "</{tag}>");
+        }
+        self
+    }
+
+    /// An element without content.
+    pub fn leaf(&mut self, tag: &str, attributes: Attributes<'_>) -> &mut Self {
+        self.start(tag, attributes);
+        self.out.push_str("/>");
+        self
+    }
+
+    /// An element that holds only text.
+    pub fn holding(&mut self, tag: &str, attributes: Attributes<'_>, text: &str) -> &mut Self {
+        self.start(tag, attributes);
+        self.out.push('>');
+        let _ = Escaping(&mut self.out).write_str(text);
+        let _ = write!(self.out, "</{tag}>");
+        self
+    }
+
+    /// Text at (x, y), anchored `start`, `middle` or `end`.
+    pub fn text(&mut self, at: (f64, f64), class: &str, anchor: &str, text: &str) -> &mut Self {
+        self.holding(
+            "text",
+            &[
+                ("x", &Px(at.0)),
+                ("y", &Px(at.1)),
+                ("class", &class),
+                ("text-anchor", &anchor),
+            ],
+            text,
+        )
+    }
+
+    /// A straight line.
+    pub fn line(&mut self, class: &str, from: (f64, f64), to: (f64, f64)) -> &mut Self {
+        self.leaf(
+            "line",
+            &[
+                ("class", &class),
+                ("x1", &Px(from.0)),
+                ("y1", &Px(from.1)),
+                ("x2", &Px(to.0)),
+                ("y2", &Px(to.1)),
+            ],
+        )
+    }
+
+    /// A path with the given data.
+    pub fn path(&mut self, class: &str, data: &str) -> &mut Self {
+        if data.is_empty() {
+            return self;
+        }
+        self.leaf("path", &[("class", &class), ("d", &data)])
+    }
+
+    /// The text; open elements are closed.
+    #[must_use]
+    pub fn finish(mut self) -> String {
+        while !self.open.is_empty() {
+            self.close();
+        }
+        self.out
+    }
+}
+
+/// Path data through the points; `close` adds the way back.
+pub fn polyline(points: impl IntoIterator<Item = (f64, f64)>, close: bool) -> String {
+    let mut d = String::new();
+    for (x, y) in points {
+        let _ = write!(d, "{}{} {}", if d.is_empty() { 'M' } else { 'L' }, Px(x), Px(y));
+    }
+    if close && !d.is_empty() {
+        d.push('Z');
+    }
+    d
+}
+
+/// Path data of dots: zero-length strokes, round with `stroke-linecap: round`. Far smaller than circles.
+pub fn dots(points: impl IntoIterator<Item = (f64, f64)>) -> String {
+    let mut d = String::new();
+    for (x, y) in points {
+        let _ = write!(d, "M{} {}h0", Px(x), Px(y));
+    }
+    d
+}
+
+/// Tick positions at 1, 2 or 5 times a power of ten inside `low..=high`, about `wanted` of them.
+#[must_use]
+pub fn ticks(low: f64, high: f64, wanted: u32) -> Vec<f64> {
+    let span = high - low;
+    if !(span.is_finite() && span > 0.0) {
+        return vec![];
+    }
+    let raw = span / f64::from(wanted.max(1));
+    let power = 10f64.powf(raw.log10().floor());
+    let step = [1.0, 2.0, 5.0, 10.0]
+        .into_iter()
+        .map(|m| m * power)
+        .find(|s| *s >= raw * 0.999)
+        .unwrap_or(10.0 * power);
+    let first = (low / step - 1e-9).ceil() as i64;
+    let last = (high / step + 1e-9).floor() as i64;
+    (first..=last).map(|k| k as f64 * step).collect()
+}
+
+/// Writes a tick with as many decimals as the distance `step` between ticks needs.
+#[must_use]
+pub fn tick_label(value: f64, step: f64) -> String {
+    let digits = if step > 0.0 { (-step.log10().floor()).max(0.0) as usize } else { 0 };
+    crate::format::number(Some(value), digits.min(9))
+}
+
+/// A linear map from data to pixels along one axis.
+#[derive(Debug, Clone, Copy)]
+pub struct Scale {
+    /// Data range; never empty.
+    pub data: (f64, f64),
+    /// Pixel range; may run backwards.
+    pub px: (f64, f64),
+}
+
+impl Scale {
+    /// The map of `data` onto `px`. An empty or non-finite data range is widened to one unit.
+    #[must_use]
+    pub fn new(data: (f64, f64), px: (f64, f64)) -> Self {
+        let (mut low, mut high) = data;
+        if !(low.is_finite() && high.is_finite()) {
+            (low, high) = (0.0, 1.0);
+        }
+        if high <= low {
+            high = low + 1.0;
+        }
+        Self { data: (low, high), px }
+    }
+
+    /// Pixel position of `value`.
+    #[must_use]
+    pub fn at(&self, value: f64) -> f64 {
+        let share = (value - self.data.0) / (self.data.1 - self.data.0);
+        self.px.0 + share * (self.px.1 - self.px.0)
+    }
+
+    /// Pixels per data unit, positive.
+    #[must_use]
+    pub fn per_unit(&self) -> f64 {
+        ((self.px.1 - self.px.0) / (self.data.1 - self.data.0)).abs()
+    }
+}
+
+/// Two scales with labels.
+#[derive(Debug, Clone)]
+pub struct Axes {
+    /// Horizontal.
+    pub x: Scale,
+    /// Vertical (pixels run downwards).
+    pub y: Scale,
+    /// Label below, with unit.
+    pub x_label: String,
+    /// Label at the left, with unit.
+    pub y_label: String,
+    /// About how many ticks (x, y).
+    pub tick_count: (u32, u32),
+}
+
+impl Axes {
+    /// Draws grid, ticks and labels.
+    pub fn draw(&self, svg: &mut Svg) {
+        let (left, right) = (self.x.px.0.min(self.x.px.1), self.x.px.0.max(self.x.px.1));
+        let (top, bottom) = (self.y.px.0.min(self.y.px.1), self.y.px.0.max(self.y.px.1));
+        svg.open("g", &[("class", &"axes")]);
+        let xs = ticks(self.x.data.0, self.x.data.1, self.tick_count.0);
+        let ys = ticks(self.y.data.0, self.y.data.1, self.tick_count.1);
+        let step = |v: &[f64]| if v.len() > 1 { v[1] - v[0] } else { 1.0 };
+        for &t in &xs {
+            let x = self.x.at(t);
+            svg.line("grid", (x, top), (x, bottom));
+            svg.text((x, bottom + 16.0), "tick", "middle", &tick_label(t, step(&xs)));
+        }
+        for &t in &ys {
+            let y = self.y.at(t);
+            svg.line("grid", (left, y), (right, y));
+            svg.text((left - 7.0, y + 4.0), "tick", "end", &tick_label(t, step(&ys)));
+        }
+        svg.line("axis", (left, bottom), (right, bottom));
+        svg.line("axis", (left, top), (left, bottom));
+        svg.text(((left + right) / 2.0, bottom + 36.0), "label", "middle", &self.x_label);
+        let (x, y) = (left - 46.0, (top + bottom) / 2.0);
+        svg.holding(
+            "text",
+            &[
+                ("class", &"label"),
+                ("text-anchor", &"middle"),
+                ("transform", &format_args!("translate({} {}) rotate(-90)", Px(x), Px(y))),
+            ],
+            &self.y_label,
+        );
+        svg.close();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn specials_are_escaped_in_attributes_and_text() {
+        let mut svg = Svg::new();
+        svg.open("g", &[("data-x", &"\"><script>&'")]);
+        svg.text((1.0, f64::NAN), "a", "start", "</text><img onerror=x>\u{0}");
+        assert_eq!(
+            svg.finish(),
+            "<g data-x=\"&quot;&gt;&lt;script&gt;&amp;&#39;\"><text x=\"1\" y=\"0\" class=\"a\" \
+             text-anchor=\"start\">&lt;/text&gt;&lt;img onerror=x&gt;\u{fffd}</text></g>"
+        );
+    }
+
+    #[test]
+    fn ticks_are_round_and_inside() {
+        assert_eq!(ticks(0.0, 10.0, 5), [0.0, 2.0, 4.0, 6.0, 8.0, 10.0]);
+        assert_eq!(ticks(-0.3, 0.3, 4), [-0.2, 0.0, 0.2]);
+        assert!(ticks(1.0, 1.0, 4).is_empty());
+        assert!(ticks(f64::NAN, 1.0, 4).is_empty());
+        assert_eq!(tick_label(0.2, 0.2), "0.2");
+        assert_eq!(tick_label(20.0, 20.0), "20");
+        assert_eq!(tick_label(0.25, 0.05), "0.25");
+    }
+
+    #[test]
+    fn an_empty_range_still_maps() {
+        assert!(Scale::new((2.0, 2.0), (0.0, 10.0)).at(2.0).is_finite());
+        assert!(Scale::new((f64::NAN, 2.0), (0.0, 10.0)).at(2.0).is_finite());
+    }
+}
