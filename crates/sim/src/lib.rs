@@ -1,1 +1,3 @@
-//! (being written)
+//! A seeded skin world, simulated devices, replayed devices, fault injection.
+
+pub mod scene;
