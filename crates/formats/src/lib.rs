@@ -1,1 +1,14 @@
-//! (being written)
+//! Other people's formats: EVT2, EVT2.1 and EVT3 streams, Prophesee RAW files, bimvee HDF5 containers and
+//! press-position tables.
+//!
+//! Parsers of foreign bytes are total: any input gives events, or an error that says where it stands and
+//! what was expected. Words that a decoder does not deliver are counted in [`StreamStats`].
+
+pub mod error;
+pub mod stream;
+
+pub use error::FormatsError;
+pub use stream::{
+    Decoder, Discontinuity, EventSink, Geometry, Monitoring, Scanner, StreamStats, evt2, evt3,
+    evt21,
+};

@@ -1,0 +1,103 @@
+//! From the wrapping time base of a stream to a continuous camera time.
+
+use super::stats::Discontinuity;
+
+/// What a new time base word means.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Step {
+    /// Progress, or the first word.
+    Forward,
+    /// The counter passed its end.
+    Wrap,
+    /// Neither.
+    Jump(Discontinuity),
+}
+
+/// A counter of `BITS` bits whose unit is `2^SHIFT` µs, continued past its end.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct TimeBase<const BITS: u32, const SHIFT: u32> {
+    high: u32,
+    epoch_us: u64,
+    known: bool,
+}
+
+impl<const BITS: u32, const SHIFT: u32> TimeBase<BITS, SHIFT> {
+    /// Half of the range: the largest step that is taken at its word.
+    pub const HALF: u32 = 1 << (BITS - 1);
+    const RANGE_US: u64 = 1 << (BITS + SHIFT);
+
+    /// True once a time base word was seen.
+    pub const fn known(&self) -> bool {
+        self.known
+    }
+
+    /// The current base, µs.
+    pub const fn base_us(&self) -> u64 {
+        self.epoch_us + ((self.high as u64) << SHIFT)
+    }
+
+    /// µs of all passed ranges.
+    pub const fn epoch_us(&self) -> u64 {
+        self.epoch_us
+    }
+
+    /// The last counter value.
+    pub const fn high(&self) -> u32 {
+        self.high
+    }
+
+    /// Moves on to `high`, which the caller knows to be ordinary progress.
+    pub const fn advance(&mut self, high: u32) {
+        self.high = high;
+    }
+
+    /// Takes the next counter value (below `2^BITS`).
+    pub fn set(&mut self, high: u32) -> Step {
+        let from_us = self.base_us();
+        let previous = self.high;
+        self.high = high;
+        if !self.known {
+            self.known = true;
+            return Step::Forward;
+        }
+        if high >= previous && high - previous <= Self::HALF {
+            return Step::Forward;
+        }
+        if high < previous && previous - high > Self::HALF {
+            self.epoch_us = self.epoch_us.wrapping_add(Self::RANGE_US);
+            return Step::Wrap;
+        }
+        Step::Jump(Discontinuity {
+            from_us,
+            to_us: self.base_us(),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn steps_are_told_apart() {
+        let mut base = TimeBase::<12, 12>::default();
+        assert_eq!(base.set(4000), Step::Forward);
+        assert_eq!(base.set(4000), Step::Forward);
+        assert_eq!(base.set(1), Step::Wrap);
+        assert_eq!(base.base_us(), (4096 + 1) << 12);
+        assert_eq!(base.set(2049), Step::Forward);
+        let Step::Jump(back) = base.set(2048) else {
+            panic!("a small step back is a discontinuity");
+        };
+        assert_eq!(back.from_us - back.to_us, 4096);
+        assert_eq!(
+            base.set(0),
+            Step::Jump(Discontinuity {
+                from_us: 6144 << 12,
+                to_us: 4096 << 12
+            })
+        );
+        assert!(matches!(base.set(2049), Step::Jump(_)));
+        assert_eq!(base.set(0), Step::Wrap);
+    }
+}

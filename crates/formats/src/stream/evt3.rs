@@ -1,0 +1,196 @@
+//! EVT3: 16-bit words with state.
+//!
+//! Layout (EVK1 reference, section 4.3; Prophesee's published EVT 3.0 format): type in bits 15:12. ADDR_Y 0x0
+//! sets the row, ADDR_X 0x2 is one event, VECT_BASE_X 0x3 sets column and polarity of the vectors VECT_12 0x4
+//! and VECT_8 0x5, whose bits are events and which move the column on by 12 and 8. TIME_LOW 0x6 and TIME_HIGH
+//! 0x8 hold 12 bits of time each; a changed TIME_HIGH sets the low part to 0. EXT_TRIGGER 0xA carries channel
+//! 11:8 and edge 0. OTHERS 0xE is followed by 12 + 12 + 4 bits of payload. Time wraps every 16.777216 s.
+//!
+//! Every vector word stands for itself. Sensors send vectors in groups 12 + 12 + 8, and the camera vendor's
+//! own library waits for whole groups and ignores a lone vector; taking words one by one gives the same events
+//! for whole groups and loses none at the edges of a recording.
+
+use skinrig_model::{CdEvent, Polarity, TriggerEdge};
+
+use super::clock::TimeBase;
+use super::output::Output;
+use super::sink::{EventSink, Monitoring};
+
+/// Length of the time base counter, bits; its unit is 4096 µs.
+pub const TIME_HIGH_BITS: u32 = 12;
+/// Range of the stream's time, µs.
+pub const RANGE_US: u64 = 1 << 24;
+
+/// State of an EVT3 stream between two words.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Words {
+    base: TimeBase<TIME_HIGH_BITS, 12>,
+    low: u16,
+    y: Option<u16>,
+    /// Column and polarity of the next vector.
+    vector: Option<(u16, Polarity)>,
+    /// An OTHERS word whose payload is not complete.
+    other: Option<Other>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Other {
+    t_us: u64,
+    subtype: u16,
+    payload: u32,
+    bits: u32,
+}
+
+impl Words {
+    /// Decodes whole words.
+    pub fn run<const KEEP: bool>(
+        &mut self,
+        bytes: &[u8],
+        output: &mut Output,
+        sink: &mut impl EventSink,
+    ) {
+        let (words, _) = bytes.as_chunks();
+        for word in words {
+            self.word::<KEEP>(u16::from_le_bytes(*word), output, sink);
+        }
+    }
+
+    #[inline]
+    fn word<const KEEP: bool>(&mut self, w: u16, output: &mut Output, sink: &mut impl EventSink) {
+        let t_us = self.base.base_us() + u64::from(self.low);
+        let data = w & 0x0fff;
+        match w >> 12 {
+            0x2 => {
+                let Some(y) = self.y.filter(|_| self.base.known()) else {
+                    return self.drop_events(1, output);
+                };
+                output.cd::<KEEP>(
+                    CdEvent {
+                        t_us,
+                        x: data & 0x7ff,
+                        y,
+                        polarity: Polarity::from_bit(data & 0x800 != 0),
+                    },
+                    sink,
+                );
+            }
+            0x4 => self.vector::<KEEP>(data, 12, t_us, output, sink),
+            0x5 => self.vector::<KEEP>(data & 0xff, 8, t_us, output, sink),
+            0x6 => {
+                self.low = data;
+                output.stats.time_low += 1;
+                if self.base.known() {
+                    output.timed(self.base.base_us() + u64::from(data));
+                }
+            }
+            0x0 => {
+                self.y = Some(data & 0x7ff);
+                output.stats.address += 1;
+            }
+            0x3 => {
+                self.vector = Some((data & 0x7ff, Polarity::from_bit(data & 0x800 != 0)));
+                output.stats.address += 1;
+            }
+            0x8 => {
+                if !self.base.known() || self.base.high() != u32::from(data) {
+                    self.low = 0;
+                }
+                let step = self.base.set(data.into());
+                let now_us = self.base.base_us() + u64::from(self.low);
+                output.time_high(step, now_us, sink);
+            }
+            0xa if !self.base.known() => output.stats.dropped_before_time += 1,
+            0xa => output.trigger(
+                TriggerEdge {
+                    t_us,
+                    channel: (data >> 8) as u8,
+                    rising: data & 1 == 1,
+                },
+                sink,
+            ),
+            0xe => {
+                output.stats.monitoring += 1;
+                self.other = Some(Other {
+                    t_us,
+                    subtype: data,
+                    payload: 0,
+                    bits: 0,
+                });
+            }
+            0xf => self.continued(data, 12, 0xf, output, sink),
+            0x7 => self.continued(data & 0xf, 4, 0x7, output, sink),
+            kind => output.stats.skipped[usize::from(kind)] += 1,
+        }
+    }
+
+    #[inline]
+    fn vector<const KEEP: bool>(
+        &mut self,
+        mut mask: u16,
+        columns: u16,
+        t_us: u64,
+        output: &mut Output,
+        sink: &mut impl EventSink,
+    ) {
+        let (Some(y), Some((x, polarity)), true) = (self.y, self.vector, self.base.known()) else {
+            self.drop_events(mask.count_ones(), output);
+            if let Some((x, _)) = &mut self.vector {
+                *x = x.saturating_add(columns);
+            }
+            return;
+        };
+        self.vector = Some((x.saturating_add(columns), polarity));
+        while mask != 0 {
+            let x = x.saturating_add(mask.trailing_zeros() as u16);
+            mask &= mask - 1;
+            output.cd::<KEEP>(
+                CdEvent {
+                    t_us,
+                    x,
+                    y,
+                    polarity,
+                },
+                sink,
+            );
+        }
+    }
+
+    /// Counts events whose time, row or column is not known.
+    fn drop_events(&self, events: u32, output: &mut Output) {
+        if self.base.known() {
+            output.stats.dropped_before_address += u64::from(events);
+        } else {
+            output.stats.dropped_before_time += u64::from(events);
+        }
+    }
+
+    /// Takes a continuation: the next bits of an OTHERS payload, low part first, 28 bits in all.
+    fn continued(
+        &mut self,
+        data: u16,
+        bits: u32,
+        kind: usize,
+        output: &mut Output,
+        sink: &mut impl EventSink,
+    ) {
+        let Some(mut other) = self.other.take() else {
+            output.stats.skipped[kind] += 1;
+            return;
+        };
+        output.stats.monitoring += 1;
+        other.payload |= u32::from(data) << other.bits;
+        other.bits += bits;
+        if other.bits < 28 {
+            self.other = Some(other);
+        } else if self.base.known() {
+            output.monitoring(
+                Monitoring {
+                    t_us: other.t_us,
+                    subtype: other.subtype,
+                    payload: other.payload & 0x0fff_ffff,
+                },
+                sink,
+            );
+        }
+    }
+}

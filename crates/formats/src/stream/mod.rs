@@ -1,0 +1,152 @@
+//! Event streams as cameras send them: one decoder and one scanner over all word formats.
+
+mod clock;
+pub mod evt2;
+pub mod evt21;
+mod evt2_encode;
+pub mod evt3;
+mod output;
+mod scan;
+mod sink;
+mod stats;
+
+use skinrig_model::{CdEvent, StreamFormat, TriggerEdge};
+
+pub use scan::Scanner;
+pub use sink::{EventSink, Monitoring};
+pub use stats::{Discontinuity, Geometry, StreamStats};
+
+use output::Output;
+
+/// An incremental decoder: bytes in, events out, in stream order.
+///
+/// The bytes may be split anywhere, also inside a word; the result does not depend on the splits. Times are
+/// camera times in µs, unwrapped, with the origin of the stream (nothing is shifted to zero). Events before
+/// the first time base word have no time and are counted in [`StreamStats::dropped_before_time`].
+///
+/// A backward step of the time base by more than half of its range is a wrap. A smaller one, and a forward
+/// step by more than half of the range, is taken literally and counted as a discontinuity.
+#[derive(Debug, Clone)]
+pub struct Decoder {
+    words: Words,
+    output: Output,
+    partial: [u8; 8],
+    partial_len: usize,
+}
+
+#[derive(Debug, Clone)]
+enum Words {
+    Evt2(evt2::Words),
+    Evt21(evt21::Words),
+    Evt3(evt3::Words),
+}
+
+impl Words {
+    fn run<const KEEP: bool>(
+        &mut self,
+        bytes: &[u8],
+        output: &mut Output,
+        sink: &mut impl EventSink,
+    ) {
+        match self {
+            Self::Evt2(w) => w.run::<KEEP>(bytes, output, sink),
+            Self::Evt21(w) => w.run::<KEEP>(bytes, output, sink),
+            Self::Evt3(w) => w.run::<KEEP>(bytes, output, sink),
+        }
+    }
+
+    const fn word_bytes(&self) -> usize {
+        match self {
+            Self::Evt2(_) => 4,
+            Self::Evt21(_) => 8,
+            Self::Evt3(_) => 2,
+        }
+    }
+}
+
+impl Decoder {
+    /// A decoder at the start of a stream of `format`, for the EVK1's 640 x 480 pixels.
+    #[must_use]
+    pub fn new(format: StreamFormat) -> Self {
+        Self::with_geometry(format, Geometry::EVK1)
+    }
+
+    /// A decoder for a sensor of `geometry`. Events outside it are not delivered but counted in
+    /// [`StreamStats::out_of_geometry`].
+    #[must_use]
+    pub fn with_geometry(format: StreamFormat, geometry: Geometry) -> Self {
+        let words = match format {
+            StreamFormat::Evt2 => Words::Evt2(evt2::Words::default()),
+            StreamFormat::Evt21 => Words::Evt21(evt21::Words::new(false)),
+            StreamFormat::Evt21Legacy => Words::Evt21(evt21::Words::new(true)),
+            StreamFormat::Evt3 => Words::Evt3(evt3::Words::default()),
+        };
+        Self {
+            words,
+            output: Output::new(geometry),
+            partial: [0; 8],
+            partial_len: 0,
+        }
+    }
+
+    /// Decodes `bytes` and hands everything found to `sink`, in stream order; CD events come in slices of at
+    /// most a few thousand, so that they stay in the processor's cache. This is the fast way to use events
+    /// once.
+    pub fn push(&mut self, bytes: &[u8], sink: &mut impl EventSink) {
+        self.feed::<true>(bytes, sink);
+    }
+
+    /// Decodes `bytes` and hands the CD events to `on_slice`, without the triggers.
+    pub fn for_each_slice(&mut self, bytes: &[u8], on_slice: impl FnMut(&[CdEvent])) {
+        self.push(bytes, &mut sink::CdSlices(on_slice));
+    }
+
+    /// Decodes `bytes` and appends CD events and trigger edges.
+    pub fn push_cd(
+        &mut self,
+        bytes: &[u8],
+        events: &mut Vec<CdEvent>,
+        triggers: &mut Vec<TriggerEdge>,
+    ) {
+        self.push(bytes, &mut sink::Collect { events, triggers });
+    }
+
+    /// What was seen since the start. Bytes of an unfinished word are in [`StreamStats::trailing_bytes`].
+    #[must_use]
+    pub fn stats(&self) -> StreamStats {
+        StreamStats {
+            trailing_bytes: self.partial_len as u64,
+            ..self.output.stats
+        }
+    }
+
+    /// Time of the last timed word (time base, CD event or trigger edge), µs; `None` before the first time
+    /// base word.
+    #[must_use]
+    pub fn last_us(&self) -> Option<u64> {
+        self.output.last_us
+    }
+
+    fn feed<const KEEP: bool>(&mut self, mut bytes: &[u8], sink: &mut impl EventSink) {
+        let size = self.words.word_bytes();
+        if self.partial_len > 0 {
+            let taken = bytes.len().min(size - self.partial_len);
+            let (head, rest) = bytes.split_at(taken);
+            self.partial[self.partial_len..self.partial_len + taken].copy_from_slice(head);
+            self.partial_len += taken;
+            bytes = rest;
+            if self.partial_len < size {
+                return;
+            }
+            let word = self.partial;
+            self.partial_len = 0;
+            self.words
+                .run::<KEEP>(&word[..size], &mut self.output, sink);
+        }
+        let (whole, rest) = bytes.split_at(bytes.len() - bytes.len() % size);
+        self.words.run::<KEEP>(whole, &mut self.output, sink);
+        self.partial[..rest.len()].copy_from_slice(rest);
+        self.partial_len = rest.len();
+        self.output.flush(sink);
+    }
+}

@@ -1,0 +1,111 @@
+//! The decoder's way out: a small reused buffer of events, and the counts.
+
+use skinrig_model::{CdEvent, Polarity, TriggerEdge};
+
+use super::clock::Step;
+use super::sink::{EventSink, Monitoring};
+use super::stats::{Geometry, StreamStats};
+
+/// Events in the buffer: 16 KiB, which stays in the first-level cache together with its input.
+pub(super) const BLOCK: usize = 1024;
+
+#[derive(Debug, Clone)]
+pub(super) struct Output {
+    pub geometry: Geometry,
+    pub stats: StreamStats,
+    /// Time of the last timed word.
+    pub last_us: Option<u64>,
+    /// Time of the first timed word since [`Self::begin_chunk`].
+    pub chunk_first_us: Option<u64>,
+    pub buffer: Box<[CdEvent; BLOCK]>,
+    pub len: usize,
+}
+
+impl Output {
+    pub fn new(geometry: Geometry) -> Self {
+        const NONE: CdEvent = CdEvent {
+            t_us: 0,
+            x: 0,
+            y: 0,
+            polarity: Polarity::Off,
+        };
+        Self {
+            geometry,
+            stats: StreamStats::default(),
+            last_us: None,
+            chunk_first_us: None,
+            buffer: Box::new([NONE; BLOCK]),
+            len: 0,
+        }
+    }
+
+    /// Forgets when the current chunk began.
+    pub fn begin_chunk(&mut self) {
+        self.chunk_first_us = None;
+    }
+
+    /// Notes the time of a timed word.
+    #[inline]
+    pub fn timed(&mut self, t_us: u64) {
+        self.last_us = Some(t_us);
+        self.chunk_first_us.get_or_insert(t_us);
+    }
+
+    /// Hands over what is buffered.
+    pub fn flush(&mut self, sink: &mut impl EventSink) {
+        if self.len > 0 {
+            sink.on_cd(&self.buffer[..self.len]);
+            self.len = 0;
+        }
+    }
+
+    /// Takes one CD event, checked against the sensor.
+    #[inline]
+    pub fn cd<const KEEP: bool>(&mut self, event: CdEvent, sink: &mut impl EventSink) {
+        self.timed(event.t_us);
+        if !self.geometry.contains(event.x, event.y) {
+            self.stats.out_of_geometry += 1;
+            return;
+        }
+        match event.polarity {
+            Polarity::On => self.stats.cd_on += 1,
+            Polarity::Off => self.stats.cd_off += 1,
+        }
+        if KEEP {
+            if self.len == BLOCK {
+                self.flush(sink);
+            }
+            self.buffer[self.len] = event;
+            self.len += 1;
+        }
+    }
+
+    /// Takes one trigger edge.
+    pub fn trigger(&mut self, edge: TriggerEdge, sink: &mut impl EventSink) {
+        self.timed(edge.t_us);
+        self.stats.triggers[usize::from(edge.channel & 31)] += 1;
+        self.flush(sink);
+        sink.on_trigger(edge);
+    }
+
+    /// Takes one complete monitoring message.
+    pub fn monitoring(&mut self, monitoring: Monitoring, sink: &mut impl EventSink) {
+        self.flush(sink);
+        sink.on_monitoring(monitoring);
+    }
+
+    /// Takes one time base word, which led to `now_us`.
+    pub fn time_high(&mut self, step: Step, now_us: u64, sink: &mut impl EventSink) {
+        self.stats.time_high += 1;
+        self.timed(now_us);
+        match step {
+            Step::Forward => {}
+            Step::Wrap => self.stats.wraps += 1,
+            Step::Jump(jump) => {
+                self.stats.discontinuities += 1;
+                self.flush(sink);
+                sink.on_discontinuity(jump);
+            }
+        }
+    }
+}
