@@ -1,0 +1,126 @@
+//! Arming: open, configure, read back, start, and know where the robot is.
+
+use skinrig_device::CameraCapabilities;
+use skinrig_model::{CameraId, DeviceRole, Record};
+use skinrig_protocol::plan::Step;
+
+use crate::core::Core;
+use crate::error::{ControllerError, Halt};
+use crate::preflight;
+use crate::states::Event;
+
+impl Core<'_> {
+    /// Brings every device from unknown to ready. Nothing moves.
+    pub(crate) fn arm(&mut self) -> Result<(), Halt> {
+        let Some(header) = self.header.take() else {
+            return Err(ControllerError::Internal("armed twice".to_owned()).into());
+        };
+        self.journal.emit(Record::Started(header.clone()))?;
+        preflight::check_plan(self.plan, &header)?;
+        if header.robot_from_skin != self.robot_from_skin {
+            return Err(rig_error("header", "the rig's place of the skin", "another").into());
+        }
+        let can = self.indenter.capabilities();
+        let (limits, remarks) = preflight::motion_limits(self.plan, &self.robot_from_skin, &can)?;
+        for text in remarks {
+            let t = self.now();
+            self.journal.emit(Record::Note { t, text })?;
+        }
+        let settings = self.indenter.configure(&limits)?;
+        let identity = self.indenter.identity();
+        self.journal.emit(Record::Device {
+            role: DeviceRole::Indenter,
+            identity,
+            settings,
+        })?;
+        for camera in CameraId::ALL {
+            self.configure_camera(camera, header.stream_formats[camera.index()])?;
+        }
+        self.check_trigger_box()?;
+        for camera in CameraId::ALL {
+            self.cameras[camera.index()].start()?;
+        }
+        self.indenter.arm()?;
+        self.await_pose()?;
+        self.machine.fire(Event::ArmingDone);
+        Ok(())
+    }
+
+    fn configure_camera(
+        &mut self,
+        camera: CameraId,
+        format: skinrig_model::StreamFormat,
+    ) -> Result<(), ControllerError> {
+        let device = self.cameras[camera.index()].as_mut();
+        if device.camera() != camera {
+            let found = device.camera().to_string();
+            return Err(rig_error("cameras", camera.to_string(), found));
+        }
+        let can: CameraCapabilities = device.capabilities();
+        if can.format != format {
+            let expected = format!("stream format {format} (header)");
+            return Err(rig_error(camera.to_string(), expected, can.format.name()));
+        }
+        let settings = device.configure(&self.camera_settings[camera.index()])?;
+        let identity = device.identity();
+        self.journal.emit(Record::Device {
+            role: DeviceRole::of_camera(camera),
+            identity,
+            settings,
+        })
+    }
+
+    fn check_trigger_box(&mut self) -> Result<(), ControllerError> {
+        let marks = self
+            .plan
+            .steps
+            .iter()
+            .any(|s| matches!(s, Step::Press(p) if !p.marks.is_empty()));
+        match &self.trigger_box {
+            Some(device) => {
+                let identity = device.identity();
+                self.journal.emit(Record::Device {
+                    role: DeviceRole::TriggerBox,
+                    identity,
+                    settings: Vec::new(),
+                })
+            }
+            None if marks => Err(rig_error(
+                "trigger box",
+                "one, because the plan has trigger marks",
+                "none; connect it or remove the marks from the protocol",
+            )),
+            None => Ok(()),
+        }
+    }
+
+    /// Waits for the first pose after arming.
+    fn await_pose(&mut self) -> Result<(), Halt> {
+        let deadline = self.now() + self.settings.first_pose_within;
+        loop {
+            self.tick(None)?;
+            if self.indenter.position().is_some() {
+                return Ok(());
+            }
+            if self.now() >= deadline {
+                let expected = format!("a sample within {}", self.settings.first_pose_within);
+                return Err(Halt::Fault(ControllerError::PoseStream {
+                    expected,
+                    found: "none".to_owned(),
+                }));
+            }
+        }
+    }
+}
+
+fn rig_error(
+    place: impl Into<String>,
+    expected: impl Into<String>,
+    found: impl Into<String>,
+) -> ControllerError {
+    ControllerError::Rig {
+        place: place.into(),
+        expected: expected.into(),
+        found: found.into(),
+    }
+}

@@ -1,0 +1,371 @@
+//! The devices of a run and the loop that looks at them.
+
+use std::collections::VecDeque;
+
+use skinrig_device::{CameraSettings, Clock, DeviceError, EventCamera, Rig, TriggerBox};
+use skinrig_model::{
+    AttemptId, CameraId, HostDuration, HostTime, InterruptionKind, Mark, MarkKind, MotionCommand,
+    Point3, PoseSample, RawChunk, Record, RigidTransform, Robot, RunHeader, Skin,
+};
+use skinrig_protocol::plan::Plan;
+
+use crate::control::{ControlHandle, Request};
+use crate::error::{ControllerError, Halt};
+use crate::guard::GuardedIndenter;
+use crate::journal::Journal;
+use crate::moments::{PressTracker, Settling};
+use crate::run::RunReport;
+use crate::settings::ControllerSettings;
+use crate::sink::RecordSink;
+use crate::states::{Event, Machine};
+
+/// A press under way.
+pub(crate) struct OpenPress {
+    pub(crate) attempt: AttemptId,
+    pub(crate) tracker: Option<PressTracker>,
+    pub(crate) marks: Vec<MarkKind>,
+    pub(crate) lost: [u64; 2],
+    pub(crate) bytes: [u64; 2],
+}
+
+/// Everything that a run holds. Dropped before its end, it brings the rig to rest first.
+pub(crate) struct Core<'a> {
+    pub(crate) plan: &'a Plan,
+    pub(crate) settings: ControllerSettings,
+    pub(crate) header: Option<Box<RunHeader>>,
+    pub(crate) robot_from_skin: RigidTransform<Robot, Skin>,
+    pub(crate) indenter: GuardedIndenter,
+    pub(crate) cameras: [Box<dyn EventCamera>; 2],
+    pub(crate) camera_settings: [CameraSettings; 2],
+    pub(crate) trigger_box: Option<Box<dyn TriggerBox>>,
+    pub(crate) clock: Box<dyn Clock>,
+    pub(crate) control: ControlHandle,
+    pub(crate) journal: Journal<'a>,
+    pub(crate) machine: Machine,
+    pub(crate) report: Option<RunReport>,
+    /// When the present repetition (or sync block) began, moved on by pauses.
+    pub(crate) begin: HostTime,
+    pub(crate) open: Option<OpenPress>,
+    pub(crate) settling: Option<Settling>,
+    /// While ending: cameras and limits no longer stop anything.
+    pub(crate) ending: bool,
+    marks: VecDeque<Mark>,
+    marks_since: HostTime,
+    line_free_at: HostTime,
+    next_seq: [Option<u64>; 2],
+    poses: Vec<PoseSample>,
+    fresh: Vec<PoseSample>,
+    chunks: Vec<RawChunk>,
+}
+
+impl<'a> Core<'a> {
+    pub(crate) fn new(
+        plan: &'a Plan,
+        header: RunHeader,
+        rig: Rig,
+        control: &ControlHandle,
+        sink: &'a mut dyn RecordSink,
+        settings: ControllerSettings,
+    ) -> Self {
+        let Rig {
+            indenter,
+            cameras,
+            camera_settings,
+            trigger_box,
+            clock,
+            robot_from_skin,
+            ..
+        } = rig;
+        Self {
+            plan,
+            settings,
+            header: Some(Box::new(header)),
+            robot_from_skin,
+            indenter: GuardedIndenter::new(
+                indenter,
+                robot_from_skin,
+                plan.limits,
+                settings.stale_after,
+            ),
+            cameras,
+            camera_settings,
+            trigger_box,
+            clock,
+            control: control.clone(),
+            journal: Journal::new(sink, plan.presses.len()),
+            machine: Machine::new(),
+            report: None,
+            begin: HostTime::ZERO,
+            open: None,
+            settling: None,
+            ending: false,
+            marks: VecDeque::new(),
+            marks_since: HostTime::ZERO,
+            line_free_at: HostTime::ZERO,
+            next_seq: [None; 2],
+            poses: Vec::new(),
+            fresh: Vec::new(),
+            chunks: Vec::new(),
+        }
+    }
+
+    pub(crate) fn now(&self) -> HostTime {
+        self.clock.now()
+    }
+
+    /// Commands a straight motion and gives the instant after it was taken.
+    pub(crate) fn command(
+        &mut self,
+        target: Point3<Skin>,
+        speed_mm_s: f64,
+    ) -> Result<HostTime, ControllerError> {
+        self.indenter
+            .command(target, speed_mm_s, self.clock.now())?;
+        let t = self.clock.now();
+        self.journal.emit(Record::Command {
+            t,
+            command: MotionCommand { target, speed_mm_s },
+        })?;
+        Ok(t)
+    }
+
+    /// One turn of the loop: waits for at most a tick, and not beyond `due`, then looks at the devices
+    /// and at the operator's requests.
+    pub(crate) fn tick(&mut self, due: Option<HostTime>) -> Result<(), Halt> {
+        let now = self.now();
+        let mut until = now + self.settings.tick;
+        let line = (!self.marks.is_empty()).then_some(self.line_free_at);
+        for t in [due, line].into_iter().flatten() {
+            if t > now && t < until {
+                until = t;
+            }
+        }
+        self.clock.wait_until(until);
+        self.observe()?;
+        self.hear()
+    }
+
+    /// Looks at every device without waiting.
+    pub(crate) fn observe(&mut self) -> Result<(), ControllerError> {
+        let poses = self.observe_poses();
+        let cameras = self.collect(Collect::Poll);
+        if self.ending {
+            if let Err(e) = cameras {
+                self.journal.problem(e.to_string());
+            }
+            return poses;
+        }
+        poses.and(cameras)?;
+        self.queue_marks();
+        self.send_marks()
+    }
+
+    fn observe_poses(&mut self) -> Result<(), ControllerError> {
+        let mut fresh = std::mem::take(&mut self.fresh);
+        fresh.clear();
+        let mut answer = self.indenter.poll(&mut fresh);
+        for sample in &fresh {
+            if let Some(tracker) = self.open.as_mut().and_then(|o| o.tracker.as_mut()) {
+                tracker.feed(sample);
+            }
+            if let Some(settling) = &mut self.settling {
+                settling.feed(sample);
+            }
+            if answer.is_ok() && !self.ending {
+                answer = self.check_limits(sample);
+            }
+        }
+        self.poses.extend_from_slice(&fresh);
+        self.fresh = fresh;
+        if self.poses.len() >= self.settings.pose_block {
+            self.emit_poses()?;
+        }
+        answer?;
+        if self.indenter.is_armed() && self.indenter.position().is_some() {
+            self.indenter.check_fresh(self.now())?;
+        }
+        Ok(())
+    }
+
+    fn check_limits(&self, sample: &PoseSample) -> Result<(), ControllerError> {
+        let limits = &self.plan.limits;
+        if sample.force_n > limits.max_force_n {
+            return Err(ControllerError::Force {
+                limit_n: limits.max_force_n,
+                found_n: sample.force_n,
+                t: sample.t,
+            });
+        }
+        let deepest = limits.max_depth_mm + limits.position_tolerance_mm;
+        // Before the robot is armed it may lie anywhere; so may one that starts too deep: it rises first.
+        if self.open.is_some() && -sample.measured.z_mm > deepest {
+            return Err(ControllerError::Depth {
+                limit_mm: deepest,
+                found_mm: -sample.measured.z_mm,
+                t: sample.t,
+            });
+        }
+        Ok(())
+    }
+
+    /// Emits the samples that are still kept back.
+    pub(crate) fn emit_poses(&mut self) -> Result<(), ControllerError> {
+        if self.poses.is_empty() {
+            return Ok(());
+        }
+        let block = std::mem::take(&mut self.poses);
+        self.journal.emit(Record::Poses(block))
+    }
+
+    /// Takes what both cameras have and emits it, also what came before one failed.
+    pub(crate) fn collect(&mut self, how: Collect) -> Result<(), ControllerError> {
+        let mut answer = Ok(());
+        for camera in CameraId::ALL {
+            let device = self.cameras[camera.index()].as_mut();
+            let taken = match how {
+                Collect::Poll => device.poll(&mut self.chunks),
+                Collect::Flush => device.flush(&mut self.chunks),
+            };
+            let emitted = self.emit_chunks();
+            answer = answer.and(emitted).and(taken.map_err(Into::into));
+        }
+        answer
+    }
+
+    /// Stops one camera and emits what it still had.
+    pub(crate) fn stop_camera(&mut self, camera: CameraId) -> Result<(), ControllerError> {
+        let stopped = self.cameras[camera.index()].stop(&mut self.chunks);
+        self.emit_chunks()?;
+        Ok(stopped?)
+    }
+
+    fn emit_chunks(&mut self) -> Result<(), ControllerError> {
+        let mut answer = Ok(());
+        for chunk in std::mem::take(&mut self.chunks) {
+            let i = chunk.camera.index();
+            let due = self.next_seq[i].unwrap_or(chunk.seq);
+            if chunk.seq != due {
+                answer = answer.and(Err(ControllerError::ChunkOrder {
+                    camera: chunk.camera,
+                    expected: due,
+                    found: chunk.seq,
+                }));
+            }
+            self.next_seq[i] = Some(chunk.seq + 1);
+            if let Some(open) = &mut self.open {
+                open.lost[i] += chunk.lost_before;
+                open.bytes[i] += chunk.bytes.len() as u64;
+            }
+            let emitted = self.journal.emit(Record::Chunk(chunk));
+            answer = answer.and(emitted);
+        }
+        answer
+    }
+
+    /// Queues the marks of moments that have come.
+    fn queue_marks(&mut self) {
+        let Some(open) = &mut self.open else { return };
+        let Some(tracker) = &open.tracker else { return };
+        let came = |kind: &MarkKind| match kind {
+            MarkKind::Approach => tracker.approach().is_some(),
+            MarkKind::Contact => tracker.contact().is_some(),
+            MarkKind::AtDepth => tracker.at_depth().is_some(),
+            MarkKind::Retract => tracker.retract().is_some(),
+            MarkKind::Release => tracker.release().is_some(),
+        };
+        let press = open.attempt.press;
+        let (now_due, later) = open.marks.iter().copied().partition(came);
+        open.marks = later;
+        let now_due: Vec<MarkKind> = now_due;
+        if self.marks.is_empty() {
+            self.marks_since = self.clock.now();
+        }
+        self.marks
+            .extend(now_due.into_iter().map(|kind| Mark { kind, press }));
+    }
+
+    /// Sends the next mark when the line is free.
+    fn send_marks(&mut self) -> Result<(), ControllerError> {
+        let (Some(mark), Some(trigger)) = (self.marks.front().copied(), &mut self.trigger_box)
+        else {
+            return Ok(());
+        };
+        let now = self.clock.now();
+        if now < self.line_free_at {
+            return Ok(());
+        }
+        match trigger.send(mark) {
+            Ok(sent) => {
+                self.marks.pop_front();
+                self.marks_since = now;
+                self.line_free_at = sent.t + trigger.capabilities().train_duration;
+                self.journal.emit(Record::MarkSent(sent))
+            }
+            // Still busy: the next turn tries again.
+            Err(DeviceError::State { .. })
+                if now - self.marks_since < self.settings.mark_within =>
+            {
+                Ok(())
+            }
+            Err(e) => Err(e.into()),
+        }
+    }
+
+    /// True when no mark waits and none is on the line.
+    pub(crate) fn line_is_free(&self) -> bool {
+        self.marks.is_empty() && self.now() >= self.line_free_at
+    }
+
+    /// When the mark on the line ends.
+    pub(crate) const fn line_free_at(&self) -> HostTime {
+        self.line_free_at
+    }
+
+    /// Listens to the operator.
+    fn hear(&mut self) -> Result<(), Halt> {
+        for request in self.control.take() {
+            let before = self.machine.state();
+            let (event, kind, words) = match request {
+                Request::Abort => return Err(Halt::Aborted),
+                Request::Stop => (Event::Stop, InterruptionKind::Stop, "operator: stop"),
+                Request::Pause => (Event::Pause, InterruptionKind::Pause, "operator: pause"),
+                Request::Resume => (Event::Resume, InterruptionKind::Resume, "operator: resume"),
+            };
+            self.machine.fire(event);
+            // The end of the run tells of a stop; a request without effect is not told.
+            if event != Event::Stop && self.machine.state() != before {
+                let t = self.now();
+                self.journal.emit(Record::Interruption {
+                    kind,
+                    t,
+                    reason: words.to_owned(),
+                })?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The longest time that a motion outside the plan over `distance_mm` may take, and its speed.
+    pub(crate) fn own_motion(&self, distance_mm: f64) -> (f64, HostDuration) {
+        let can = self.indenter.capabilities().max_speed_mm_s;
+        let speed = self
+            .settings
+            .rise_speed_mm_s
+            .min(self.plan.limits.max_speed_mm_s)
+            .min(can);
+        let seconds = 2.0 * distance_mm / speed;
+        (
+            speed,
+            HostDuration::from_secs_f64(seconds) + self.settings.rise_allowance,
+        )
+    }
+}
+
+/// How to take what cameras have.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Collect {
+    /// Full chunks.
+    Poll,
+    /// Everything up to now.
+    Flush,
+}

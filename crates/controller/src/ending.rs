@@ -1,0 +1,192 @@
+//! The end of a run, however it came: off the skin, hold, disarm, stop, and tell.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use skinrig_model::{CameraId, InterruptionKind, Record, RunEnd};
+
+use crate::core::Core;
+use crate::error::{ControllerError, Halt};
+use crate::run::RunReport;
+use crate::states::{Event, State};
+
+/// How often a robot that does not confirm is told to disarm.
+const DISARM_TRIES: u32 = 3;
+
+impl Core<'_> {
+    /// Runs a part of the experiment; a panic in it becomes a fault.
+    pub(crate) fn shielded(
+        &mut self,
+        part: impl FnOnce(&mut Self) -> Result<(), Halt>,
+    ) -> Result<(), Halt> {
+        match catch_unwind(AssertUnwindSafe(|| part(self))) {
+            Ok(result) => result,
+            Err(payload) => Err(ControllerError::Internal(panic_text(&*payload)).into()),
+        }
+    }
+
+    /// Like [`shielded`](Self::shielded), for the end: what fails is remembered, and the end goes on.
+    fn attempt(
+        &mut self,
+        what: &str,
+        part: impl FnOnce(&mut Self) -> Result<(), ControllerError>,
+    ) -> bool {
+        match self.shielded(|core| Ok(part(core)?)) {
+            Ok(()) => true,
+            Err(Halt::Fault(e)) => {
+                self.journal.problem(format!("{what}: {e}"));
+                false
+            }
+            Err(Halt::Stopped | Halt::Aborted) => false, // `part` cannot ask for these
+        }
+    }
+
+    /// Brings the rig to rest and closes the records. Does nothing the second time.
+    pub(crate) fn conclude(&mut self, result: Result<(), Halt>) {
+        if self.machine.state() == State::Finished {
+            return;
+        }
+        let at = catch_unwind(AssertUnwindSafe(|| self.now())).ok();
+        self.ending = true;
+        self.journal.ending();
+        let (mut end, interruption) = match result {
+            Ok(()) => (RunEnd::Completed, None),
+            Err(Halt::Stopped) => (
+                RunEnd::Stopped("operator: stop".to_owned()),
+                Some(InterruptionKind::Stop),
+            ),
+            Err(Halt::Aborted) => {
+                self.machine.fire(Event::Abort);
+                (
+                    RunEnd::Stopped("operator: abort".to_owned()),
+                    Some(InterruptionKind::Abort),
+                )
+            }
+            Err(Halt::Fault(e)) => {
+                self.machine.fire(Event::Fault);
+                (
+                    RunEnd::Faulted(e.to_string()),
+                    Some(InterruptionKind::Fault),
+                )
+            }
+        };
+
+        let (retracted, disarmed) = self.make_safe();
+        if !disarmed {
+            let warning = "the robot did not confirm that it is disarmed: switch it off by hand";
+            end = RunEnd::Faulted(match end {
+                RunEnd::Completed => warning.to_owned(),
+                RunEnd::Stopped(r) | RunEnd::Faulted(r) => format!("{r}; {warning}"),
+            });
+        }
+        let interruption = match end {
+            RunEnd::Faulted(_) => Some(InterruptionKind::Fault),
+            _ => interruption,
+        };
+
+        let reason = match &end {
+            RunEnd::Completed => String::new(),
+            RunEnd::Stopped(r) | RunEnd::Faulted(r) => r.clone(),
+        };
+        let t = at.unwrap_or_else(|| self.indenter.position().map(|p| p.t).unwrap_or_default());
+        let ended = catch_unwind(AssertUnwindSafe(|| self.now())).unwrap_or(t);
+        self.attempt("outcome", |core| {
+            core.emit_poses()?;
+            if core.open.is_some() {
+                core.close_press(Some(reason.clone()))?;
+            }
+            core.journal.miss_the_rest(&reason)
+        });
+        let problems = self.journal.problems.clone();
+        for text in problems {
+            let _ = self.journal.emit(Record::Note {
+                t: ended,
+                text: format!("while ending: {text}"),
+            });
+        }
+        if let Some(kind) = interruption {
+            let _ = self.journal.emit(Record::Interruption { kind, t, reason });
+        }
+        let _ = self.journal.emit(Record::Ended {
+            t: ended,
+            end: end.clone(),
+        });
+        self.machine.fire(Event::Disarmed);
+        let [planned, valid, invalid, missed] = self.journal.counts();
+        self.report = Some(RunReport {
+            end,
+            ended_at: ended,
+            planned,
+            valid,
+            invalid,
+            missed,
+            retracted,
+            disarmed,
+            problems: std::mem::take(&mut self.journal.problems),
+        });
+    }
+
+    /// Off the skin if the robot still answers; hold; disarm; cameras flushed and stopped. Gives whether
+    /// the tip was seen at clearance height and whether the robot confirmed that it is disarmed.
+    fn make_safe(&mut self) -> (bool, bool) {
+        let mut retracted = true;
+        if self.indenter.is_armed() {
+            retracted = self.attempt("retract", Self::lift);
+            self.attempt("hold", |core| core.indenter.hold());
+        }
+        self.machine.fire(Event::Cleared);
+        let disarmed =
+            (0..DISARM_TRIES).any(|_| self.attempt("disarm", |core| core.indenter.disarm()));
+        // What the robot and the cameras delivered until now belongs to the session.
+        self.attempt("last samples", Self::observe);
+        for camera in CameraId::ALL {
+            self.attempt("stop", |core| core.stop_camera(camera));
+        }
+        (retracted, disarmed)
+    }
+
+    /// Straight up to clearance height, unless the tip is there.
+    fn lift(&mut self) -> Result<(), ControllerError> {
+        if self.machine.state() != State::Retracting {
+            // Whatever was under way, sideways motion included, ends here.
+            self.attempt("hold", |core| core.indenter.hold());
+        }
+        self.observe()?;
+        if self.indenter.is_clear() {
+            return Ok(());
+        }
+        let (Some(target), Some(from)) = (self.indenter.point_above(), self.indenter.position())
+        else {
+            return Err(ControllerError::PoseStream {
+                expected: "a known position".to_owned(),
+                found: "none".to_owned(),
+            });
+        };
+        let (speed, allowed) = self.own_motion(target.distance_mm(from.measured));
+        let t = self.command(target, speed)?;
+        while !self.indenter.is_clear() {
+            let now = self.now();
+            if now >= t + allowed {
+                return Err(self.not_arrived("retraction", target, allowed));
+            }
+            self.clock.wait_until(now + self.settings.tick);
+            self.observe()?;
+        }
+        Ok(())
+    }
+}
+
+impl Drop for Core<'_> {
+    fn drop(&mut self) {
+        let dropped = ControllerError::Internal("the run was dropped before its end".to_owned());
+        self.conclude(Err(Halt::Fault(dropped)));
+    }
+}
+
+/// What a panic said.
+fn panic_text(payload: &(dyn std::any::Any + Send)) -> String {
+    let text = payload
+        .downcast_ref::<&str>()
+        .map(|s| (*s).to_owned())
+        .or_else(|| payload.downcast_ref::<String>().cloned());
+    text.map_or_else(|| "panic".to_owned(), |t| format!("panic: {t}"))
+}

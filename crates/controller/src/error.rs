@@ -1,0 +1,179 @@
+//! What can end a run before its plan does.
+
+use skinrig_device::DeviceError;
+use skinrig_model::{HostDuration, HostTime, Point3, Skin};
+
+use crate::sink::SinkFault;
+
+/// A motion that never reached the robot. Nothing was done; the present motion goes on unchanged.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum GuardError {
+    /// A coordinate or the speed is NaN or infinite.
+    #[error("expected finite coordinates and speed, found {found}")]
+    NotFinite {
+        /// What was asked for.
+        found: String,
+    },
+    /// The speed is not above zero or beyond the limit.
+    #[error("expected a speed above 0 and at most {limit_mm_s} mm/s, found {found_mm_s} mm/s")]
+    Speed {
+        /// mm/s.
+        limit_mm_s: f64,
+        /// mm/s.
+        found_mm_s: f64,
+    },
+    /// The target lies outside the workspace.
+    #[error("expected a target with {axis} from {min_mm} to {max_mm} mm, found {found_mm} mm")]
+    Workspace {
+        /// `x`, `y` or `z` of the skin frame.
+        axis: char,
+        /// mm.
+        min_mm: f64,
+        /// mm.
+        max_mm: f64,
+        /// mm.
+        found_mm: f64,
+    },
+    /// The target lies deeper than allowed.
+    #[error("expected a depth of at most {limit_mm} mm, found {found_mm} mm")]
+    Depth {
+        /// mm, positive.
+        limit_mm: f64,
+        /// mm, positive.
+        found_mm: f64,
+    },
+    /// Sideways motion below clearance height.
+    #[error(
+        "expected lateral motion only at {clearance_mm} mm or higher, found {lateral_mm:.3} mm sideways at {height_mm:.3} mm"
+    )]
+    Lateral {
+        /// mm.
+        clearance_mm: f64,
+        /// How far sideways, mm.
+        lateral_mm: f64,
+        /// The lower end of the motion, mm.
+        height_mm: f64,
+    },
+    /// The robot's position is not known well enough to move.
+    #[error("expected a pose sample no older than {limit}, found {found}")]
+    StalePose {
+        /// Longest allowed age.
+        limit: HostDuration,
+        /// Age of the newest sample, or `none`.
+        found: String,
+    },
+    /// The robot is not armed.
+    #[error("expected an armed robot, found it disarmed")]
+    NotArmed,
+}
+
+/// A run cannot start or go on. Every one of these ends the run safely.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ControllerError {
+    /// A device failed.
+    #[error(transparent)]
+    Device(#[from] DeviceError),
+    /// The consumer of records failed.
+    #[error(transparent)]
+    Sink(#[from] SinkFault),
+    /// A motion was refused before it reached the robot.
+    #[error("motion refused: {0}")]
+    Guard(#[from] GuardError),
+    /// The plan is not one that this controller executes.
+    #[error("plan, {place}: expected {expected}, found {found}; compile the plan again")]
+    Plan {
+        /// Where in the plan.
+        place: String,
+        /// What a plan has there.
+        expected: String,
+        /// What it has.
+        found: String,
+    },
+    /// The rig does not fit the plan or its header.
+    #[error("rig, {place}: expected {expected}, found {found}")]
+    Rig {
+        /// Which part of the rig.
+        place: String,
+        /// What the run needs.
+        expected: String,
+        /// What there is.
+        found: String,
+    },
+    /// The pose stream stopped, runs backwards or holds values that are no numbers.
+    #[error("pose stream: expected {expected}, found {found}")]
+    PoseStream {
+        /// What a stream delivers.
+        expected: String,
+        /// What came.
+        found: String,
+    },
+    /// A motion did not end where it should.
+    #[error("{what}: expected to settle within {tolerance_mm} mm of {} in {allowed}, found {}", point(.target), .found.as_ref().map_or_else(|| "no pose".to_owned(), point))]
+    NotArrived {
+        /// Which motion.
+        what: String,
+        /// mm.
+        tolerance_mm: f64,
+        /// Where to.
+        target: Point3<Skin>,
+        /// How long it was given.
+        allowed: HostDuration,
+        /// Where the tip was then.
+        found: Option<Point3<Skin>>,
+    },
+    /// A measured force above the limit.
+    #[error("force: expected at most {limit_n} N, found {found_n:.3} N at {t}")]
+    Force {
+        /// N.
+        limit_n: f64,
+        /// N.
+        found_n: f64,
+        /// When.
+        t: HostTime,
+    },
+    /// A measured tip deeper than allowed.
+    #[error("depth: expected at most {limit_mm} mm, found {found_mm:.3} mm at {t}")]
+    Depth {
+        /// mm, positive, tolerance included.
+        limit_mm: f64,
+        /// mm, positive.
+        found_mm: f64,
+        /// When.
+        t: HostTime,
+    },
+    /// A camera's chunks do not follow each other.
+    #[error("{camera}: expected chunk {expected}, found chunk {found}")]
+    ChunkOrder {
+        /// Which camera.
+        camera: skinrig_model::CameraId,
+        /// The number due.
+        expected: u64,
+        /// The number that came.
+        found: u64,
+    },
+    /// The code itself failed, or the run was dropped before its end.
+    #[error("internal error: {0}")]
+    Internal(String),
+}
+
+/// `(x, y, z) mm` to the micrometre.
+pub(crate) fn point(p: &Point3<Skin>) -> String {
+    format!("({:.3}, {:.3}, {:.3}) mm", p.x_mm, p.y_mm, p.z_mm)
+}
+
+/// Why the steps of a plan ended early.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Halt {
+    /// The operator asked for it; nothing is under way.
+    Stopped,
+    /// The operator wants it to end now.
+    Aborted,
+    /// Something failed.
+    Fault(ControllerError),
+}
+
+impl<E: Into<ControllerError>> From<E> for Halt {
+    fn from(e: E) -> Self {
+        Self::Fault(e.into())
+    }
+}

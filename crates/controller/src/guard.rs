@@ -1,0 +1,263 @@
+//! The only hand on the robot: every motion is checked here, against what the robot last measured.
+
+use skinrig_device::{Indenter, IndenterCapabilities, MotionLimits, RobotSample};
+use skinrig_model::{
+    DeviceIdentity, HostDuration, HostTime, Point3, PoseSample, RigidTransform, Robot, Setting,
+    Skin,
+};
+use skinrig_protocol::plan::RunLimits;
+
+use crate::error::{ControllerError, GuardError};
+
+/// Owns the indenter. Takes targets in the skin frame, refuses what the limits of the run forbid, and gives
+/// poses in the skin frame.
+pub struct GuardedIndenter {
+    inner: Box<dyn Indenter>,
+    robot_from_skin: RigidTransform<Robot, Skin>,
+    skin_from_robot: RigidTransform<Skin, Robot>,
+    limits: RunLimits,
+    stale_after: HostDuration,
+    armed: bool,
+    last: Option<PoseSample>,
+    target: Option<Point3<Skin>>,
+    samples: Vec<RobotSample>,
+}
+
+impl GuardedIndenter {
+    /// Takes `inner` over. A newest sample older than `stale_after` forbids motion.
+    #[must_use]
+    pub fn new(
+        inner: Box<dyn Indenter>,
+        robot_from_skin: RigidTransform<Robot, Skin>,
+        limits: RunLimits,
+        stale_after: HostDuration,
+    ) -> Self {
+        Self {
+            inner,
+            robot_from_skin,
+            skin_from_robot: robot_from_skin.inverse(),
+            limits,
+            stale_after,
+            armed: false,
+            last: None,
+            target: None,
+            samples: Vec::new(),
+        }
+    }
+
+    /// Who the robot is.
+    pub fn identity(&self) -> DeviceIdentity {
+        self.inner.identity()
+    }
+
+    /// What the robot can do.
+    pub fn capabilities(&self) -> IndenterCapabilities {
+        self.inner.capabilities()
+    }
+
+    /// Hands limits to the robot itself.
+    ///
+    /// # Errors
+    /// What the robot answers.
+    pub fn configure(&mut self, limits: &MotionLimits) -> Result<Vec<Setting>, ControllerError> {
+        Ok(self.inner.configure(limits)?)
+    }
+
+    /// Powers the motors.
+    ///
+    /// # Errors
+    /// What the robot answers.
+    pub fn arm(&mut self) -> Result<(), ControllerError> {
+        self.inner.arm()?;
+        self.armed = true;
+        Ok(())
+    }
+
+    /// True between [`arm`](Self::arm) and [`disarm`](Self::disarm).
+    #[must_use]
+    pub const fn is_armed(&self) -> bool {
+        self.armed
+    }
+
+    /// The newest sample.
+    #[must_use]
+    pub const fn position(&self) -> Option<PoseSample> {
+        self.last
+    }
+
+    /// True when the tip was last seen at clearance height or above, within the tolerance.
+    #[must_use]
+    pub fn is_clear(&self) -> bool {
+        self.last
+            .is_some_and(|p| p.measured.z_mm >= self.clear_height_mm())
+    }
+
+    fn clear_height_mm(&self) -> f64 {
+        self.limits.clearance_mm - self.limits.position_tolerance_mm
+    }
+
+    /// The point at clearance height straight above the tip: above the present target (which does not
+    /// depend on when one looks) unless the tip is away from it sideways, then above the tip as measured.
+    #[must_use]
+    pub fn point_above(&self) -> Option<Point3<Skin>> {
+        let last = self.last?;
+        let held = self.target.unwrap_or(last.commanded);
+        let near =
+            held.plane().distance_mm(last.measured.plane()) <= self.limits.position_tolerance_mm;
+        let foot = if near { held } else { last.measured };
+        Some(foot.plane().at_height(self.limits.clearance_mm))
+    }
+
+    /// Age of the newest sample.
+    fn age(&self, now: HostTime) -> Option<HostDuration> {
+        self.last.map(|p| now - p.t)
+    }
+
+    /// Checks that the pose stream is alive.
+    ///
+    /// # Errors
+    /// [`GuardError::StalePose`].
+    pub fn check_fresh(&self, now: HostTime) -> Result<(), GuardError> {
+        match self.age(now) {
+            Some(age) if age <= self.stale_after => Ok(()),
+            age => Err(GuardError::StalePose {
+                limit: self.stale_after,
+                found: age.map_or_else(|| "none".to_owned(), |a| a.to_string()),
+            }),
+        }
+    }
+
+    /// Starts a straight move to `target` when every rule allows it.
+    ///
+    /// # Errors
+    /// [`GuardError`] when a rule forbids it (the robot hears nothing of it); what the robot answers.
+    pub fn command(
+        &mut self,
+        target: Point3<Skin>,
+        speed_mm_s: f64,
+        now: HostTime,
+    ) -> Result<(), ControllerError> {
+        self.check(target, speed_mm_s, now)?;
+        self.inner
+            .command(self.robot_from_skin.apply(target), speed_mm_s)?;
+        self.target = Some(target);
+        Ok(())
+    }
+
+    fn check(
+        &self,
+        target: Point3<Skin>,
+        speed_mm_s: f64,
+        now: HostTime,
+    ) -> Result<(), GuardError> {
+        let limits = &self.limits;
+        if !target.is_finite() || !speed_mm_s.is_finite() {
+            return Err(GuardError::NotFinite {
+                found: format!("{:?} at {speed_mm_s} mm/s", target.to_array()),
+            });
+        }
+        if speed_mm_s <= 0.0 || speed_mm_s > limits.max_speed_mm_s {
+            return Err(GuardError::Speed {
+                limit_mm_s: limits.max_speed_mm_s,
+                found_mm_s: speed_mm_s,
+            });
+        }
+        check_target(limits, target)?;
+        if !self.armed {
+            return Err(GuardError::NotArmed);
+        }
+        self.check_fresh(now)?;
+        let Some(last) = self.last else {
+            return Err(GuardError::NotArmed); // a fresh pose exists, see above
+        };
+        let lateral_mm = target.plane().distance_mm(last.measured.plane());
+        let height_mm = target.z_mm.min(last.measured.z_mm);
+        if lateral_mm > limits.position_tolerance_mm && height_mm < self.clear_height_mm() {
+            return Err(GuardError::Lateral {
+                clearance_mm: limits.clearance_mm,
+                lateral_mm,
+                height_mm,
+            });
+        }
+        Ok(())
+    }
+
+    /// Appends all new samples, in the skin frame.
+    ///
+    /// # Errors
+    /// [`ControllerError::PoseStream`] for samples out of order or without numbers (good ones before are
+    /// appended); what the robot answers, after appending what it delivered.
+    pub fn poll(&mut self, poses: &mut Vec<PoseSample>) -> Result<(), ControllerError> {
+        self.samples.clear();
+        let answer = self.inner.poll(&mut self.samples);
+        for s in &self.samples {
+            if !s.measured.is_finite() || !s.commanded.is_finite() {
+                return Err(ControllerError::PoseStream {
+                    expected: "finite coordinates".to_owned(),
+                    found: format!("{:?} at {}", s.measured.to_array(), s.t),
+                });
+            }
+            if let Some(last) = self.last.filter(|last| s.t <= last.t) {
+                return Err(ControllerError::PoseStream {
+                    expected: format!("a sample after {}", last.t),
+                    found: format!("one at {}", s.t),
+                });
+            }
+            let pose = PoseSample {
+                t: s.t,
+                commanded: self.skin_from_robot.apply(s.commanded),
+                measured: self.skin_from_robot.apply(s.measured),
+                force_n: s.force_n,
+            };
+            self.last = Some(pose);
+            poses.push(pose);
+        }
+        Ok(answer?)
+    }
+
+    /// Stops where it is and holds.
+    ///
+    /// # Errors
+    /// What the robot answers.
+    pub fn hold(&mut self) -> Result<(), ControllerError> {
+        Ok(self.inner.hold()?)
+    }
+
+    /// Motors off.
+    ///
+    /// # Errors
+    /// What the robot answers; no motion is allowed after that either.
+    pub fn disarm(&mut self) -> Result<(), ControllerError> {
+        self.armed = false;
+        Ok(self.inner.disarm()?)
+    }
+}
+
+/// Checks that `target` lies in the workspace and not too deep.
+///
+/// # Errors
+/// [`GuardError::Workspace`], [`GuardError::Depth`].
+pub(crate) fn check_target(limits: &RunLimits, target: Point3<Skin>) -> Result<(), GuardError> {
+    let bounds = limits.workspace_min_mm.iter().zip(limits.workspace_max_mm);
+    for ((axis, found_mm), (&min_mm, max_mm)) in ['x', 'y', 'z']
+        .into_iter()
+        .zip(target.to_array())
+        .zip(bounds)
+    {
+        if !(min_mm..=max_mm).contains(&found_mm) {
+            return Err(GuardError::Workspace {
+                axis,
+                min_mm,
+                max_mm,
+                found_mm,
+            });
+        }
+    }
+    if -target.z_mm > limits.max_depth_mm {
+        return Err(GuardError::Depth {
+            limit_mm: limits.max_depth_mm,
+            found_mm: -target.z_mm,
+        });
+    }
+    Ok(())
+}

@@ -1,0 +1,120 @@
+//! Hands records to the sink and keeps the books: every planned press ends as exactly one of its outcomes.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use skinrig_model::{AttemptId, PressId, PressOutcome, PressVerdict, Record};
+
+use crate::error::ControllerError;
+use crate::sink::RecordSink;
+
+/// What became of a planned press.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Fate {
+    Planned,
+    Under,
+    Valid,
+    Invalid,
+    Missed,
+}
+
+/// The sink and the books.
+pub(crate) struct Journal<'a> {
+    sink: &'a mut dyn RecordSink,
+    fates: Vec<Fate>,
+    /// While ending: a failing or panicking sink no longer stops anything.
+    lenient: bool,
+    /// What went wrong while ending.
+    pub(crate) problems: Vec<String>,
+}
+
+impl<'a> Journal<'a> {
+    pub(crate) fn new(sink: &'a mut dyn RecordSink, presses: usize) -> Self {
+        Self {
+            sink,
+            fates: vec![Fate::Planned; presses],
+            lenient: false,
+            problems: Vec::new(),
+        }
+    }
+
+    /// From now on nothing that the sink does stops the run's end.
+    pub(crate) const fn ending(&mut self) {
+        self.lenient = true;
+    }
+
+    pub(crate) fn problem(&mut self, what: impl Into<String>) {
+        let what = what.into();
+        if !self.problems.contains(&what) {
+            self.problems.push(what);
+        }
+    }
+
+    /// Emits a record; while ending, a failure is remembered instead of returned.
+    pub(crate) fn emit(&mut self, record: Record) -> Result<(), ControllerError> {
+        if !self.lenient {
+            return Ok(self.sink.accept(record)?);
+        }
+        match catch_unwind(AssertUnwindSafe(|| self.sink.accept(record))) {
+            Ok(Ok(())) => {}
+            Ok(Err(fault)) => self.problem(fault.to_string()),
+            Err(_) => self.problem("recorder: panicked"),
+        }
+        Ok(())
+    }
+
+    fn set(&mut self, press: PressId, fate: Fate) {
+        if let Some(f) = self.fates.get_mut(press.0 as usize) {
+            *f = fate;
+        }
+    }
+
+    /// A press begins: its intent is durable when this returns.
+    pub(crate) fn intent(
+        &mut self,
+        attempt: AttemptId,
+        t: skinrig_model::HostTime,
+    ) -> Result<(), ControllerError> {
+        self.emit(Record::Intent { attempt, t })?;
+        self.set(attempt.press, Fate::Under);
+        Ok(())
+    }
+
+    /// A press ended.
+    pub(crate) fn outcome(&mut self, outcome: PressOutcome) -> Result<(), ControllerError> {
+        let fate = match outcome.verdict {
+            PressVerdict::Valid => Fate::Valid,
+            _ => Fate::Invalid,
+        };
+        let press = outcome.attempt.press;
+        self.emit(Record::Outcome(outcome))?;
+        self.set(press, fate);
+        Ok(())
+    }
+
+    /// Every press that was never attempted is missed, for this reason.
+    pub(crate) fn miss_the_rest(&mut self, reason: &str) -> Result<(), ControllerError> {
+        for i in 0..self.fates.len() {
+            if self.fates[i] == Fate::Planned {
+                let attempt = AttemptId {
+                    press: PressId(i as u32),
+                    number: 1,
+                };
+                self.emit(Record::Missed(attempt, reason.to_owned()))?;
+                self.fates[i] = Fate::Missed;
+            }
+        }
+        Ok(())
+    }
+
+    /// Presses planned, valid, invalid, missed.
+    pub(crate) fn counts(&self) -> [usize; 4] {
+        let n = |fate| self.fates.iter().filter(|f| **f == fate).count();
+        [
+            self.fates.len(),
+            n(Fate::Valid),
+            // A press whose intent stands without outcome is not valid.
+            n(Fate::Invalid) + n(Fate::Under),
+            n(Fate::Missed),
+        ]
+    }
+}

@@ -1,0 +1,320 @@
+//! The moments of a press, found in the pose stream alone.
+
+use skinrig_model::{HostDuration, HostTime, Point2, Point3, PoseSample, PressTiming, Skin};
+use skinrig_protocol::plan::RunLimits;
+
+/// A set point that differs from where it was by more than this has begun to move, mm.
+const MOVED_MM: f64 = 1e-3;
+
+/// Waits for a tip that stays close to a target.
+#[derive(Debug, Clone)]
+pub struct Settling {
+    target: Point3<Skin>,
+    tolerance_mm: f64,
+    time: HostDuration,
+    after: HostTime,
+    since: Option<HostTime>,
+    settled: Option<HostTime>,
+    near: bool,
+}
+
+impl Settling {
+    /// Settled when samples taken after `after` stay within the limits' tolerance of `target` for their settle
+    /// time.
+    #[must_use]
+    pub const fn new(target: Point3<Skin>, limits: &RunLimits, after: HostTime) -> Self {
+        Self {
+            target,
+            tolerance_mm: limits.position_tolerance_mm,
+            time: limits.settle_time,
+            after,
+            since: None,
+            settled: None,
+            near: false,
+        }
+    }
+
+    /// Takes the next sample.
+    pub fn feed(&mut self, sample: &PoseSample) {
+        if sample.t <= self.after {
+            return;
+        }
+        self.near = sample.measured.distance_mm(self.target) <= self.tolerance_mm;
+        if !self.near {
+            self.since = None;
+            return;
+        }
+        let since = *self.since.get_or_insert(sample.t);
+        if sample.t - since >= self.time && self.settled.is_none() {
+            self.settled = Some(sample.t);
+        }
+    }
+
+    /// Where to.
+    #[must_use]
+    pub const fn target(&self) -> Point3<Skin> {
+        self.target
+    }
+
+    /// True when the newest sample is within the tolerance.
+    #[must_use]
+    pub const fn is_near(&self) -> bool {
+        self.near
+    }
+
+    /// The first sample at which the tip had been within the tolerance for the whole settle time.
+    #[must_use]
+    pub const fn settled(&self) -> Option<HostTime> {
+        self.settled
+    }
+}
+
+/// Follows one press through the pose stream.
+#[derive(Debug, Clone)]
+pub struct PressTracker {
+    at: Point2,
+    depth_mm: f64,
+    limits: RunLimits,
+    down: Settling,
+    depth: Option<Settling>,
+    up: Option<Settling>,
+    down_from: HostTime,
+    up_from: Option<HostTime>,
+    previous: Option<PoseSample>,
+    start_set_point_mm: Option<f64>,
+    hold_set_point_mm: Option<f64>,
+    approach: Option<HostTime>,
+    contact: Option<HostTime>,
+    at_depth: Option<HostTime>,
+    retract: Option<HostTime>,
+    release: Option<HostTime>,
+    clear: Option<HostTime>,
+    hold_sum: [f64; 3],
+    hold_samples: u64,
+    worst: Option<(f64, Point3<Skin>)>,
+    peak_force_n: Option<f64>,
+}
+
+impl PressTracker {
+    /// A press at `at`, `depth_mm` deep, whose downward motion was commanded at `down_from` when the pose was
+    /// `last`.
+    #[must_use]
+    pub fn new(
+        at: Point2,
+        depth_mm: f64,
+        limits: &RunLimits,
+        down_from: HostTime,
+        last: Option<PoseSample>,
+    ) -> Self {
+        Self {
+            at,
+            depth_mm,
+            limits: *limits,
+            down: Settling::new(at.at_height(0.0), limits, down_from),
+            depth: None,
+            up: None,
+            down_from,
+            up_from: None,
+            previous: last,
+            start_set_point_mm: last.map(|p| p.commanded.z_mm),
+            hold_set_point_mm: None,
+            approach: None,
+            contact: None,
+            at_depth: None,
+            retract: None,
+            release: None,
+            clear: None,
+            hold_sum: [0.0; 3],
+            hold_samples: 0,
+            worst: None,
+            peak_force_n: None,
+        }
+    }
+
+    /// Takes the next sample.
+    pub fn feed(&mut self, s: &PoseSample) {
+        if s.force_n.is_finite() {
+            let peak = self.peak_force_n.unwrap_or(s.force_n);
+            self.peak_force_n = Some(peak.max(s.force_n));
+        }
+        let rising = self.up_from.is_some_and(|t| s.t > t);
+        if let Some(p) = self.previous {
+            let (from, to) = (p.measured.z_mm, s.measured.z_mm);
+            if s.t > self.down_from && self.contact.is_none() && from > 0.0 && to <= 0.0 {
+                self.contact = Some(crossing(&p, s));
+            }
+            if rising && self.release.is_none() && from <= 0.0 && to > 0.0 {
+                self.release = Some(crossing(&p, s));
+            }
+        }
+        if s.t > self.down_from && self.approach.is_none() && !rising {
+            let start = *self.start_set_point_mm.get_or_insert(s.commanded.z_mm);
+            if s.commanded.z_mm < start - MOVED_MM {
+                self.approach = Some(s.t);
+            }
+        }
+        self.settle(s, rising);
+        if self.at_depth.is_some() {
+            if !rising {
+                self.hold(s);
+            } else if rising && self.retract.is_none() {
+                let held = *self.hold_set_point_mm.get_or_insert(s.commanded.z_mm);
+                if s.commanded.z_mm > held + MOVED_MM {
+                    self.retract = Some(s.t);
+                }
+            }
+        }
+        self.previous = Some(*s);
+    }
+
+    fn hold(&mut self, s: &PoseSample) {
+        let m = s.measured;
+        for (sum, v) in self.hold_sum.iter_mut().zip(m.to_array()) {
+            *sum += v;
+        }
+        self.hold_samples += 1;
+        self.hold_set_point_mm = Some(s.commanded.z_mm);
+        let off = m.distance_mm(self.at.at_height(-self.depth_mm));
+        if self.worst.is_none_or(|(worst, _)| off > worst) {
+            self.worst = Some((off, m));
+        }
+    }
+
+    fn settle(&mut self, s: &PoseSample, rising: bool) {
+        self.down.feed(s);
+        if let (Some(depth), false) = (&mut self.depth, rising) {
+            depth.feed(s);
+            self.at_depth = depth.settled();
+        }
+        if let Some(up) = &mut self.up {
+            up.feed(s);
+            self.clear = up.settled();
+        }
+    }
+
+    /// The motion from the surface to depth was commanded at `t`.
+    pub fn indent_from(&mut self, t: HostTime) {
+        let target = self.at.at_height(-self.depth_mm);
+        self.depth = Some(Settling::new(target, &self.limits, t));
+    }
+
+    /// The upward motion was commanded at `t`.
+    pub fn rise_from(&mut self, t: HostTime) {
+        let target = self.at.at_height(self.limits.clearance_mm);
+        self.up_from = Some(t);
+        self.up = Some(Settling::new(target, &self.limits, t));
+    }
+
+    /// True when the tip is at the surface, or was.
+    #[must_use]
+    pub fn at_surface(&self) -> bool {
+        self.down.is_near() || self.contact.is_some()
+    }
+
+    /// When the tip had settled at clearance height.
+    #[must_use]
+    pub const fn clear(&self) -> Option<HostTime> {
+        self.clear
+    }
+
+    /// When the set point began to move down.
+    #[must_use]
+    pub const fn approach(&self) -> Option<HostTime> {
+        self.approach
+    }
+
+    /// First crossing of the surface downwards, interpolated.
+    #[must_use]
+    pub const fn contact(&self) -> Option<HostTime> {
+        self.contact
+    }
+
+    /// When the tip had settled at depth.
+    #[must_use]
+    pub const fn at_depth(&self) -> Option<HostTime> {
+        self.at_depth
+    }
+
+    /// When the set point began to move up.
+    #[must_use]
+    pub const fn retract(&self) -> Option<HostTime> {
+        self.retract
+    }
+
+    /// First crossing of the surface upwards after the upward command, interpolated.
+    #[must_use]
+    pub const fn release(&self) -> Option<HostTime> {
+        self.release
+    }
+
+    /// All six moments, or the first one that is missing or out of order.
+    ///
+    /// # Errors
+    /// Why there is no timing, in words.
+    pub fn timing(&self) -> Result<PressTiming, String> {
+        let need = |t: Option<HostTime>, what: &str| {
+            t.ok_or_else(|| format!("expected a measured {what}, found none"))
+        };
+        let timing = PressTiming {
+            approach: need(self.approach, "begin of the approach")?,
+            contact: need(self.contact, "contact")?,
+            at_depth: need(self.at_depth, "settling at depth")?,
+            retract: need(self.retract, "begin of the retraction")?,
+            release: need(self.release, "release")?,
+            clear: need(self.clear, "settling at clearance height")?,
+        };
+        let order = [
+            timing.approach,
+            timing.contact,
+            timing.at_depth,
+            timing.retract,
+            timing.release,
+            timing.clear,
+        ];
+        if order.is_sorted() {
+            Ok(timing)
+        } else {
+            Err(format!("expected the moments in order, found {order:?}"))
+        }
+    }
+
+    /// Mean measured tip during the hold.
+    #[must_use]
+    pub fn mean(&self) -> Option<Point3<Skin>> {
+        if self.hold_samples == 0 {
+            return None;
+        }
+        let [x, y, z] = self.hold_sum.map(|s| s / self.hold_samples as f64);
+        Some(Point3::new(x, y, z))
+    }
+
+    /// Largest force seen, N.
+    #[must_use]
+    pub const fn peak_force_n(&self) -> Option<f64> {
+        self.peak_force_n
+    }
+
+    /// Checks the hold against the plan.
+    ///
+    /// # Errors
+    /// What is off, in words.
+    pub fn check_hold(&self) -> Result<(), String> {
+        match self.worst {
+            None => Err("expected samples during the hold, found none".to_owned()),
+            Some((off, at)) if off > self.limits.position_tolerance_mm => Err(format!(
+                "hold: expected within {} mm of {}, found {}",
+                self.limits.position_tolerance_mm,
+                crate::error::point(&self.at.at_height(-self.depth_mm)),
+                crate::error::point(&at)
+            )),
+            Some(_) => Ok(()),
+        }
+    }
+}
+
+/// When the straight line from `a` to `b` crosses z = 0.
+fn crossing(a: &PoseSample, b: &PoseSample) -> HostTime {
+    let (za, zb) = (a.measured.z_mm, b.measured.z_mm);
+    let share = za / (za - zb);
+    a.t + HostDuration((share * (b.t - a.t).0 as f64).round() as i64)
+}

@@ -1,0 +1,244 @@
+//! What must fit together before anything is armed: plan, header and rig.
+
+use skinrig_device::{IndenterCapabilities, MotionLimits};
+use skinrig_model::{Point3, RigidTransform, Robot, RunHeader, Skin};
+use skinrig_protocol::plan::{Plan, Step};
+
+use crate::error::ControllerError;
+use crate::guard::check_target;
+
+/// How far a press may be from the end of the travel before it, mm: the rounding of a plan kept as text.
+const SAME_PLACE_MM: f64 = 1e-6;
+
+fn plan_error(
+    place: impl Into<String>,
+    expected: impl Into<String>,
+    found: impl Into<String>,
+) -> ControllerError {
+    ControllerError::Plan {
+        place: place.into(),
+        expected: expected.into(),
+        found: found.into(),
+    }
+}
+
+/// Checks that `plan` can be executed as it stands: every press exactly once, from above its place, every
+/// target and speed within the plan's own limits, and the header's presses those of the plan.
+pub(crate) fn check_plan(plan: &Plan, header: &RunHeader) -> Result<(), ControllerError> {
+    if header.presses != plan.presses {
+        return Err(plan_error(
+            "header",
+            format!("the plan's {} presses", plan.presses.len()),
+            format!("{} presses that differ", header.presses.len()),
+        ));
+    }
+    let limits = &plan.limits;
+    let positive = [
+        ("max_speed_mm_s", limits.max_speed_mm_s),
+        ("max_force_n", limits.max_force_n),
+        ("max_depth_mm", limits.max_depth_mm),
+        ("clearance_mm", limits.clearance_mm),
+        ("position_tolerance_mm", limits.position_tolerance_mm),
+    ];
+    for (name, value) in positive {
+        if !(value.is_finite() && value > 0.0) {
+            return Err(plan_error(
+                format!("limits.{name}"),
+                "a finite number above 0",
+                value.to_string(),
+            ));
+        }
+    }
+    for (i, press) in plan.presses.iter().enumerate() {
+        if press.id.0 as usize != i {
+            let found = press.id.to_string();
+            return Err(plan_error("presses", format!("press {i}"), found));
+        }
+    }
+    let mut seen = vec![false; plan.presses.len()];
+    let mut above: Option<Point3<Skin>> = None;
+    for (n, step) in plan.steps.iter().enumerate() {
+        let place = |what: &str| format!("step {n}, {what}");
+        match step {
+            Step::Begin { .. } => {}
+            Step::Pause { duration } => {
+                if duration.0 < 0 {
+                    let found = duration.to_string();
+                    return Err(plan_error(place("pause"), "0 s or more", found));
+                }
+            }
+            Step::Travel { to, speed_mm_s, .. } => {
+                check_speed(plan, &place("travel"), *speed_mm_s)?;
+                check_point(plan, &place("travel"), *to)?;
+                if to.z_mm < limits.clearance_mm - SAME_PLACE_MM {
+                    return Err(plan_error(
+                        place("travel"),
+                        format!("a height of at least {} mm", limits.clearance_mm),
+                        format!("{} mm", to.z_mm),
+                    ));
+                }
+                above = Some(*to);
+            }
+            Step::Press(press) => {
+                let name = place(&press.press.to_string());
+                match seen.get_mut(press.press.0 as usize) {
+                    Some(done) if !*done => *done = true,
+                    _ => {
+                        return Err(plan_error(
+                            name,
+                            "each press once",
+                            "it again, or no such press",
+                        ));
+                    }
+                }
+                for speed in [
+                    press.approach_speed_mm_s,
+                    press.indent_speed_mm_s,
+                    press.retract_speed_mm_s,
+                ] {
+                    check_speed(plan, &name, speed)?;
+                }
+                if !(press.depth_mm.is_finite() && press.depth_mm > 0.0) {
+                    let found = press.depth_mm.to_string();
+                    return Err(plan_error(name, "a depth above 0 mm", found));
+                }
+                for z_mm in [limits.clearance_mm, 0.0, -press.depth_mm] {
+                    check_point(plan, &name, press.at.at_height(z_mm))?;
+                }
+                let planned = &plan.presses[press.press.0 as usize];
+                if planned.at != press.at || planned.depth_mm != press.depth_mm {
+                    return Err(plan_error(
+                        name,
+                        format!("place and depth of the press list ({planned:?})"),
+                        format!("{:?}, {} mm", press.at, press.depth_mm),
+                    ));
+                }
+                let there = above.is_some_and(|a| a.plane().distance_mm(press.at) <= SAME_PLACE_MM);
+                if !there {
+                    return Err(plan_error(
+                        name,
+                        "a travel to above the press before it",
+                        above.map_or_else(|| "none".to_owned(), |a| crate::error::point(&a)),
+                    ));
+                }
+                above = Some(press.at.at_height(limits.clearance_mm));
+            }
+        }
+    }
+    if let Some(i) = seen.iter().position(|done| !done) {
+        return Err(plan_error("steps", format!("a step for press {i}"), "none"));
+    }
+    Ok(())
+}
+
+fn check_speed(plan: &Plan, place: &str, speed_mm_s: f64) -> Result<(), ControllerError> {
+    let limit = plan.limits.max_speed_mm_s;
+    if speed_mm_s.is_finite() && speed_mm_s > 0.0 && speed_mm_s <= limit {
+        return Ok(());
+    }
+    Err(plan_error(
+        place,
+        format!("a speed above 0 and at most {limit} mm/s"),
+        format!("{speed_mm_s} mm/s"),
+    ))
+}
+
+fn check_point(plan: &Plan, place: &str, target: Point3<Skin>) -> Result<(), ControllerError> {
+    check_target(&plan.limits, target)
+        .map_err(|e| plan_error(place, "a target within the limits", e.to_string()))
+}
+
+/// The limits that the robot itself is given, and remarks about what it cannot do.
+///
+/// The run's workspace, its floor at the deepest allowed indentation, widened by the position tolerance
+/// (a settled pose may be that far off) and taken to the robot frame: with axes turned by anything but
+/// quarter turns, the box around the turned box. Where the robot itself can do less, its own limits stand, and
+/// the remark says so; every target of the plan is then checked against the result.
+pub(crate) fn motion_limits(
+    plan: &Plan,
+    robot_from_skin: &RigidTransform<Robot, Skin>,
+    can: &IndenterCapabilities,
+) -> Result<(MotionLimits, Vec<String>), ControllerError> {
+    let limits = &plan.limits;
+    let margin = limits.position_tolerance_mm;
+    let low_z = limits.workspace_min_mm[2].max(-limits.max_depth_mm);
+    let [x0, y0, _] = limits.workspace_min_mm.map(|v| v - margin);
+    let [x1, y1, z1] = limits.workspace_max_mm.map(|v| v + margin);
+    let (mut min_mm, mut max_mm) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+    for x in [x0, x1] {
+        for y in [y0, y1] {
+            for z in [low_z - margin, z1] {
+                let corner = robot_from_skin.apply(Point3::new(x, y, z)).to_array();
+                for (i, c) in corner.into_iter().enumerate() {
+                    min_mm[i] = min_mm[i].min(c);
+                    max_mm[i] = max_mm[i].max(c);
+                }
+            }
+        }
+    }
+    let mut remarks = Vec::new();
+    for (i, axis) in ['x', 'y', 'z'].into_iter().enumerate() {
+        let (low, high) = (can.workspace_min_mm[i], can.workspace_max_mm[i]);
+        if min_mm[i] < low || max_mm[i] > high {
+            remarks.push(format!(
+                "workspace along the robot's {axis}: the plan allows {:.3} to {:.3} mm, the robot reaches {low} to {high} mm",
+                min_mm[i], max_mm[i]
+            ));
+            min_mm[i] = min_mm[i].max(low);
+            max_mm[i] = max_mm[i].min(high);
+        }
+    }
+    if limits.max_force_n > can.max_force_n {
+        remarks.push(format!(
+            "force: the plan allows {} N, the robot exerts at most {} N",
+            limits.max_force_n, can.max_force_n
+        ));
+    }
+    let chosen = MotionLimits {
+        min_mm,
+        max_mm,
+        max_speed_mm_s: limits.max_speed_mm_s.min(can.max_speed_mm_s),
+        max_force_n: limits.max_force_n.min(can.max_force_n),
+    };
+    check_reach(plan, robot_from_skin, &chosen)?;
+    Ok((chosen, remarks))
+}
+
+/// Every target and speed of the plan within what the robot will accept.
+fn check_reach(
+    plan: &Plan,
+    robot_from_skin: &RigidTransform<Robot, Skin>,
+    limits: &MotionLimits,
+) -> Result<(), ControllerError> {
+    let reach = |n: usize, target: Point3<Skin>, speed: f64| {
+        let p = robot_from_skin.apply(target).to_array();
+        let inside = (0..3).all(|i| (limits.min_mm[i]..=limits.max_mm[i]).contains(&p[i]));
+        if inside && speed <= limits.max_speed_mm_s {
+            return Ok(());
+        }
+        Err(ControllerError::Rig {
+            place: format!("indenter, step {n} of the plan"),
+            expected: format!(
+                "a target from {:?} to {:?} mm (robot frame) and at most {} mm/s",
+                limits.min_mm, limits.max_mm, limits.max_speed_mm_s
+            ),
+            found: format!("{p:?} mm at {speed} mm/s"),
+        })
+    };
+    for (n, step) in plan.steps.iter().enumerate() {
+        match step {
+            Step::Travel { to, speed_mm_s, .. } => reach(n, *to, *speed_mm_s)?,
+            Step::Press(p) => {
+                reach(
+                    n,
+                    p.at.at_height(plan.limits.clearance_mm),
+                    p.retract_speed_mm_s,
+                )?;
+                reach(n, p.at.at_height(0.0), p.approach_speed_mm_s)?;
+                reach(n, p.at.at_height(-p.depth_mm), p.indent_speed_mm_s)?;
+            }
+            Step::Begin { .. } | Step::Pause { .. } => {}
+        }
+    }
+    Ok(())
+}

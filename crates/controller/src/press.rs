@@ -1,0 +1,179 @@
+//! One press: down to the surface, to depth, hold, and back up; every moment measured.
+
+use skinrig_model::{AttemptId, CameraId, HostTime, PressOutcome, PressTiming, PressVerdict};
+use skinrig_protocol::plan::PressStep;
+
+use crate::core::{Collect, Core, OpenPress};
+use crate::error::{ControllerError, Halt};
+use crate::moments::PressTracker;
+
+impl Core<'_> {
+    /// Executes one press. A press that goes wrong without harm ends invalid and the run goes on.
+    pub(crate) fn press(&mut self, step: &PressStep) -> Result<(), Halt> {
+        if let Some(after) = step.start_after_begin {
+            self.wait_at_clearance(self.begin + after)?;
+        }
+        let attempt = AttemptId {
+            press: step.press,
+            number: 1,
+        };
+        let t = self.now();
+        self.journal.intent(attempt, t)?;
+        self.open = Some(OpenPress {
+            attempt,
+            tracker: None,
+            marks: step.marks.clone(),
+            lost: [0; 2],
+            bytes: [0; 2],
+        });
+        // A durable intent may have taken a while: know the present pose before moving.
+        self.observe()?;
+        let trouble = self.press_motion(step)?;
+        self.close_press(trouble)?;
+        Ok(())
+    }
+
+    /// The motion. `Some` says why the press is invalid although the tip is back at clearance height.
+    fn press_motion(&mut self, step: &PressStep) -> Result<Option<String>, Halt> {
+        let start = self.indenter.position();
+        let down = self.command(step.at.at_height(0.0), step.approach_speed_mm_s)?;
+        let deadline = down + step.deadline;
+        let tracker = PressTracker::new(step.at, step.depth_mm, &self.plan.limits, down, start);
+        if let Some(open) = &mut self.open {
+            open.tracker = Some(tracker);
+        }
+        let trouble = self.go_down(step, deadline)?;
+
+        let target = step.at.at_height(self.plan.limits.clearance_mm);
+        let up = self.command(target, step.retract_speed_mm_s)?;
+        self.with_tracker(|t| t.rise_from(up));
+        let height = self.plan.limits.clearance_mm + step.depth_mm;
+        let (_, grace) = self.own_motion(height);
+        let slow = height / step.retract_speed_mm_s;
+        let allowed = grace + skinrig_model::HostDuration::from_secs_f64(2.0 * slow);
+        if !self.until(|t| t.clear().is_some(), deadline.max(up + allowed))? {
+            let what = format!("{}, retraction", step.press);
+            return Err(self.not_arrived(&what, target, allowed).into());
+        }
+        while !self.line_is_free() {
+            self.tick(Some(self.line_free_at()))?;
+        }
+        let clear = self.tracker().and_then(PressTracker::clear);
+        Ok(trouble.or_else(|| {
+            let clear = clear.filter(|clear| *clear > deadline)?;
+            Some(format!(
+                "expected to be back at clearance height within {}, found {}",
+                step.deadline,
+                clear - down
+            ))
+        }))
+    }
+
+    /// Down, settle, hold. `Some` says what did not happen in time.
+    fn go_down(&mut self, step: &PressStep, deadline: HostTime) -> Result<Option<String>, Halt> {
+        let late = |core: &Self, what: &str, z_mm: f64| {
+            let target = step.at.at_height(z_mm);
+            Some(core.not_arrived(what, target, step.deadline).to_string())
+        };
+        if !self.until(PressTracker::at_surface, deadline)? {
+            return Ok(late(self, "approach", 0.0));
+        }
+        let depth = step.at.at_height(-step.depth_mm);
+        let t = self.command(depth, step.indent_speed_mm_s)?;
+        self.with_tracker(|tracker| tracker.indent_from(t));
+        if !self.until(|t| t.at_depth().is_some(), deadline)? {
+            return Ok(late(self, "indentation", -step.depth_mm));
+        }
+        let settled = self.tracker().and_then(PressTracker::at_depth);
+        let until = settled.unwrap_or(t) + step.hold;
+        while self.now() < until {
+            self.tick(Some(until))?;
+        }
+        Ok(None)
+    }
+
+    fn tracker(&self) -> Option<&PressTracker> {
+        self.open.as_ref().and_then(|o| o.tracker.as_ref())
+    }
+
+    fn with_tracker(&mut self, change: impl FnOnce(&mut PressTracker)) {
+        if let Some(tracker) = self.open.as_mut().and_then(|o| o.tracker.as_mut()) {
+            change(tracker);
+        }
+    }
+
+    /// Ticks until the tracker says so; false when `deadline` came first.
+    fn until(
+        &mut self,
+        done: impl Fn(&PressTracker) -> bool,
+        deadline: HostTime,
+    ) -> Result<bool, Halt> {
+        loop {
+            if self.tracker().is_some_and(&done) {
+                return Ok(true);
+            }
+            if self.now() >= deadline {
+                return Ok(false);
+            }
+            self.tick(Some(deadline))?;
+        }
+    }
+
+    /// Hands over all bytes and poses up to now, then the outcome.
+    pub(crate) fn close_press(&mut self, trouble: Option<String>) -> Result<(), ControllerError> {
+        let flushed = self.observe().and(self.collect(Collect::Flush));
+        if self.ending {
+            if let Err(e) = flushed {
+                self.journal.problem(e.to_string());
+            }
+        } else {
+            flushed?;
+        }
+        self.emit_poses()?;
+        let Some(open) = &self.open else {
+            return Ok(());
+        };
+        let outcome = judge(open, trouble);
+        self.journal.outcome(outcome)?;
+        self.open = None;
+        Ok(())
+    }
+}
+
+/// The outcome of a press: valid only when all was measured, stayed in place and nothing was lost.
+fn judge(open: &OpenPress, trouble: Option<String>) -> PressOutcome {
+    let mut reasons: Vec<String> = trouble.into_iter().collect();
+    let mut timing: Option<PressTiming> = None;
+    if let Some(tracker) = &open.tracker {
+        match tracker.timing() {
+            Ok(t) => timing = Some(t),
+            Err(reason) if reasons.is_empty() => reasons.push(reason),
+            Err(_) => {}
+        }
+        if tracker.at_depth().is_some() {
+            reasons.extend(tracker.check_hold().err());
+        }
+    }
+    for camera in CameraId::ALL {
+        let (lost, bytes) = (open.lost[camera.index()], open.bytes[camera.index()]);
+        if lost > 0 {
+            reasons.push(format!("{camera} lost {lost} bytes"));
+        } else if bytes == 0 {
+            reasons.push(format!("{camera} sent no bytes"));
+        }
+    }
+    let mean = open.tracker.as_ref().and_then(PressTracker::mean);
+    PressOutcome {
+        attempt: open.attempt,
+        verdict: if reasons.is_empty() {
+            PressVerdict::Valid
+        } else {
+            PressVerdict::Invalid(reasons.join("; "))
+        },
+        timing,
+        measured_at: mean.map(skinrig_model::Point3::plane),
+        measured_depth_mm: mean.map(|m| -m.z_mm),
+        peak_force_n: open.tracker.as_ref().and_then(PressTracker::peak_force_n),
+        scheduled: false,
+    }
+}

@@ -1,0 +1,215 @@
+//! What a terminal shows of a run, from its records alone.
+
+use std::collections::{BTreeMap, VecDeque};
+
+use skinrig_model::pulse::{PULSES_PER_TRAIN, decode_marks};
+use skinrig_model::{
+    CameraId, HostDuration, HostTime, PlannedPress, Point2, PressVerdict, RawChunk, Record, RunEnd,
+    TriggerEdge,
+};
+
+/// Event rates are taken over this span of rig time.
+const RATE_SPAN: HostDuration = HostDuration::from_millis(1_000);
+
+/// What is known of one camera.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct CameraProgress {
+    /// CD events so far.
+    pub events: u64,
+    /// Bytes so far.
+    pub bytes: u64,
+    /// Bytes known to be lost so far.
+    pub lost_bytes: u64,
+    /// CD events per second of rig time over about the last second; `None` before there are two chunks.
+    pub events_per_s: Option<f64>,
+    /// Complete marks seen on the trigger input.
+    pub marks_seen: u64,
+}
+
+/// A run at one instant.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Progress {
+    /// Presses of the plan.
+    pub planned: usize,
+    /// Presses that have ended, missed ones included.
+    pub done: usize,
+    /// How many of them are valid.
+    pub valid: usize,
+    /// How many of them are invalid.
+    pub invalid: usize,
+    /// How many of them were missed.
+    pub missed: usize,
+    /// The press under way, or the last one.
+    pub press: Option<PlannedPress>,
+    /// The measured tip's place on the skin, and its height in mm.
+    pub tip: Option<(Point2, f64)>,
+    /// Both cameras.
+    pub cameras: [CameraProgress; 2],
+    /// Marks that the trigger box sent.
+    pub marks_sent: u64,
+    /// Rig time since the first record that carries a time.
+    pub elapsed: HostDuration,
+    /// Rig time still to go; `None` without an expected duration or after the end.
+    pub eta: Option<HostDuration>,
+    /// True between a pause and its end.
+    pub paused: bool,
+    /// How it ended.
+    pub end: Option<RunEnd>,
+}
+
+/// Follows a run by its records.
+#[derive(Debug, Clone, Default)]
+pub struct ProgressTracker {
+    progress: Progress,
+    presses: Vec<PlannedPress>,
+    expected: Option<HostDuration>,
+    first: Option<HostTime>,
+    chunks: [VecDeque<(HostTime, u64)>; 2],
+    edges: [BTreeMap<u8, Vec<TriggerEdge>>; 2],
+}
+
+impl ProgressTracker {
+    /// A tracker for a plan that is expected to take `expected` of rig time.
+    #[must_use]
+    pub fn new(expected: Option<HostDuration>) -> Self {
+        Self {
+            expected,
+            ..Self::default()
+        }
+    }
+
+    /// The run as of the last record.
+    #[must_use]
+    pub const fn progress(&self) -> &Progress {
+        &self.progress
+    }
+
+    /// Takes the next record.
+    pub fn update(&mut self, record: &Record) -> &Progress {
+        let p = &mut self.progress;
+        match record {
+            Record::Started(header) => {
+                self.presses = header.presses.clone();
+                p.planned = header.presses.len();
+            }
+            Record::Intent { attempt, t } => {
+                p.press = self.presses.get(attempt.press.0 as usize).copied();
+                self.reached(*t);
+            }
+            Record::Poses(block) => {
+                if let Some(last) = block.last() {
+                    p.tip = Some((last.measured.plane(), last.measured.z_mm));
+                    self.reached(last.t);
+                }
+            }
+            Record::MarkSent(sent) => {
+                p.marks_sent += 1;
+                self.reached(sent.t);
+            }
+            Record::Chunk(chunk) => self.chunk(chunk),
+            Record::Outcome(outcome) => {
+                p.done += 1;
+                match outcome.verdict {
+                    PressVerdict::Valid => p.valid += 1,
+                    _ => p.invalid += 1,
+                }
+            }
+            Record::Missed(..) => {
+                p.done += 1;
+                p.missed += 1;
+            }
+            Record::Interruption { kind, t, .. } => {
+                p.paused = *kind == skinrig_model::InterruptionKind::Pause;
+                self.reached(*t);
+            }
+            Record::Ended { t, end } => {
+                p.end = Some(end.clone());
+                self.reached(*t);
+                self.progress.eta = None;
+            }
+            Record::Command { t, .. } | Record::Note { t, .. } => self.reached(*t),
+            Record::Device { .. } => {}
+        }
+        &self.progress
+    }
+
+    fn reached(&mut self, t: HostTime) {
+        let first = *self.first.get_or_insert(t);
+        let p = &mut self.progress;
+        p.elapsed = p.elapsed.max(t - first);
+        p.eta = remaining(p, self.expected).filter(|_| p.end.is_none());
+    }
+
+    fn chunk(&mut self, chunk: &RawChunk) {
+        let i = chunk.camera.index();
+        let camera = &mut self.progress.cameras[i];
+        camera.events += chunk.facts.cd_events;
+        camera.bytes += chunk.bytes.len() as u64;
+        camera.lost_bytes += chunk.lost_before;
+
+        let recent = &mut self.chunks[i];
+        recent.push_back((chunk.host_time, chunk.facts.cd_events));
+        // Keep one chunk older than the span: the events of the others came after it.
+        while recent
+            .get(1)
+            .is_some_and(|(t, _)| chunk.host_time - *t >= RATE_SPAN)
+        {
+            recent.pop_front();
+        }
+        let oldest = recent.front().map_or(chunk.host_time, |(t, _)| *t);
+        let span = (chunk.host_time - oldest).as_secs_f64();
+        if span > 0.0 {
+            let events: u64 = recent.iter().skip(1).map(|(_, n)| n).sum();
+            camera.events_per_s = Some(events as f64 / span);
+        }
+
+        for edge in &chunk.triggers {
+            self.edges[i].entry(edge.channel).or_default().push(*edge);
+        }
+        let seen: u64 = self.edges[i].values_mut().map(take_marks).sum();
+        self.progress.cameras[i].marks_seen += seen;
+        self.reached(chunk.host_time);
+    }
+
+    /// Press number (from 1) of how many, for example `12/2500`.
+    #[must_use]
+    pub fn press_label(&self) -> String {
+        let at = self.progress.press.map_or(0, |p| u64::from(p.id.0) + 1);
+        format!("{at}/{}", self.progress.planned)
+    }
+
+    /// CD events per second of `camera`; see [`CameraProgress::events_per_s`].
+    #[must_use]
+    pub fn events_per_s(&self, camera: CameraId) -> Option<f64> {
+        self.progress.cameras[camera.index()].events_per_s
+    }
+}
+
+/// The expected rest: what the plan said at first, then more and more the pace of the presses done.
+fn remaining(p: &Progress, expected: Option<HostDuration>) -> Option<HostDuration> {
+    let planned = HostDuration((expected?.0 - p.elapsed.0).max(0));
+    if p.done == 0 || p.planned == 0 {
+        return Some(planned);
+    }
+    let share = p.done as f64 / p.planned as f64;
+    let pace = p.elapsed.as_secs_f64() * (1.0 - share) / share;
+    Some(HostDuration::from_secs_f64(
+        share * pace + (1.0 - share) * planned.as_secs_f64(),
+    ))
+}
+
+/// Takes the complete trains off the front of a channel's edges and counts them.
+fn take_marks(edges: &mut Vec<TriggerEdge>) -> u64 {
+    let length = 2 * PULSES_PER_TRAIN as usize;
+    let (mut seen, mut from) = (0, 0);
+    while let Some(train) = edges.get(from..from + length) {
+        if decode_marks(train).marks.is_empty() {
+            from += 1;
+        } else {
+            seen += 1;
+            from += length;
+        }
+    }
+    edges.drain(..from);
+    seen
+}

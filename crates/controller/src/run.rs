@@ -1,0 +1,176 @@
+//! The life of a run in types, and the one call that goes through all of it.
+
+use std::marker::PhantomData;
+
+use skinrig_device::Rig;
+use skinrig_model::{HostTime, RunEnd, RunHeader};
+use skinrig_protocol::plan::Plan;
+
+use crate::control::ControlHandle;
+use crate::core::Core;
+use crate::settings::ControllerSettings;
+use crate::sink::RecordSink;
+use crate::states::Event;
+
+/// What became of a run. `planned = valid + invalid + missed`, always.
+#[derive(Debug, Clone, PartialEq)]
+#[must_use]
+pub struct RunReport {
+    /// How it ended, as in the last record.
+    pub end: RunEnd,
+    /// When.
+    pub ended_at: HostTime,
+    /// Presses of the plan.
+    pub planned: usize,
+    /// Presses done as planned.
+    pub valid: usize,
+    /// Presses attempted, but not as planned.
+    pub invalid: usize,
+    /// Presses never attempted.
+    pub missed: usize,
+    /// True when the tip was seen at clearance height at the end, or the robot was never armed.
+    pub retracted: bool,
+    /// True when the robot confirmed that it is disarmed.
+    pub disarmed: bool,
+    /// What else went wrong while ending.
+    pub problems: Vec<String>,
+}
+
+/// State of a [`Run`]: nothing has been opened.
+#[derive(Debug)]
+pub enum Planned {}
+/// State of a [`Run`]: devices are configured and read back, cameras stream, the robot holds.
+#[derive(Debug)]
+pub enum Armed {}
+/// State of a [`Run`]: ready to execute its steps.
+#[derive(Debug)]
+pub enum Running {}
+/// State of a [`Run`]: disarmed, all records written.
+#[derive(Debug)]
+pub enum Finished {}
+
+/// A run in state `S`. Dropped in any state before [`Finished`], it retracts, disarms, stops the cameras and
+/// writes its last records first.
+pub struct Run<'a, S> {
+    core: Core<'a>,
+    state: PhantomData<S>,
+}
+
+impl<'a, S> Run<'a, S> {
+    fn become_<T>(self) -> Run<'a, T> {
+        Run {
+            core: self.core,
+            state: PhantomData,
+        }
+    }
+}
+
+impl<'a> Run<'a, Planned> {
+    /// A run of `plan` on `rig`. Nothing happens yet.
+    pub fn new(
+        plan: &'a Plan,
+        header: RunHeader,
+        rig: Rig,
+        control: &ControlHandle,
+        sink: &'a mut dyn RecordSink,
+    ) -> Self {
+        Self::with_settings(
+            plan,
+            header,
+            rig,
+            control,
+            sink,
+            ControllerSettings::default(),
+        )
+    }
+
+    /// As [`new`](Self::new), with other than the default settings.
+    pub fn with_settings(
+        plan: &'a Plan,
+        header: RunHeader,
+        rig: Rig,
+        control: &ControlHandle,
+        sink: &'a mut dyn RecordSink,
+        settings: ControllerSettings,
+    ) -> Self {
+        Self {
+            core: Core::new(plan, header, rig, control, sink, settings),
+            state: PhantomData,
+        }
+    }
+
+    /// Checks the plan against the rig, configures every device and reads it back, starts the cameras and
+    /// powers the robot, which holds its position.
+    ///
+    /// # Errors
+    /// The report of a run that ended here, the rig at rest.
+    pub fn arm(mut self) -> Result<Run<'a, Armed>, RunReport> {
+        match self.core.shielded(Core::arm) {
+            Ok(()) => Ok(self.become_()),
+            Err(halt) => {
+                self.core.conclude(Err(halt));
+                Err(self.core.take_report())
+            }
+        }
+    }
+}
+
+impl<'a> Run<'a, Armed> {
+    /// Begins the plan. Nothing moves yet.
+    #[must_use]
+    pub fn begin(mut self) -> Run<'a, Running> {
+        self.core.machine.fire(Event::Begin);
+        self.become_()
+    }
+}
+
+impl<'a> Run<'a, Running> {
+    /// Executes the plan and ends the run, whatever happens.
+    #[must_use]
+    pub fn run(mut self) -> Run<'a, Finished> {
+        let result = self.core.shielded(Core::steps);
+        self.core.conclude(result);
+        self.become_()
+    }
+}
+
+impl Run<'_, Finished> {
+    /// What became of it.
+    pub fn report(mut self) -> RunReport {
+        self.core.take_report()
+    }
+}
+
+impl Core<'_> {
+    fn take_report(&mut self) -> RunReport {
+        // Concluding always leaves a report; an absent one must not read as success.
+        self.report.take().unwrap_or_else(|| RunReport {
+            end: RunEnd::Faulted("internal error: no report".to_owned()),
+            ended_at: HostTime::ZERO,
+            planned: self.plan.presses.len(),
+            valid: 0,
+            invalid: 0,
+            missed: self.plan.presses.len(),
+            retracted: false,
+            disarmed: false,
+            problems: Vec::new(),
+        })
+    }
+}
+
+/// Executes `plan` on `rig` from arming to disarming, and tells `sink` everything that happens.
+///
+/// Returns when the rig is at rest: also after a stop, an abort, a device fault, a fault of the sink, or a panic in
+/// any of them. `header` is the first record.
+pub fn execute(
+    plan: &Plan,
+    header: RunHeader,
+    rig: Rig,
+    control: &ControlHandle,
+    sink: &mut dyn RecordSink,
+) -> RunReport {
+    match Run::new(plan, header, rig, control, sink).arm() {
+        Ok(run) => run.begin().run().report(),
+        Err(report) => report,
+    }
+}

@@ -1,0 +1,39 @@
+//! Constants of the controller that a plan does not set.
+
+use skinrig_model::HostDuration;
+
+/// How often the controller looks, and how long it waits for a device before it calls it silent.
+///
+/// The defaults are our own choices, not a vendor's figures.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ControllerSettings {
+    /// Longest time between two looks at the devices and the operator's requests; 1 to 10 ms.
+    pub tick: HostDuration,
+    /// A newest pose sample older than this is stale: no motion is commanded and the run ends.
+    pub stale_after: HostDuration,
+    /// Longest time from arming the robot to the first sample of its pose stream.
+    pub first_pose_within: HostDuration,
+    /// Speed of motions that are not in the plan (rising from an unknown start, retracting after a
+    /// fault), mm/s; never more than the plan's own limit.
+    pub rise_speed_mm_s: f64,
+    /// What a motion that is not in the plan may take beyond twice its length divided by its speed.
+    pub rise_allowance: HostDuration,
+    /// Longest time for which a trigger box may stay busy.
+    pub mark_within: HostDuration,
+    /// Pose samples per record, at least 1.
+    pub pose_block: usize,
+}
+
+impl Default for ControllerSettings {
+    fn default() -> Self {
+        Self {
+            tick: HostDuration::from_millis(5),
+            stale_after: HostDuration::from_millis(100),
+            first_pose_within: HostDuration::from_millis(2_000),
+            rise_speed_mm_s: 20.0,
+            rise_allowance: HostDuration::from_millis(3_000),
+            mark_within: HostDuration::from_millis(1_000),
+            pose_block: 256,
+        }
+    }
+}

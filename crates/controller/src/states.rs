@@ -1,0 +1,361 @@
+//! The transition table of a run: state and event give the next state and what to do.
+//!
+//! `docs/run-states.md` shows the same table; a test writes it out and compares.
+
+/// Where a run is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum State {
+    /// Nothing has been opened.
+    Planned,
+    /// Devices are configured and read back, cameras stream, the robot holds its position.
+    Armed,
+    /// Steps are executed.
+    Running,
+    /// As running; waits at the next safe point.
+    Pausing,
+    /// Waits at clearance height, everything streaming.
+    Paused,
+    /// As running; ends at the next safe point.
+    Stopping,
+    /// The operator's abort: the robot leaves the skin now.
+    Aborting,
+    /// The orderly end: the robot is at, or returns to, clearance height.
+    Retracting,
+    /// Something failed: the robot leaves the skin if it still answers.
+    Faulted,
+    /// Disarmed; all is told.
+    Finished,
+}
+
+/// What happens to a run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Event {
+    /// All devices are armed.
+    ArmingDone,
+    /// The caller begins the plan.
+    Begin,
+    /// The operator asks to wait.
+    Pause,
+    /// The operator asks to go on.
+    Resume,
+    /// The operator asks to end after the press under way.
+    Stop,
+    /// The operator asks to end now.
+    Abort,
+    /// A device, a limit, the recorder or the code failed.
+    Fault,
+    /// No press is under way and the tip is at clearance height.
+    SafePoint,
+    /// The last step is done.
+    PlanDone,
+    /// The tip is at clearance height, or cannot be brought there.
+    Cleared,
+    /// The motors are off, or the robot was told so and does not answer.
+    Disarmed,
+}
+
+/// What the controller does on a transition.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Action {
+    /// Nothing more.
+    None,
+    /// Execute the next step.
+    GoOn,
+    /// Wait at clearance height.
+    Wait,
+    /// Hold, rise straight to clearance height, hold.
+    Retract,
+    /// Motors off, cameras flushed and stopped.
+    Disarm,
+    /// Write the last records.
+    Close,
+    /// The request has no effect here.
+    Ignore,
+    /// The controller itself went wrong: treat it as [`Event::Fault`].
+    Refuse,
+}
+
+impl State {
+    /// All states.
+    pub const ALL: [Self; 10] = [
+        Self::Planned,
+        Self::Armed,
+        Self::Running,
+        Self::Pausing,
+        Self::Paused,
+        Self::Stopping,
+        Self::Aborting,
+        Self::Retracting,
+        Self::Faulted,
+        Self::Finished,
+    ];
+
+    /// True when the robot's motors may be on.
+    #[must_use]
+    pub const fn may_be_armed(self) -> bool {
+        // While planned, arming may have begun; it counts from its first moment.
+        !matches!(self, Self::Finished)
+    }
+}
+
+impl Event {
+    /// All events.
+    pub const ALL: [Self; 11] = [
+        Self::ArmingDone,
+        Self::Begin,
+        Self::Pause,
+        Self::Resume,
+        Self::Stop,
+        Self::Abort,
+        Self::Fault,
+        Self::SafePoint,
+        Self::PlanDone,
+        Self::Cleared,
+        Self::Disarmed,
+    ];
+}
+
+/// The table. Total: the compiler checks that every pair is there.
+#[must_use]
+pub const fn transition(state: State, event: Event) -> (State, Action) {
+    use Action as A;
+    use Event as E;
+    use State as S;
+    match (state, event) {
+        // The normal course.
+        (S::Planned, E::ArmingDone) => (S::Armed, A::None),
+        (S::Armed, E::Begin) => (S::Running, A::GoOn),
+        (S::Running, E::SafePoint) => (S::Running, A::GoOn),
+        (S::Pausing, E::SafePoint) => (S::Paused, A::Wait),
+        (S::Stopping, E::SafePoint) => (S::Retracting, A::Retract),
+        (S::Running | S::Pausing | S::Stopping, E::PlanDone) => (S::Retracting, A::Retract),
+
+        // The operator.
+        (S::Running, E::Pause) => (S::Pausing, A::None),
+        (S::Pausing, E::Resume) => (S::Running, A::None),
+        (S::Paused, E::Resume) => (S::Running, A::GoOn),
+        (S::Running | S::Pausing, E::Stop) => (S::Stopping, A::None),
+        (S::Planned | S::Armed | S::Paused, E::Stop) => (S::Retracting, A::Retract),
+        (S::Planned | S::Armed | S::Running | S::Pausing | S::Paused | S::Stopping, E::Abort) => {
+            (S::Aborting, A::Retract)
+        }
+
+        // The way out. Only a disarmed robot gets to `Finished`.
+        (S::Retracting | S::Aborting | S::Faulted, E::Cleared) => (state, A::Disarm),
+        (S::Retracting | S::Aborting | S::Faulted, E::Disarmed) => (S::Finished, A::Close),
+        (
+            S::Planned
+            | S::Armed
+            | S::Running
+            | S::Pausing
+            | S::Paused
+            | S::Stopping
+            | S::Aborting
+            | S::Retracting,
+            E::Fault,
+        ) => (S::Faulted, A::Retract),
+        (S::Faulted | S::Finished, E::Fault) => (state, A::Ignore),
+
+        // Requests without effect.
+        (S::Retracting | S::Aborting | S::Faulted | S::Finished, E::Stop | E::Abort) => {
+            (state, A::Ignore)
+        }
+        (S::Stopping, E::Stop) => (state, A::Ignore),
+        (
+            S::Planned
+            | S::Armed
+            | S::Pausing
+            | S::Paused
+            | S::Stopping
+            | S::Aborting
+            | S::Retracting
+            | S::Faulted
+            | S::Finished,
+            E::Pause,
+        ) => (state, A::Ignore),
+        (
+            S::Planned
+            | S::Armed
+            | S::Running
+            | S::Stopping
+            | S::Aborting
+            | S::Retracting
+            | S::Faulted
+            | S::Finished,
+            E::Resume,
+        ) => (state, A::Ignore),
+
+        // The controller's own events where they cannot be.
+        (
+            S::Armed
+            | S::Running
+            | S::Pausing
+            | S::Paused
+            | S::Stopping
+            | S::Aborting
+            | S::Retracting
+            | S::Faulted
+            | S::Finished,
+            E::ArmingDone,
+        )
+        | (
+            S::Planned
+            | S::Running
+            | S::Pausing
+            | S::Paused
+            | S::Stopping
+            | S::Aborting
+            | S::Retracting
+            | S::Faulted
+            | S::Finished,
+            E::Begin,
+        )
+        | (
+            S::Planned
+            | S::Armed
+            | S::Paused
+            | S::Aborting
+            | S::Retracting
+            | S::Faulted
+            | S::Finished,
+            E::SafePoint | E::PlanDone,
+        )
+        | (
+            S::Planned | S::Armed | S::Running | S::Pausing | S::Paused | S::Stopping | S::Finished,
+            E::Cleared | E::Disarmed,
+        ) => (state, A::Refuse),
+    }
+}
+
+/// The table as Markdown, one row per state, one column per event: `next state: action`.
+#[must_use]
+pub fn markdown() -> String {
+    let mut out = String::from("| state |");
+    for event in Event::ALL {
+        out.push_str(&format!(" {event:?} |"));
+    }
+    out.push_str("\n|---|");
+    out.push_str(&"---|".repeat(Event::ALL.len()));
+    out.push('\n');
+    for state in State::ALL {
+        out.push_str(&format!("| **{state:?}** |"));
+        for event in Event::ALL {
+            let cell = match transition(state, event) {
+                (_, Action::Ignore) => " · |".to_owned(),
+                (_, Action::Refuse) => " ✗ |".to_owned(),
+                (next, Action::None) => format!(" {next:?} |"),
+                (next, action) => format!(" {next:?}: {action:?} |"),
+            };
+            out.push_str(&cell);
+        }
+        out.push('\n');
+    }
+    out
+}
+
+/// A run's present state.
+#[derive(Debug)]
+pub(crate) struct Machine(State);
+
+impl Machine {
+    pub(crate) const fn new() -> Self {
+        Self(State::Planned)
+    }
+
+    pub(crate) const fn state(&self) -> State {
+        self.0
+    }
+
+    /// Goes to the next state and says what to do.
+    pub(crate) fn fire(&mut self, event: Event) -> Action {
+        let (next, action) = transition(self.0, event);
+        self.0 = next;
+        action
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::{BTreeMap, BTreeSet};
+
+    use super::*;
+
+    /// Every state that can be reached, with a shortest way to it.
+    fn reachable() -> BTreeMap<State, Vec<Event>> {
+        let mut ways = BTreeMap::from([(State::Planned, vec![])]);
+        let mut todo = vec![State::Planned];
+        while let Some(state) = todo.pop() {
+            for event in Event::ALL {
+                let (next, action) = transition(state, event);
+                if action != Action::Refuse && !ways.contains_key(&next) {
+                    let mut way = ways[&state].clone();
+                    way.push(event);
+                    ways.insert(next, way);
+                    todo.push(next);
+                }
+            }
+        }
+        ways
+    }
+
+    #[test]
+    fn every_state_can_be_reached() {
+        let found: BTreeSet<_> = reachable().into_keys().collect();
+        assert_eq!(found, BTreeSet::from(State::ALL));
+    }
+
+    #[test]
+    fn abort_and_fault_lead_to_disarmed_from_everywhere() {
+        for state in State::ALL {
+            for event in [Event::Abort, Event::Fault] {
+                let mut machine = Machine(state);
+                let action = machine.fire(event);
+                if state == State::Finished {
+                    assert_eq!(machine.state(), State::Finished);
+                    continue;
+                }
+                assert!(matches!(action, Action::Retract | Action::Ignore));
+                assert_eq!(machine.fire(Event::Cleared), Action::Disarm, "{state:?}");
+                assert_eq!(machine.fire(Event::Disarmed), Action::Close, "{state:?}");
+                assert!(!machine.state().may_be_armed());
+            }
+        }
+    }
+
+    #[test]
+    fn only_disarming_finishes_and_nothing_leaves_the_end() {
+        for state in State::ALL {
+            for event in Event::ALL {
+                let (next, action) = transition(state, event);
+                if next == State::Finished && state != State::Finished {
+                    assert_eq!(event, Event::Disarmed, "from {state:?}");
+                }
+                if state == State::Finished {
+                    assert_eq!(next, State::Finished);
+                }
+                if matches!(action, Action::Ignore | Action::Refuse) {
+                    assert_eq!(next, state, "{state:?} {event:?} changes nothing");
+                }
+                // Once on the way out, a run never executes steps again.
+                let out = |s| {
+                    matches!(
+                        s,
+                        State::Aborting | State::Retracting | State::Faulted | State::Finished
+                    )
+                };
+                assert!(!out(state) || out(next), "{state:?} {event:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_documented_table_is_this_one() {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/run-states.md");
+        let text = std::fs::read_to_string(path).unwrap_or_default();
+        let table = markdown();
+        assert!(
+            text.contains(&table),
+            "docs/run-states.md does not hold this table:\n{table}"
+        );
+    }
+}
