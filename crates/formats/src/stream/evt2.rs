@@ -18,6 +18,74 @@ pub const TIME_HIGH_BITS: u32 = 28;
 /// Range of the stream's time, µs.
 pub const RANGE_US: u64 = 1 << 34;
 
+/// CD words that are handled at once.
+const GROUP: usize = 8;
+
+/// True for a CD word of a pixel of the sensor.
+#[inline]
+fn is_cd_within(w: u32, (width, height): (u16, u16)) -> bool {
+    (w >> 29 == 0) & ((w >> 11 & 0x7ff) < u32::from(width)) & ((w & 0x7ff) < u32::from(height))
+}
+
+/// A run of plain words, on its way through the fast loop.
+struct Run {
+    epoch_us: u64,
+    base_us: u64,
+    high: u32,
+    events: usize,
+    on: u64,
+}
+
+impl Run {
+    #[inline]
+    fn event(&self, w: u32) -> CdEvent {
+        CdEvent {
+            t_us: self.base_us + u64::from(w >> 22 & 0x3f),
+            x: (w >> 11 & 0x7ff) as u16,
+            y: (w & 0x7ff) as u16,
+            polarity: Polarity::from_bit(w >> 28 & 1 == 1),
+        }
+    }
+
+    /// Takes CD words of one time base.
+    #[inline]
+    fn group<const KEEP: bool>(&mut self, group: &[u32; GROUP], buffer: &mut [CdEvent; BLOCK]) {
+        if KEEP && let Some(out) = buffer[self.events..].first_chunk_mut::<GROUP>() {
+            for (out, w) in out.iter_mut().zip(group) {
+                *out = self.event(*w);
+            }
+        }
+        self.on += u64::from(group.iter().map(|w| w >> 28).sum::<u32>());
+        self.events += GROUP;
+    }
+
+    /// Takes one word if it is plain.
+    #[inline]
+    fn word<const KEEP: bool>(
+        &mut self,
+        w: u32,
+        limits: (u16, u16),
+        buffer: &mut [CdEvent; BLOCK],
+    ) -> bool {
+        if is_cd_within(w, limits) {
+            if KEEP {
+                buffer[self.events] = self.event(w);
+            }
+            self.events += 1;
+            self.on += u64::from(w >> 28);
+            return true;
+        }
+        let high = w & 0x0fff_ffff;
+        let progress = high.wrapping_sub(self.high) <= TimeBase::<TIME_HIGH_BITS, 6>::HALF;
+        if w >> 28 == 8 && progress {
+            self.high = high;
+            self.base_us = self.epoch_us + (u64::from(high) << 6);
+            return true;
+        }
+        false
+    }
+}
+
 /// State of an EVT2 stream between two words.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Words {
@@ -35,14 +103,15 @@ impl Words {
         sink: &mut impl EventSink,
     ) {
         while !bytes.is_empty() {
+            output.flush(sink);
             if self.base.known() {
                 let used = self.plain_words::<KEEP>(bytes, output);
                 bytes = &bytes[used..];
-                if output.len > 0 {
-                    output.flush(sink);
+                if used == BLOCK * 4 {
+                    continue;
                 }
             }
-            // Either the buffer was full, or the next word is not plain.
+            // The input is at its end, or the next word is not plain.
             let Some((word, rest)) = bytes.split_first_chunk() else {
                 return;
             };
@@ -54,68 +123,79 @@ impl Words {
     /// Decodes a run of at most [`BLOCK`] plain words into the empty buffer and returns the bytes used.
     ///
     /// Plain are CD events on the sensor and ordinary progress of the time base: nearly everything a camera
-    /// sends. Each word is written as an event, and kept by moving the end of the buffer, so that the loop
-    /// has no branch that depends on the mixture of words.
+    /// sends. Eight CD events in a row, the usual case, are checked at once and written without a branch.
     fn plain_words<const KEEP: bool>(&mut self, bytes: &[u8], output: &mut Output) -> usize {
-        let (width, height) = (
-            u32::from(output.geometry.width),
-            u32::from(output.geometry.height),
-        );
-        let epoch_us = self.base.epoch_us();
-        let mut base_us = self.base.base_us();
-        let mut high = self.base.high();
-        let buffer = &mut *output.buffer;
-        let (mut events, mut on, mut words) = (0_usize, 0_u64, 0_usize);
-        let mut first = None;
-        for word in bytes.chunks_exact(4).take(BLOCK) {
-            let w = u32::from_le_bytes([word[0], word[1], word[2], word[3]]);
-            let kind = w >> 28;
-            let (is_cd, is_time) = (kind < 2, kind == 8);
-            let (x, y) = (w >> 11 & 0x7ff, w & 0x7ff);
-            let next = w & 0x0fff_ffff;
-            let progress = next.wrapping_sub(high) <= TimeBase::<TIME_HIGH_BITS, 6>::HALF;
-            let plain = (is_cd & (x < width) & (y < height)) | (is_time & progress);
-            if !plain {
-                break;
+        let bytes = &bytes[..bytes.len().min(BLOCK * 4)];
+        let limits = (output.geometry.width, output.geometry.height);
+        let mut run = Run {
+            epoch_us: self.base.epoch_us(),
+            base_us: self.base.base_us(),
+            high: self.base.high(),
+            events: 0,
+            on: 0,
+        };
+        let (groups, _) = bytes.as_chunks::<{ 4 * GROUP }>();
+        let mut words = 0;
+        'groups: for group in groups {
+            let group: [u32; GROUP] = std::array::from_fn(|k| {
+                u32::from_le_bytes([
+                    group[4 * k],
+                    group[4 * k + 1],
+                    group[4 * k + 2],
+                    group[4 * k + 3],
+                ])
+            });
+            if group
+                .iter()
+                .fold(true, |all, w| all & is_cd_within(*w, limits))
+            {
+                run.group::<KEEP>(&group, &mut output.buffer);
+                words += GROUP;
+                continue;
             }
-            high = if is_time { next } else { high };
-            base_us = if is_time {
-                epoch_us + (u64::from(next) << 6)
-            } else {
-                base_us
-            };
-            let t_us = base_us + u64::from(w >> 22 & 0x3f);
-            if KEEP {
-                buffer[events & (BLOCK - 1)] = CdEvent {
-                    t_us,
-                    x: x as u16,
-                    y: y as u16,
-                    polarity: Polarity::from_bit(kind == 1),
-                };
+            for w in group {
+                if !run.word::<KEEP>(w, limits, &mut output.buffer) {
+                    break 'groups;
+                }
+                words += 1;
             }
-            if words == 0 {
-                first = Some(if is_time { base_us } else { t_us });
+        }
+        if words == groups.len() * GROUP {
+            let (rest, _) = bytes[words * 4..].as_chunks();
+            for word in rest {
+                if !run.word::<KEEP>(u32::from_le_bytes(*word), limits, &mut output.buffer) {
+                    break;
+                }
+                words += 1;
             }
-            words += 1;
-            events += usize::from(is_cd);
-            on += u64::from(kind == 1);
         }
-        self.base.advance(high);
-        if KEEP {
-            output.len = events;
-        }
-        output.stats.cd_on += on;
-        output.stats.cd_off += events as u64 - on;
-        output.stats.time_high += (words - events) as u64;
-        if let Some(first_us) = first {
-            self.other = None;
-            output.timed(first_us);
-            let last = &bytes[words * 4 - 4..words * 4];
-            let w = u32::from_le_bytes([last[0], last[1], last[2], last[3]]);
-            let low = if w >> 28 == 8 { 0 } else { w >> 22 & 0x3f };
-            output.timed(base_us + u64::from(low));
-        }
+        self.finish_run::<KEEP>(&bytes[..words * 4], &run, output);
         words * 4
+    }
+
+    /// Books a run that used `bytes`.
+    fn finish_run<const KEEP: bool>(&mut self, bytes: &[u8], run: &Run, output: &mut Output) {
+        let (words, _) = bytes.as_chunks();
+        let (Some(first), Some(last)) = (words.first(), words.last()) else {
+            return;
+        };
+        let time_of = |word: &[u8; 4], base_us| {
+            let w = u32::from_le_bytes(*word);
+            match w >> 28 {
+                8 => run.epoch_us + (u64::from(w & 0x0fff_ffff) << 6),
+                _ => base_us + u64::from(w >> 22 & 0x3f),
+            }
+        };
+        output.timed(time_of(first, self.base.base_us()));
+        output.timed(time_of(last, run.base_us));
+        self.base.advance(run.high);
+        self.other = None;
+        if KEEP {
+            output.len = run.events;
+        }
+        output.stats.cd_on += run.on;
+        output.stats.cd_off += run.events as u64 - run.on;
+        output.stats.time_high += (words.len() - run.events) as u64;
     }
 
     /// Decodes one word of any kind.

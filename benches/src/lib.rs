@@ -1,0 +1,130 @@
+//! A small harness: times pieces of work that belong together and prints them as one table.
+//!
+//! A number alone says more about the machine than about the code. So every table holds, from the same run,
+//! the baseline that the code is compared with, and each row says how it was measured. The rounds of all rows
+//! are interleaved, so that a slow moment of the machine hits all of them; the best round counts.
+
+use std::fmt::Write as _;
+use std::time::Instant;
+
+/// One thing to measure.
+struct Row<'a> {
+    what: String,
+    work: Box<dyn FnMut() + 'a>,
+    units: f64,
+    is_baseline: bool,
+    best_s: f64,
+}
+
+/// A table of things that do the same work in different ways.
+pub struct Table<'a> {
+    title: String,
+    unit: &'static str,
+    method: String,
+    rows: Vec<Row<'a>>,
+}
+
+impl<'a> Table<'a> {
+    /// An empty table. `unit` names what is counted per second ("Mev"), `method` says how.
+    #[must_use]
+    pub fn new(title: &str, unit: &'static str, method: &str) -> Self {
+        Self {
+            title: title.into(),
+            unit,
+            method: method.into(),
+            rows: Vec::new(),
+        }
+    }
+
+    /// Adds a row whose `work` handles `units` (in the table's unit) in one call.
+    pub fn row(&mut self, what: &str, units: f64, work: impl FnMut() + 'a) -> &mut Self {
+        self.push(what, units, false, work)
+    }
+
+    /// Adds the row that the ratios refer to.
+    pub fn baseline(&mut self, what: &str, units: f64, work: impl FnMut() + 'a) -> &mut Self {
+        self.push(what, units, true, work)
+    }
+
+    fn push(
+        &mut self,
+        what: &str,
+        units: f64,
+        is_baseline: bool,
+        work: impl FnMut() + 'a,
+    ) -> &mut Self {
+        self.rows.push(Row {
+            what: what.into(),
+            work: Box::new(work),
+            units,
+            is_baseline,
+            best_s: f64::INFINITY,
+        });
+        self
+    }
+
+    /// Runs every row once to warm up and then `rounds` times, and returns the table as text.
+    #[must_use]
+    pub fn run(mut self, rounds: u32) -> String {
+        for round in 0..=rounds {
+            for row in &mut self.rows {
+                let start = Instant::now();
+                (row.work)();
+                let taken_s = start.elapsed().as_secs_f64();
+                if round > 0 {
+                    row.best_s = row.best_s.min(taken_s);
+                }
+            }
+        }
+        let rate = |row: &Row<'_>| row.units / row.best_s;
+        let baseline = self.rows.iter().find(|r| r.is_baseline).map(rate);
+        let width = self.rows.iter().map(|r| r.what.chars().count()).max();
+        let width = width.unwrap_or(0).max(4);
+        let mut text = format!("\n{}\n", self.title);
+        for row in &self.rows {
+            let ratio = match baseline {
+                Some(_) if row.is_baseline => "baseline".into(),
+                Some(base) => format!("{:.2} x", rate(row) / base),
+                None => String::new(),
+            };
+            let _ = writeln!(
+                text,
+                "  {:width$}  {:>10.1} {}/s  {:>9.4} s  {ratio}",
+                row.what,
+                rate(row),
+                self.unit,
+                row.best_s,
+            );
+        }
+        let _ = writeln!(text, "  method: {}; best of {rounds}", self.method);
+        text
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_table_names_every_row_and_its_ratio() {
+        let mut calls = 0;
+        let mut table = Table::new("sums", "Mop", "adds numbers");
+        table.baseline("slow", 1.0, || calls += 1);
+        table.row("fast", 2.0, || {
+            std::hint::black_box(1 + 1);
+        });
+        let text = table.run(3);
+        assert_eq!(calls, 4, "one warm-up and three rounds");
+        for part in [
+            "sums",
+            "slow",
+            "baseline",
+            "fast",
+            " x",
+            "Mop/s",
+            "adds numbers; best of 3",
+        ] {
+            assert!(text.contains(part), "{part} in {text}");
+        }
+    }
+}
