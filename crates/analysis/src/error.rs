@@ -67,4 +67,14 @@ pub enum AnalysisError {
         /// Camera time, µs.
         t_us: u64,
     },
+    /// More events in one window than a counter holds.
+    #[error(
+        "expected at most 4294967295 events in the window of press {row}, found more ({camera})"
+    )]
+    TooManyEvents {
+        /// Which camera.
+        camera: CameraId,
+        /// Row of the press in the plan.
+        row: usize,
+    },
 }

@@ -2,28 +2,33 @@
 //!
 //! Numbers in, numbers out: no files, no SQL, no devices, no clock, no randomness but the seed in the
 //! settings. The same input gives the same result to the last bit on the same machine.
+//!
+//! Data flows one way: [`clock`] finds where host time lies on each camera's clock, [`segment`] turns measured
+//! press times into windows of camera time, one pass over the events fills a [`grid`] per window and [`dbscan`]
+//! finds its clusters, [`triangulate`] intersects the rays of the two centroids, [`calibrate`] fits the
+//! camera geometry to the presses that calibrate ([`sets`]), [`metrics`] judges those that score.
 
+mod accumulate;
+mod analyze;
+pub mod calibrate;
+mod check;
+pub mod clock;
+pub mod dbscan;
 mod error;
+pub mod grid;
+mod hash;
 pub mod input;
+pub mod metrics;
+pub mod rates;
 pub mod result;
+mod seeded;
+pub mod segment;
+pub mod sets;
+pub mod triangulate;
+mod verdict;
 
+pub use analyze::analyze;
 pub use error::AnalysisError;
+pub use hash::results_hash;
 pub use input::{EventSource, SessionInput};
 pub use result::{ANALYSIS_VERSION, Analysis};
-
-/// Analyses a session.
-///
-/// # Errors
-/// See [`AnalysisError`].
-pub fn analyze(input: &SessionInput, _source: &dyn EventSource) -> Result<Analysis, AnalysisError> {
-    Err(AnalysisError::JournalLength {
-        planned: input.planned.len(),
-        outcomes: input.outcomes.len(),
-    })
-}
-
-/// Lower-case hex SHA-256 over the results.
-#[must_use]
-pub fn results_hash(_analysis: &Analysis) -> String {
-    String::new()
-}

@@ -1,0 +1,335 @@
+//! One pass over a camera's events: rates, the pixel counts of each press, and a few close-ups.
+//!
+//! Memory holds one pixel grid per window that is open at a time. Events may be out of order by up to
+//! [`SLACK_US`]; later ones are counted as late and reported, never silently dropped.
+
+use skinrig_model::{
+    AnalysisSettings, CameraId, CdEvent, CentroidRule, Polarity, PressId, SENSOR_HEIGHT,
+    SENSOR_WIDTH,
+};
+
+use crate::dbscan::{Cluster, Dbscan};
+use crate::error::AnalysisError;
+use crate::grid::PixelGrid;
+use crate::rates::RateHistogram;
+use crate::result::{PicturePixel, PressPicture, PressView, RateZoom};
+use crate::segment::Window;
+
+/// How far an event may lie before the newest one seen and still find its window open, µs.
+pub const SLACK_US: u64 = 10_000;
+
+/// A close-up of the rate around one press.
+#[derive(Debug, Clone)]
+pub struct ZoomPlan {
+    pub press: PressId,
+    pub start_us: u64,
+    pub bins: usize,
+    /// Time of the first bin after the contact, s, and the release after the contact, s.
+    pub start_s: f64,
+    pub release_s: f64,
+}
+
+/// What one camera gives.
+pub struct Accumulator<'a> {
+    camera: CameraId,
+    settings: &'a AnalysisSettings,
+    crop: (u16, u16),
+    rates: Option<RateHistogram>,
+    windows: &'a [Window],
+    /// Rows of the plan whose picture is wanted, with the press.
+    pictured: &'a [(usize, PressId)],
+    next: usize,
+    open: Vec<Open>,
+    spare: Vec<Open>,
+    /// Nothing happens before this camera time: no window opens or closes.
+    quiet_until_us: u64,
+    newest_us: u64,
+    late: u64,
+    dbscan: Dbscan,
+    zooms: Vec<(ZoomPlan, Vec<u32>, Vec<u32>)>,
+    zoom_next: usize,
+    bin_us: u64,
+    views: Vec<(usize, PressView)>,
+    pictures: Vec<PressPicture>,
+    error: Option<AnalysisError>,
+}
+
+/// A window that is collecting events.
+struct Open {
+    window: Window,
+    grid: PixelGrid,
+    on_events: u32,
+    idle_events: u64,
+    /// ON events per pixel, only for a pictured press.
+    on: Option<PixelGrid>,
+}
+
+/// What [`Accumulator::finish`] gives.
+pub struct Accumulated {
+    pub rates: Option<RateHistogram>,
+    /// (row of the plan, view).
+    pub views: Vec<(usize, PressView)>,
+    pub pictures: Vec<PressPicture>,
+    pub zooms: Vec<RateZoom>,
+    /// Events that came more than [`SLACK_US`] after newer ones.
+    pub late: u64,
+}
+
+impl<'a> Accumulator<'a> {
+    /// Collects over `windows` (sorted by start); `rates` when this pass is to fill the histogram.
+    pub fn new(
+        camera: CameraId,
+        settings: &'a AnalysisSettings,
+        windows: &'a [Window],
+        pictured: &'a [(usize, PressId)],
+        zooms: Vec<ZoomPlan>,
+        rates: Option<RateHistogram>,
+    ) -> Self {
+        let zooms = zooms
+            .into_iter()
+            .map(|plan| {
+                let bins = plan.bins;
+                (plan, vec![0; bins], vec![0; bins])
+            })
+            .collect();
+        Self {
+            camera,
+            settings,
+            crop: settings.crop_v[camera.index()],
+            rates,
+            windows,
+            pictured,
+            next: 0,
+            open: Vec::new(),
+            spare: Vec::new(),
+            quiet_until_us: 0,
+            newest_us: 0,
+            late: 0,
+            dbscan: Dbscan::new(settings.eps_px, settings.min_samples),
+            zooms,
+            zoom_next: 0,
+            bin_us: rate_bin_us(settings),
+            views: Vec::new(),
+            pictures: Vec::new(),
+            error: None,
+        }
+    }
+
+    /// Takes the next events of the stream.
+    pub fn take(&mut self, events: &[CdEvent]) {
+        if self.error.is_some() {
+            return;
+        }
+        for event in events {
+            if event.x >= SENSOR_WIDTH || event.y >= SENSOR_HEIGHT {
+                self.error = Some(AnalysisError::OffSensor {
+                    camera: self.camera,
+                    x: event.x,
+                    y: event.y,
+                    t_us: event.t_us,
+                });
+                return;
+            }
+            self.newest_us = self.newest_us.max(event.t_us);
+            if event.t_us + SLACK_US < self.newest_us {
+                self.late += 1;
+            }
+            if event.y < self.crop.0 || event.y > self.crop.1 {
+                continue;
+            }
+            if let Some(rates) = &mut self.rates {
+                rates.add(event.t_us);
+            }
+            if self.newest_us >= self.quiet_until_us {
+                self.move_on();
+            }
+            self.count(event);
+        }
+    }
+
+    fn count(&mut self, event: &CdEvent) {
+        let on = event.polarity == Polarity::On;
+        for open in &mut self.open {
+            let w = &open.window;
+            if event.t_us >= w.start_us && event.t_us < w.end_us {
+                if !open.grid.add(event.x, event.y) {
+                    self.error = Some(AnalysisError::TooManyEvents {
+                        camera: self.camera,
+                        row: w.row,
+                    });
+                    return;
+                }
+                if on {
+                    open.on_events += 1;
+                    if let Some(grid) = &mut open.on {
+                        grid.add(event.x, event.y);
+                    }
+                }
+            } else if event.t_us >= w.idle_start_us && event.t_us < w.start_us {
+                open.idle_events += 1;
+            }
+        }
+        for (plan, ons, offs) in &mut self.zooms[self.zoom_next..] {
+            if event.t_us < plan.start_us {
+                break;
+            }
+            let bin = ((event.t_us - plan.start_us) / self.bin_us) as usize;
+            if let Some(count) = if on { ons } else { offs }.get_mut(bin) {
+                *count += 1;
+            }
+        }
+    }
+
+    /// Opens the windows that begin and closes those that are over, by the newest time seen.
+    fn move_on(&mut self) {
+        let now = self.newest_us;
+        let mut i = 0;
+        while i < self.open.len() {
+            if self.open[i].window.end_us + SLACK_US <= now {
+                let done = self.open.remove(i);
+                self.close(done);
+            } else {
+                i += 1;
+            }
+        }
+        while let Some(&window) = self.windows.get(self.next) {
+            if window.idle_start_us > now + SLACK_US {
+                break;
+            }
+            self.next += 1;
+            self.open_window(window);
+        }
+        while let Some((plan, ..)) = self.zooms.get(self.zoom_next) {
+            if plan.start_us + plan.bins as u64 * self.bin_us + SLACK_US > now {
+                break;
+            }
+            self.zoom_next += 1;
+        }
+        let closes = self.open.iter().map(|o| o.window.end_us + SLACK_US);
+        let opens = self
+            .windows
+            .get(self.next)
+            .map(|w| w.idle_start_us.saturating_sub(SLACK_US));
+        self.quiet_until_us = closes.chain(opens).min().unwrap_or(u64::MAX);
+    }
+
+    fn open_window(&mut self, window: Window) {
+        let mut fresh = self.spare.pop().unwrap_or_else(|| Open {
+            window,
+            grid: PixelGrid::new(self.crop),
+            on_events: 0,
+            idle_events: 0,
+            on: None,
+        });
+        fresh.window = window;
+        if self.pictured.iter().any(|(row, _)| *row == window.row) {
+            fresh.on = Some(PixelGrid::new(self.crop));
+        }
+        self.open.push(fresh);
+    }
+
+    fn close(&mut self, mut done: Open) {
+        self.dbscan.run(&done.grid);
+        let chosen = match self.settings.centroid {
+            CentroidRule::LargestCluster => self.dbscan.largest().map(|(_, c)| c),
+            CentroidRule::AllClusters => self
+                .dbscan
+                .clusters()
+                .iter()
+                .copied()
+                .reduce(Cluster::merged),
+        };
+        let centroid = chosen.and_then(|c| c.centroid());
+        let per_s = |n: f64, s: f64| if s > 0.0 { n / s } else { 0.0 };
+        let window = done.window;
+        let events = done.grid.events();
+        self.views.push((
+            window.row,
+            PressView {
+                events,
+                on_events: done.on_events,
+                clusters: self.dbscan.clusters().len() as u32,
+                // The grid holds at most u32::MAX events.
+                cluster_events: chosen.map_or(0, |c| c.events) as u32,
+                centroid_u: centroid.map(|(u, _)| u),
+                centroid_v: centroid.map(|(_, v)| v),
+                rate_per_s: per_s(f64::from(events), window.length_s()),
+                idle_rate_per_s: per_s(done.idle_events as f64, window.idle_s()),
+                idle_s: window.idle_s(),
+            },
+        ));
+        if let Some(on) = done.on.take()
+            && let Some((_, press)) = self.pictured.iter().find(|(row, _)| *row == window.row)
+        {
+            self.pictures.push(self.picture(*press, &done.grid, &on));
+        }
+        done.grid.clear();
+        done.on_events = 0;
+        done.idle_events = 0;
+        self.spare.push(done);
+    }
+
+    fn picture(&self, press: PressId, grid: &PixelGrid, on: &PixelGrid) -> PressPicture {
+        let largest = self.dbscan.largest().map(|(label, _)| label);
+        let makes_centroid = |label: u32| match self.settings.centroid {
+            CentroidRule::LargestCluster => Some(label) == largest,
+            CentroidRule::AllClusters => label != crate::dbscan::NOISE,
+        };
+        let pixels = self.dbscan.labels().map(|(index, label)| PicturePixel {
+            u: (index % PixelGrid::WIDTH as u32) as u16,
+            v: (index / PixelGrid::WIDTH as u32) as u16 + grid.rows().0,
+            on: on.count(index),
+            off: grid.count(index) - on.count(index),
+            clustered: makes_centroid(label),
+        });
+        PressPicture {
+            press,
+            camera: self.camera,
+            rows: grid.rows(),
+            pixels: pixels.collect(),
+        }
+    }
+
+    /// Ends the pass: what is open is closed, and windows that no event reached are empty.
+    pub fn finish(mut self) -> Result<Accumulated, AnalysisError> {
+        while !self.open.is_empty() {
+            let done = self.open.remove(0);
+            self.close(done);
+        }
+        for i in self.next..self.windows.len() {
+            self.open_window(self.windows[i]);
+            if let Some(done) = self.open.pop() {
+                self.close(done);
+            }
+        }
+        if let Some(error) = self.error {
+            return Err(error);
+        }
+        let bin_s = self.bin_us as f64 * 1e-6;
+        let per_s = |counts: &[u32]| {
+            let rate = |c: &u32| (f64::from(*c) / bin_s) as f32;
+            counts.iter().map(rate).collect::<Vec<f32>>()
+        };
+        let zooms = self.zooms.iter().map(|(plan, ons, offs)| RateZoom {
+            press: plan.press,
+            camera: self.camera,
+            start_s: plan.start_s,
+            bin_s,
+            on_per_s: per_s(ons),
+            off_per_s: per_s(offs),
+            release_s: plan.release_s,
+        });
+        Ok(Accumulated {
+            zooms: zooms.collect(),
+            rates: self.rates,
+            views: self.views,
+            pictures: self.pictures,
+            late: self.late,
+        })
+    }
+}
+
+/// Width of a rate bin in whole µs, at least 1.
+pub fn rate_bin_us(settings: &AnalysisSettings) -> u64 {
+    (settings.rate_bin_ms * 1e3).round().max(1.0) as u64
+}

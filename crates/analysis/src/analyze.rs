@@ -1,0 +1,407 @@
+//! The analysis as a whole: from a session's values and events to one [`Analysis`].
+
+use skinrig_model::{
+    CalibrationModel, CameraId, PressId, PressRole, PressTiming, PressVerdict, StereoGeometry,
+};
+
+use crate::accumulate::{Accumulated, Accumulator, SLACK_US, ZoomPlan, rate_bin_us};
+use crate::calibrate::{affordable_model, calibrate};
+use crate::clock::{PressSpan, SUSPICIOUS_DRIFT_PPM, fit_marks, fit_rates};
+use crate::error::AnalysisError;
+use crate::input::{EventSource, SessionInput};
+use crate::metrics::{Exclusions, metrics};
+use crate::rates::RateHistogram;
+use crate::result::{
+    ANALYSIS_VERSION, Analysis, CalibrationResult, ClockFit, LocationOutcome, PressPicture,
+    PressResult, PressView, RateSeries, RateZoom,
+};
+use crate::segment::{Window, windows};
+use crate::sets::{CalibrationSet, ScoreSet};
+use crate::triangulate::locate;
+use crate::{check, verdict};
+
+/// Scored presses with a picture.
+const PICTURES: usize = 6;
+/// Scored presses with a rate close-up.
+const ZOOMS: usize = 3;
+/// A close-up begins this long before the contact and ends this long after the release, s.
+const ZOOM_SIDE_S: f64 = 0.3;
+/// Most bins of a close-up.
+const MAX_ZOOM_BINS: usize = 2000;
+
+/// Analyses a session: one pass over each camera's events when its clock can be fitted from trigger marks, two
+/// when it has to be aligned by event rates; both cameras at the same time.
+///
+/// The same input gives the same result to the last bit on the same machine. Memory does not grow with the
+/// number of events: it holds the rate histogram (4 bytes per `rate_bin_ms`), the table of presses, and one
+/// pixel grid per open window.
+///
+/// # Errors
+/// When the input contradicts itself, a setting is out of its range or the events cannot be read. Whatever
+/// keeps single presses or a camera from being used becomes verdicts and warnings instead.
+pub fn analyze(input: &SessionInput, source: &dyn EventSource) -> Result<Analysis, AnalysisError> {
+    check::input(input)?;
+    let plan = Closeups::choose(input);
+    let [one, two] = std::thread::scope(|scope| {
+        let second = scope.spawn(|| camera_pass(input, source, CameraId::Two, &plan));
+        let first = camera_pass(input, source, CameraId::One, &plan);
+        let second = match second.join() {
+            Ok(result) => result,
+            Err(panic) => std::panic::resume_unwind(panic),
+        };
+        [first, second]
+    });
+    let cameras = [one?, two?];
+    let mut warnings: Vec<String> = Vec::new();
+    let mut presses = rows(input, &cameras);
+    let (geometry, calibration) = calibrated(input, &presses, &mut warnings);
+    for row in &mut presses {
+        let column = |k: usize| row.views[k].and_then(|v| v.centroid_u);
+        row.location_outcome = locate(&geometry, &input.rig.outline, [column(0), column(1)]);
+        let judged = row.role != PressRole::Sync && row.verdict == PressVerdict::Valid.name();
+        if judged && let Some(rule) = verdict::location_rule(&row.location_outcome, &input.settings)
+        {
+            verdict::put(row, &PressVerdict::Excluded(rule));
+        }
+    }
+    let scores = ScoreSet::from_presses(&presses);
+    let measure = |exclusions| {
+        metrics(
+            &scores,
+            exclusions,
+            &input.rig.outline,
+            input.settings.bootstrap_resamples,
+            input.settings.seed,
+        )
+    };
+    let (scored, scored_without_exclusions) =
+        (measure(Exclusions::Applied), measure(Exclusions::Ignored));
+    if scores.presses().is_empty() {
+        warnings.push("no scored press was attempted: there are no metrics".to_owned());
+    }
+    let scheduled = input.outcomes.iter().flatten().any(|o| o.scheduled);
+    if scheduled {
+        warnings.push(
+            "press times and positions come from a schedule, not from a measurement".to_owned(),
+        );
+    }
+    let [one, two] = cameras;
+    let counts = verdict::count(&presses);
+    Ok(Analysis {
+        version: ANALYSIS_VERSION,
+        settings: input.settings.clone(),
+        rig: input.rig,
+        geometry,
+        counts,
+        clocks: [one.clock, two.clock],
+        calibration,
+        scored,
+        scored_without_exclusions,
+        rates: [one.rates, two.rates],
+        presses,
+        warnings: [one.warnings, two.warnings, warnings].concat(),
+        pictures: [one.pictures, two.pictures].concat(),
+        zooms: [one.zooms, two.zooms].concat(),
+    })
+}
+
+/// What came from one camera.
+struct CameraResult {
+    clock: Option<ClockFit>,
+    rates: RateSeries,
+    /// Per row of the plan.
+    views: Vec<Option<PressView>>,
+    data_lost: Vec<bool>,
+    pictures: Vec<PressPicture>,
+    zooms: Vec<RateZoom>,
+    warnings: Vec<String>,
+}
+
+/// Which presses get pictures and close-ups of the rate.
+struct Closeups {
+    pictures: Vec<(usize, PressId)>,
+    zooms: Vec<(usize, PressId)>,
+}
+
+impl Closeups {
+    /// Evenly spaced over the scored presses that were done; over all presses when none scores.
+    fn choose(input: &SessionInput) -> Self {
+        let done = |scored: bool| -> Vec<(usize, PressId)> {
+            let rows = input.planned.iter().zip(&input.outcomes).enumerate();
+            rows.filter(|(_, (p, _))| !scored || p.role == PressRole::Score)
+                .filter(|(_, (_, o))| o.as_ref().is_some_and(|o| o.timing.is_some()))
+                .map(|(row, (p, _))| (row, p.id))
+                .collect()
+        };
+        let mut candidates = done(true);
+        if candidates.is_empty() {
+            candidates = done(false);
+        }
+        let spaced = |most: usize| {
+            let n = candidates.len();
+            let count = most.min(n);
+            // The middles of `count` equal parts.
+            (0..count)
+                .map(|i| candidates[(2 * i + 1) * n / (2 * count)])
+                .collect()
+        };
+        Self {
+            pictures: spaced(PICTURES),
+            zooms: spaced(ZOOMS),
+        }
+    }
+}
+
+fn timings(input: &SessionInput) -> impl Iterator<Item = (usize, PressTiming)> {
+    let rows = input.outcomes.iter().enumerate();
+    rows.filter_map(|(row, o)| Some((row, o.as_ref()?.timing?)))
+}
+
+fn camera_pass(
+    input: &SessionInput,
+    source: &dyn EventSource,
+    camera: CameraId,
+    plan: &Closeups,
+) -> Result<CameraResult, AnalysisError> {
+    let settings = &input.settings;
+    let k = camera.index();
+    let mut warnings: Vec<String> = Vec::new();
+    let mut rates = Some(RateHistogram::new(rate_bin_us(settings)));
+    let marks = input
+        .rig
+        .trigger_channel
+        .and_then(|channel| fit_marks(&input.edges[k], channel, &input.marks));
+    let clock = if let Some(found) = marks {
+        warnings.extend(found.warnings);
+        Some(found.fit)
+    } else {
+        if !input.marks.is_empty() {
+            warnings.push(format!(
+                "of {} trigger marks sent too few were seen ({} edges): the clock is aligned by event rates",
+                input.marks.len(),
+                input.edges[k].len()
+            ));
+        }
+        let empty = Accumulator::new(camera, settings, &[], &[], Vec::new(), rates.take());
+        let first = pass(source, camera, empty)?;
+        rates = first.rates;
+        let found = rates
+            .as_ref()
+            .map_or_else(|| Err(String::new()), |r| fit_rates(r, &spans(input)));
+        match found {
+            Ok(found) => {
+                warnings.extend(found.warnings);
+                Some(found.fit)
+            }
+            Err(why) => {
+                warnings.push(format!("no clock alignment: {why}"));
+                None
+            }
+        }
+    };
+    if let Some(fit) = clock.filter(|c| c.drift_ppm.abs() > SUSPICIOUS_DRIFT_PPM) {
+        warnings.push(format!(
+            "the camera clock drifts by {:.0} ppm against the host clock (expected tens); one of them is broken or the alignment is wrong",
+            fit.drift_ppm
+        ));
+    }
+    let list = clock.map_or_else(Vec::new, |c| windows(timings(input), &c, settings));
+    let collected = match (clock, rates) {
+        // Without a clock the events have been seen once already and there is nothing else to find.
+        (None, rates) => Accumulated {
+            rates,
+            views: Vec::new(),
+            pictures: Vec::new(),
+            zooms: Vec::new(),
+            late: 0,
+        },
+        (Some(clock), rates) => {
+            let aligned_by_rates = clock.method == crate::result::ClockMethod::EventRates;
+            let (fresh, known) = if aligned_by_rates {
+                (None, rates)
+            } else {
+                (rates, None)
+            };
+            let zooms = zoom_plans(input, plan, &clock);
+            let accumulator =
+                Accumulator::new(camera, settings, &list, &plan.pictures, zooms, fresh);
+            let mut done = pass(source, camera, accumulator)?;
+            done.rates = done.rates.or(known);
+            done
+        }
+    };
+    if list.windows(2).any(|w| w[1].start_us < w[0].end_us) {
+        warnings
+            .push("press windows overlap: events in the overlap count in both presses".to_owned());
+    }
+    if collected.late > 0 {
+        warnings.push(format!(
+            "{} events are more than {} ms out of order; presses may miss them",
+            collected.late,
+            SLACK_US / 1000
+        ));
+    }
+    if let Some(beyond) = collected
+        .rates
+        .as_ref()
+        .map(RateHistogram::beyond)
+        .filter(|b| *b > 0)
+    {
+        warnings.push(format!(
+            "{beyond} events lie days away from the others and are not in the event rates"
+        ));
+    }
+    let series = collected
+        .rates
+        .map(|r| r.series(clock.as_ref()))
+        .unwrap_or_default();
+    Ok(CameraResult {
+        clock,
+        rates: series,
+        views: by_row(input.planned.len(), collected.views),
+        data_lost: lost_rows(input.planned.len(), &list, &input.gaps[k]),
+        pictures: collected.pictures,
+        zooms: collected.zooms,
+        warnings: warnings
+            .into_iter()
+            .map(|w| format!("{camera}: {w}"))
+            .collect(),
+    })
+}
+
+fn pass(
+    source: &dyn EventSource,
+    camera: CameraId,
+    mut accumulator: Accumulator<'_>,
+) -> Result<Accumulated, AnalysisError> {
+    source
+        .for_each_slice(camera, &mut |events| accumulator.take(events))
+        .map_err(|message| AnalysisError::Events { camera, message })?;
+    accumulator.finish()
+}
+
+fn spans(input: &SessionInput) -> Vec<PressSpan> {
+    let mut spans: Vec<PressSpan> = timings(input)
+        .map(|(_, t)| PressSpan {
+            contact_us: t.contact.0 as f64 * 1e-3,
+            release_us: t.release.0 as f64 * 1e-3,
+        })
+        .collect();
+    spans.sort_by(|a, b| a.contact_us.total_cmp(&b.contact_us));
+    spans
+}
+
+fn zoom_plans(input: &SessionInput, plan: &Closeups, clock: &ClockFit) -> Vec<ZoomPlan> {
+    let bin_us = rate_bin_us(&input.settings);
+    let mut plans: Vec<ZoomPlan> = plan
+        .zooms
+        .iter()
+        .filter_map(|&(row, press)| {
+            let timing = input.outcomes[row].as_ref()?.timing?;
+            let contact = clock.camera_us_of_host(timing.contact);
+            let release = clock.camera_us_of_host(timing.release);
+            let start_us = (contact - ZOOM_SIDE_S * 1e6).ceil().max(0.0) as u64;
+            let length_us = (release + ZOOM_SIDE_S * 1e6 - start_us as f64).max(0.0);
+            Some(ZoomPlan {
+                press,
+                start_us,
+                bins: ((length_us / bin_us as f64).ceil() as usize).min(MAX_ZOOM_BINS),
+                start_s: (start_us as f64 - contact) * 1e-6,
+                release_s: (release - contact) * 1e-6,
+            })
+        })
+        .collect();
+    plans.sort_by_key(|p| p.start_us);
+    plans
+}
+
+fn by_row(rows: usize, views: Vec<(usize, PressView)>) -> Vec<Option<PressView>> {
+    let mut out = vec![None; rows];
+    for (row, view) in views {
+        out[row] = Some(view);
+    }
+    out
+}
+
+fn lost_rows(rows: usize, windows: &[Window], gaps: &[(u64, u64)]) -> Vec<bool> {
+    let mut out = vec![false; rows];
+    for window in windows.iter().filter(|w| w.overlaps(gaps)) {
+        out[window.row] = true;
+    }
+    out
+}
+
+fn rows(input: &SessionInput, cameras: &[CameraResult; 2]) -> Vec<PressResult> {
+    let has_clock = [0, 1].map(|k| cameras[k].clock.is_some());
+    let pairs = input.planned.iter().zip(&input.outcomes).enumerate();
+    pairs
+        .map(|(i, (planned, outcome))| {
+            let views = [0, 1].map(|k| cameras[k].views[i]);
+            let data_lost = [0, 1].map(|k| cameras[k].data_lost[i]);
+            let verdict = verdict::from_data(
+                planned.role,
+                outcome.as_ref(),
+                has_clock,
+                data_lost,
+                &views,
+                &input.settings,
+            );
+            let mut row = PressResult {
+                press: planned.id,
+                role: planned.role,
+                repetition: planned.repetition,
+                location: planned.location,
+                planned: planned.at,
+                depth_mm: planned.depth_mm,
+                truth: outcome.as_ref().and_then(|o| o.measured_at),
+                verdict: String::new(),
+                reason: None,
+                timing: outcome.as_ref().and_then(|o| o.timing),
+                views,
+                location_outcome: LocationOutcome::Missing,
+            };
+            verdict::put(&mut row, &verdict);
+            row
+        })
+        .collect()
+}
+
+/// The geometry that locates the presses, and how it was found.
+fn calibrated(
+    input: &SessionInput,
+    presses: &[PressResult],
+    warnings: &mut Vec<String>,
+) -> (StereoGeometry, Option<CalibrationResult>) {
+    let nominal = input.rig.nominal;
+    let wanted = input.settings.calibration;
+    if wanted == CalibrationModel::None {
+        return (nominal, None);
+    }
+    let set = CalibrationSet::from_presses(presses);
+    if set.sights().is_empty() {
+        warnings
+            .push("no usable calibrating press: the nominal camera geometry is used".to_owned());
+        return (nominal, None);
+    }
+    let model = affordable_model(&set, wanted);
+    if model != wanted {
+        warnings.push(format!(
+            "the calibrating presses touch too few places for the calibration `{wanted:?}`: `{model:?}` is used"
+        ));
+    }
+    let Some((geometry, result)) = calibrate(&set, &nominal, model, input.settings.seed) else {
+        if model != CalibrationModel::None {
+            warnings.push(
+                "the calibration found no plausible geometry: the nominal one is used".to_owned(),
+            );
+        }
+        return (nominal, None);
+    };
+    if result.rmse_after_mm > result.rmse_before_mm {
+        warnings.push(format!(
+            "the calibration does not lower the error of its own presses ({:.2} mm before, {:.2} mm after): outliers among them?",
+            result.rmse_before_mm, result.rmse_after_mm
+        ));
+    }
+    (geometry, Some(result))
+}

@@ -1,0 +1,133 @@
+//! The clock fit from coded trigger marks: what was sent, matched by name with what the camera saw.
+
+use std::collections::BTreeMap;
+
+use skinrig_model::pulse::decode_marks;
+use skinrig_model::{Mark, SentMark, TriggerEdge};
+
+use super::line::{self, Pair};
+use crate::result::{ClockFit, ClockMethod};
+
+/// Residuals are never judged finer than this, µs: the camera's clock ticks in µs.
+const FLOOR_US: f64 = 1.0;
+/// A repeated mark is matched with the one seen within this of its predicted time, µs.
+const NEAR_US: f64 = 50_000.0;
+/// Residuals above this are suspicious, µs: three orders above the trigger input's resolution.
+const SUSPICIOUS_RMS_US: f64 = 100.0;
+
+/// A clock fit from marks and what to say about it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MarksFit {
+    /// The fit.
+    pub fit: ClockFit,
+    /// Remarks for the reader.
+    pub warnings: Vec<String>,
+}
+
+/// Fits a camera's clock from the edges on its trigger channel and the marks that were sent.
+///
+/// `None` when fewer than three marks can be matched; the session then has to be aligned by its presses.
+/// Marks that were sent or seen several times (a repeated attempt sends the same name again) are matched by
+/// time once the others have given a first fit.
+#[must_use]
+pub fn fit_marks(edges: &[TriggerEdge], channel: u8, sent: &[SentMark]) -> Option<MarksFit> {
+    let on_channel: Vec<TriggerEdge> = edges
+        .iter()
+        .copied()
+        .filter(|e| e.channel == channel)
+        .collect();
+    let decoded = decode_marks(&on_channel);
+    let mut sent_by: BTreeMap<Mark, Vec<f64>> = BTreeMap::new();
+    for mark in sent {
+        let host_us = mark.t.0 as f64 * 1e-3;
+        sent_by.entry(mark.mark).or_default().push(host_us);
+    }
+    let mut seen_by: BTreeMap<Mark, Vec<u64>> = BTreeMap::new();
+    for mark in &decoded.marks {
+        seen_by.entry(mark.mark).or_default().push(mark.t_us);
+    }
+    // Camera times relative to the first mark, exactly, so that large counters lose nothing.
+    let reference = decoded.marks.first()?.t_us;
+    let relative = |t_us: u64| t_us.wrapping_sub(reference) as i64 as f64;
+
+    let mut pairs = Vec::new();
+    let mut repeated = Vec::new();
+    for (mark, hosts) in &sent_by {
+        let Some(cameras) = seen_by.get(mark) else {
+            continue;
+        };
+        if let ([host_us], [camera]) = (hosts.as_slice(), cameras.as_slice()) {
+            pairs.push(Pair {
+                host_us: *host_us,
+                camera_us: relative(*camera),
+            });
+        } else {
+            repeated.push((hosts, cameras));
+        }
+    }
+    if pairs.len() < 3 {
+        // Hardly any unique names: trust the order where nothing is missing.
+        for (hosts, cameras) in repeated.iter().filter(|(h, c)| h.len() == c.len()) {
+            pairs.extend(hosts.iter().zip(cameras.iter()).map(|(h, c)| Pair {
+                host_us: *h,
+                camera_us: relative(*c),
+            }));
+        }
+    } else {
+        let first = line::fit(&pairs, FLOOR_US)?;
+        for (hosts, cameras) in &repeated {
+            for host_us in hosts.iter() {
+                let predicted = first.offset_us + host_us + first.drift * host_us;
+                let nearest = cameras
+                    .iter()
+                    .map(|c| relative(*c))
+                    .min_by(|a, b| (a - predicted).abs().total_cmp(&(b - predicted).abs()));
+                if let Some(camera_us) = nearest.filter(|c| (c - predicted).abs() < NEAR_US) {
+                    pairs.push(Pair {
+                        host_us: *host_us,
+                        camera_us,
+                    });
+                }
+            }
+        }
+    }
+    let line = line::fit(&pairs, FLOOR_US)?;
+    let fit = ClockFit {
+        method: ClockMethod::TriggerMarks,
+        offset_us: reference as f64 + line.offset_us,
+        drift_ppm: line.drift * 1e6,
+        drift_se_ppm: line.drift_se * 1e6,
+        residual_rms_us: line.rms_us,
+        residual_max_us: line.max_us,
+        n: line.n() as u32,
+        rejected: (decoded.marks.len().max(pairs.len()) - line.n()) as u32,
+    };
+    let mut warnings = Vec::new();
+    if line.rms_us > SUSPICIOUS_RMS_US {
+        warnings.push(format!(
+            "trigger marks fit the clock only to {:.0} µs rms (expected a few µs); check the trigger line",
+            line.rms_us
+        ));
+    }
+    if fit.rejected > 0 {
+        warnings.push(format!(
+            "{} of {} trigger marks do not fit the clock and were left out",
+            fit.rejected,
+            decoded.marks.len()
+        ));
+    }
+    let unseen = sent.len().saturating_sub(decoded.marks.len());
+    if unseen > 0 {
+        warnings.push(format!(
+            "{unseen} of {} trigger marks were not seen",
+            sent.len()
+        ));
+    }
+    if decoded.stray_edges > 0 {
+        warnings.push(format!(
+            "{} edges on trigger channel {channel} belong to no complete mark",
+            decoded.stray_edges
+        ));
+    }
+    Some(MarksFit { fit, warnings })
+}

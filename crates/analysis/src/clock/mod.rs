@@ -1,0 +1,36 @@
+//! Camera clocks: where host time lies on a camera's clock, and how surely.
+
+mod line;
+mod marks;
+mod presses;
+
+pub use marks::{MarksFit, fit_marks};
+pub use presses::{PressSpan, RatesFit, fit_rates};
+
+use skinrig_model::HostTime;
+
+use crate::result::ClockFit;
+
+/// A drift above this is no crystal's: both clocks are specified to tens of ppm.
+pub const SUSPICIOUS_DRIFT_PPM: f64 = 200.0;
+
+impl ClockFit {
+    /// Camera time (µs) of a host time.
+    #[must_use]
+    pub fn camera_us_of_host(&self, t: HostTime) -> f64 {
+        self.camera_us(t.0 as f64 * 1e-3)
+    }
+
+    /// Camera time (µs) of a host time in µs.
+    #[must_use]
+    pub fn camera_us(&self, host_us: f64) -> f64 {
+        // The small term apart: the sum keeps the drift's digits at large times.
+        self.offset_us + host_us + self.drift_ppm * 1e-6 * host_us
+    }
+
+    /// Host time (µs) of a camera time in µs.
+    #[must_use]
+    pub fn host_us_of_camera(&self, camera_us: f64) -> f64 {
+        (camera_us - self.offset_us) / (1.0 + self.drift_ppm * 1e-6)
+    }
+}

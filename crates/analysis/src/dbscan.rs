@@ -1,0 +1,393 @@
+//! DBSCAN as scikit-learn defines it, computed on pixel counts instead of events.
+//!
+//! Events are integer pixels, so a press is a grid of counts and every question about neighbours becomes a
+//! question about discs on that grid: an event is *core* when the disc of radius eps about it (border
+//! included) holds at least `min_samples` events, itself and duplicates counted. Core pixels within eps of
+//! each other are one cluster. A *border* event is not core but within eps of a core pixel. Everything else is
+//! noise. Core, border and noise are exactly scikit-learn's.
+//!
+//! Where two clusters reach the same border event, scikit-learn gives it to the one that its input order
+//! happened to expand first. There is no input order here; the rule is: **the border event belongs to the
+//! cluster of its nearest core pixel; of equally near ones the first by row, then column, decides.** Clusters
+//! are numbered by their first core pixel in the same order.
+//!
+//! Distances are compared squared (`dx² + dy² <= eps * eps`), as scikit-learn's trees do.
+
+use crate::grid::PixelGrid;
+
+/// The label of events that belong to no cluster.
+pub const NOISE: u32 = u32::MAX;
+
+const NO_CORE: u16 = u16::MAX;
+const WIDTH: usize = PixelGrid::WIDTH;
+
+/// One cluster.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Cluster {
+    /// Events in it, core and border.
+    pub events: u64,
+    /// Sum of their columns, px.
+    pub sum_u: u64,
+    /// Sum of their rows on the sensor, px.
+    pub sum_v: u64,
+}
+
+impl Cluster {
+    /// Mean column and row, px; `None` without events.
+    #[must_use]
+    pub fn centroid(&self) -> Option<(f64, f64)> {
+        (self.events > 0).then(|| {
+            let n = self.events as f64;
+            (self.sum_u as f64 / n, self.sum_v as f64 / n)
+        })
+    }
+
+    /// Both together.
+    #[must_use]
+    pub const fn merged(self, other: Self) -> Self {
+        Self {
+            events: self.events + other.events,
+            sum_u: self.sum_u + other.sum_u,
+            sum_v: self.sum_v + other.sum_v,
+        }
+    }
+}
+
+/// Core pixels of one row with gaps of at most eps: always one cluster.
+#[derive(Debug, Clone, Copy)]
+struct Run {
+    row: usize,
+    /// Range in `core_columns`.
+    from: usize,
+    to: usize,
+    first: u16,
+    last: u16,
+}
+
+/// The algorithm with its buffers, to be used for press after press.
+#[derive(Debug, Clone)]
+pub struct Dbscan {
+    min_samples: u32,
+    /// Half width of the disc at each row distance.
+    half: Vec<usize>,
+    pixels: Vec<u32>,
+    /// Start of each row in `pixels`, one more than there are rows.
+    row_start: Vec<usize>,
+    prefix: Vec<u32>,
+    core: Vec<bool>,
+    core_columns: Vec<u16>,
+    runs: Vec<Run>,
+    run_start: Vec<usize>,
+    parent: Vec<u32>,
+    run_label: Vec<u32>,
+    nearest: Vec<u16>,
+    labels: Vec<u32>,
+    clusters: Vec<Cluster>,
+}
+
+impl Dbscan {
+    /// DBSCAN with radius `eps_px` (0..=640 px) and core threshold `min_samples` (at least 1).
+    #[must_use]
+    pub fn new(eps_px: f64, min_samples: u32) -> Self {
+        let eps_sq = eps_px * eps_px;
+        let fits = |dx: usize, dy: usize| (dx * dx + dy * dy) as f64 <= eps_sq;
+        let half = (0..WIDTH)
+            .take_while(|&dy| fits(0, dy))
+            .map(|dy| (0..WIDTH).take_while(|&dx| fits(dx, dy)).count() - 1)
+            .collect();
+        Self {
+            min_samples,
+            half,
+            pixels: Vec::new(),
+            row_start: Vec::new(),
+            prefix: Vec::new(),
+            core: Vec::new(),
+            core_columns: Vec::new(),
+            runs: Vec::new(),
+            run_start: Vec::new(),
+            parent: Vec::new(),
+            run_label: Vec::new(),
+            nearest: Vec::new(),
+            labels: Vec::new(),
+            clusters: Vec::new(),
+        }
+    }
+
+    /// Clusters the events of `grid`; the result lasts until the next call.
+    pub fn run(&mut self, grid: &PixelGrid) -> &[Cluster] {
+        self.clusters.clear();
+        self.labels.clear();
+        grid.sorted_pixels(&mut self.pixels);
+        if self.pixels.is_empty() || self.half.is_empty() {
+            self.labels.resize(self.pixels.len(), NOISE);
+            return &self.clusters;
+        }
+        self.index_rows(grid);
+        self.find_core(grid);
+        self.find_runs(grid.height());
+        self.join_runs();
+        let count = self.number_clusters();
+        self.label_pixels(grid.height());
+        self.clusters.resize(count, Cluster::default());
+        for (&pixel, &label) in self.pixels.iter().zip(&self.labels) {
+            if let Some(cluster) = self.clusters.get_mut(label as usize) {
+                let (u, v) = (
+                    u64::from(pixel) % WIDTH as u64,
+                    u64::from(pixel) / WIDTH as u64,
+                );
+                let n = u64::from(grid.count(pixel));
+                cluster.events += n;
+                cluster.sum_u += n * u;
+                cluster.sum_v += n * (v + u64::from(grid.rows().0));
+            }
+        }
+        &self.clusters
+    }
+
+    /// The clusters of the last run.
+    #[must_use]
+    pub fn clusters(&self) -> &[Cluster] {
+        &self.clusters
+    }
+
+    /// (index of the pixel as in [`PixelGrid::sorted_pixels`], its cluster or [`NOISE`]) of the last run.
+    pub fn labels(&self) -> impl Iterator<Item = (u32, u32)> {
+        self.pixels.iter().copied().zip(self.labels.iter().copied())
+    }
+
+    /// The largest cluster of the last run, the first of equal ones, with its number.
+    #[must_use]
+    pub fn largest(&self) -> Option<(u32, Cluster)> {
+        let mut best: Option<(u32, Cluster)> = None;
+        for (i, c) in self.clusters.iter().enumerate() {
+            if best.is_none_or(|(_, b)| c.events > b.events) {
+                best = Some((i as u32, *c));
+            }
+        }
+        best
+    }
+
+    /// Row starts and, for rows with events, prefix sums of counts.
+    fn index_rows(&mut self, grid: &PixelGrid) {
+        let height = grid.height();
+        self.row_start.clear();
+        let mut at = 0;
+        for row in 0..height {
+            self.row_start.push(at);
+            let end = ((row + 1) * WIDTH) as u32;
+            at += self.pixels[at..].partition_point(|&p| p < end);
+        }
+        self.row_start.push(at);
+        self.prefix.resize(height * (WIDTH + 1), 0);
+        for row in 0..height {
+            if self.row_start[row] == self.row_start[row + 1] {
+                continue;
+            }
+            let sums = &mut self.prefix[row * (WIDTH + 1)..(row + 1) * (WIDTH + 1)];
+            let mut sum = 0;
+            sums[0] = 0;
+            for (s, c) in sums[1..].iter_mut().zip(grid.row(row)) {
+                sum += c;
+                *s = sum;
+            }
+        }
+    }
+
+    fn find_core(&mut self, grid: &PixelGrid) {
+        let height = grid.height();
+        self.core.clear();
+        for &pixel in &self.pixels {
+            let (x, y) = (pixel as usize % WIDTH, pixel as usize / WIDTH);
+            let in_row = |row: usize, half: usize| {
+                if self.row_start[row] == self.row_start[row + 1] {
+                    return 0;
+                }
+                let sums = &self.prefix[row * (WIDTH + 1)..(row + 1) * (WIDTH + 1)];
+                sums[(x + half + 1).min(WIDTH)] - sums[x.saturating_sub(half)]
+            };
+            // Near rows first: in a dense press the first row already decides.
+            let mut sum = grid.count(pixel);
+            if sum < self.min_samples {
+                sum = in_row(y, self.half[0]);
+                for (dy, &half) in self.half.iter().enumerate().skip(1) {
+                    if sum >= self.min_samples {
+                        break;
+                    }
+                    if y >= dy {
+                        sum += in_row(y - dy, half);
+                    }
+                    if y + dy < height {
+                        sum += in_row(y + dy, half);
+                    }
+                }
+            }
+            self.core.push(sum >= self.min_samples);
+        }
+    }
+
+    fn find_runs(&mut self, height: usize) {
+        self.core_columns.clear();
+        self.runs.clear();
+        self.run_start.clear();
+        let reach = self.half[0] as u16;
+        for row in 0..height {
+            self.run_start.push(self.runs.len());
+            let fresh = self.runs.len();
+            for i in self.row_start[row]..self.row_start[row + 1] {
+                if !self.core[i] {
+                    continue;
+                }
+                let x = (self.pixels[i] as usize % WIDTH) as u16;
+                let at = self.core_columns.len();
+                self.core_columns.push(x);
+                match self.runs[fresh..].last_mut() {
+                    Some(run) if x - run.last <= reach => {
+                        run.last = x;
+                        run.to = at + 1;
+                    }
+                    _ => self.runs.push(Run {
+                        row,
+                        from: at,
+                        to: at + 1,
+                        first: x,
+                        last: x,
+                    }),
+                }
+            }
+        }
+        self.run_start.push(self.runs.len());
+    }
+
+    fn join_runs(&mut self) {
+        self.parent.clear();
+        self.parent.extend(0..self.runs.len() as u32);
+        let height = self.run_start.len() - 1;
+        for a in 0..self.runs.len() {
+            let run = self.runs[a];
+            for dy in 1..self.half.len() {
+                let row = run.row + dy;
+                if row >= height {
+                    break;
+                }
+                let half = self.half[dy] as u16;
+                let others = self.run_start[row]..self.run_start[row + 1];
+                let skip = self.runs[others.clone()]
+                    .partition_point(|b| b.last.saturating_add(half) < run.first);
+                for b in others.start + skip..others.end {
+                    let other = self.runs[b];
+                    if other.first > run.last.saturating_add(half) {
+                        break;
+                    }
+                    let (ra, rb) = (find(&mut self.parent, a), find(&mut self.parent, b));
+                    if ra != rb && self.touch(run, other, half) {
+                        // The smaller index is the root: it is the first run by row and column.
+                        self.parent[ra.max(rb)] = ra.min(rb) as u32;
+                    }
+                }
+            }
+        }
+    }
+
+    /// True when some core pixel of `a` and some of `b` are at most `half` columns apart.
+    fn touch(&self, a: Run, b: Run, half: u16) -> bool {
+        let (xs, ys) = (
+            &self.core_columns[a.from..a.to],
+            &self.core_columns[b.from..b.to],
+        );
+        let mut j = 0;
+        for &x in xs {
+            while j < ys.len() && ys[j] + half < x {
+                j += 1;
+            }
+            match ys.get(j) {
+                None => return false,
+                Some(&y) if y <= x + half => return true,
+                Some(_) => {}
+            }
+        }
+        false
+    }
+
+    /// Numbers the clusters by their first run; returns how many there are.
+    fn number_clusters(&mut self) -> usize {
+        self.run_label.clear();
+        let mut count = 0;
+        for i in 0..self.runs.len() {
+            let root = find(&mut self.parent, i);
+            let label = if root == i {
+                count += 1;
+                count - 1
+            } else {
+                self.run_label[root]
+            };
+            self.run_label.push(label);
+        }
+        count as usize
+    }
+
+    fn label_pixels(&mut self, height: usize) {
+        if self.runs.is_empty() {
+            self.labels.resize(self.pixels.len(), NOISE);
+            return;
+        }
+        self.find_nearest(height);
+        let reach = self.half.len() - 1;
+        for (&pixel, &core) in self.pixels.iter().zip(&self.core) {
+            let (x, y) = (pixel as usize % WIDTH, pixel as usize / WIDTH);
+            if core {
+                self.labels.push(self.label_of_core(x as u16, y));
+                continue;
+            }
+            let mut best: Option<(usize, u16, usize)> = None;
+            for row in y.saturating_sub(reach)..=(y + reach).min(height - 1) {
+                if self.run_start[row] == self.run_start[row + 1] {
+                    continue;
+                }
+                let column = self.nearest[row * WIDTH + x];
+                let (dx, dy) = (x.abs_diff(usize::from(column)), y.abs_diff(row));
+                let distance = dx * dx + dy * dy;
+                if dx <= self.half[dy] && best.is_none_or(|(d, ..)| distance < d) {
+                    best = Some((distance, column, row));
+                }
+            }
+            let label = best.map_or(NOISE, |(_, column, row)| self.label_of_core(column, row));
+            self.labels.push(label);
+        }
+    }
+
+    fn label_of_core(&self, x: u16, row: usize) -> u32 {
+        let range = self.run_start[row]..self.run_start[row + 1];
+        let i = self.runs[range.clone()].partition_point(|r| r.last < x);
+        self.run_label[range.start + i]
+    }
+
+    /// For each pixel of a row with core pixels, the column of the nearest of them, the left one of two.
+    fn find_nearest(&mut self, height: usize) {
+        self.nearest.resize(height * WIDTH, NO_CORE);
+        for row in 0..height {
+            let runs = &self.runs[self.run_start[row]..self.run_start[row + 1]];
+            let (Some(first), Some(last)) = (runs.first(), runs.last()) else {
+                continue;
+            };
+            let columns = &self.core_columns[first.from..last.to];
+            let nearest = &mut self.nearest[row * WIDTH..(row + 1) * WIDTH];
+            let mut from = 0;
+            for (i, &c) in columns.iter().enumerate() {
+                // Up to half way to the next core pixel, the middle included.
+                let to = columns
+                    .get(i + 1)
+                    .map_or(WIDTH, |&n| (usize::from(c) + usize::from(n)) / 2 + 1);
+                nearest[from..to].fill(c);
+                from = to;
+            }
+        }
+    }
+}
+
+fn find(parent: &mut [u32], mut i: usize) -> usize {
+    while parent[i] as usize != i {
+        parent[i] = parent[parent[i] as usize];
+        i = parent[i] as usize;
+    }
+    i
+}

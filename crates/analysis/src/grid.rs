@@ -1,0 +1,102 @@
+//! How many events fell on each pixel of the crop: all that the clustering needs to know of a press.
+
+use skinrig_model::{SENSOR_HEIGHT, SENSOR_WIDTH};
+
+/// Event counts per pixel: all columns, the rows of a crop.
+///
+/// Counters are 32 bit wide and so is their sum; [`PixelGrid::add`] refuses the event that would overflow it.
+#[derive(Debug, Clone)]
+pub struct PixelGrid {
+    rows: (u16, u16),
+    counts: Vec<u32>,
+    touched: Vec<u32>,
+    events: u32,
+}
+
+impl PixelGrid {
+    /// Columns of every grid.
+    pub const WIDTH: usize = SENSOR_WIDTH as usize;
+
+    /// An empty grid over the rows `rows.0..=rows.1`; an empty crop when they are in the wrong order.
+    #[must_use]
+    pub fn new(rows: (u16, u16)) -> Self {
+        let rows = (rows.0, rows.1.min(SENSOR_HEIGHT - 1));
+        let height = (usize::from(rows.1) + 1).saturating_sub(usize::from(rows.0));
+        Self {
+            rows,
+            counts: vec![0; height * Self::WIDTH],
+            touched: Vec::new(),
+            events: 0,
+        }
+    }
+
+    /// First and last row, both included.
+    #[must_use]
+    pub const fn rows(&self) -> (u16, u16) {
+        self.rows
+    }
+
+    /// Number of rows.
+    #[must_use]
+    pub fn height(&self) -> usize {
+        self.counts.len() / Self::WIDTH
+    }
+
+    /// Events on the grid.
+    #[must_use]
+    pub const fn events(&self) -> u32 {
+        self.events
+    }
+
+    /// Counts one event at column `u`, row `v`. False, and nothing counted, outside the crop or when the
+    /// grid already holds `u32::MAX` events.
+    pub fn add(&mut self, u: u16, v: u16) -> bool {
+        if u >= SENSOR_WIDTH || v < self.rows.0 || v > self.rows.1 || self.events == u32::MAX {
+            return false;
+        }
+        let index = usize::from(v - self.rows.0) * Self::WIDTH + usize::from(u);
+        let Some(count) = self.counts.get_mut(index) else {
+            return false;
+        };
+        if *count == 0 {
+            self.touched.push(index as u32);
+        }
+        *count += 1;
+        self.events += 1;
+        true
+    }
+
+    /// Empties the grid; costs as much as it held.
+    pub fn clear(&mut self) {
+        for &index in &self.touched {
+            self.counts[index as usize] = 0;
+        }
+        self.touched.clear();
+        self.events = 0;
+    }
+
+    /// Indices (`row * WIDTH + column`, rows counted from the crop's first) of the pixels with events, row by
+    /// row, into `out`.
+    pub fn sorted_pixels(&self, out: &mut Vec<u32>) {
+        out.clear();
+        if self.touched.len() * 16 > self.counts.len() {
+            let occupied = self.counts.iter().enumerate().filter(|(_, c)| **c > 0);
+            out.extend(occupied.map(|(i, _)| i as u32));
+        } else {
+            out.extend_from_slice(&self.touched);
+            out.sort_unstable();
+        }
+    }
+
+    /// Count of the pixel with this index.
+    #[must_use]
+    pub fn count(&self, index: u32) -> u32 {
+        self.counts[index as usize]
+    }
+
+    /// Counts of one row, counted from the crop's first.
+    #[must_use]
+    pub fn row(&self, row: usize) -> &[u32] {
+        &self.counts[row * Self::WIDTH..(row + 1) * Self::WIDTH]
+    }
+}

@@ -1,0 +1,92 @@
+//! A digest of the results, by which two analyses are known to say the same.
+
+use serde::Serialize;
+use sha2::{Digest, Sha256};
+
+use crate::result::{
+    Analysis, CalibrationResult, LocationOutcome, Metrics, PressCounts, PressResult, PressView,
+};
+use skinrig_model::{AnalysisSettings, Point2, PressId, PressRole, StereoGeometry};
+
+/// What the digest covers: settings, geometry, table of presses and metrics. Not the absolute times: a session
+/// that is replayed at another hour gives the same results.
+#[derive(Serialize)]
+struct Results<'a> {
+    version: u32,
+    settings: &'a AnalysisSettings,
+    geometry: &'a StereoGeometry,
+    counts: &'a PressCounts,
+    calibration: &'a Option<CalibrationResult>,
+    scored: &'a Metrics,
+    scored_without_exclusions: &'a Metrics,
+    presses: Vec<Row<'a>>,
+}
+
+#[derive(Serialize)]
+struct Row<'a> {
+    press: PressId,
+    role: PressRole,
+    repetition: u32,
+    location: u32,
+    planned: Point2,
+    depth_mm: f64,
+    truth: Option<Point2>,
+    verdict: &'a str,
+    reason: Option<&'a str>,
+    views: &'a [Option<PressView>; 2],
+    location_outcome: &'a LocationOutcome,
+}
+
+impl<'a> Row<'a> {
+    fn of(press: &'a PressResult) -> Self {
+        Self {
+            press: press.press,
+            role: press.role,
+            repetition: press.repetition,
+            location: press.location,
+            planned: press.planned,
+            depth_mm: press.depth_mm,
+            truth: press.truth,
+            verdict: &press.verdict,
+            reason: press.reason.as_deref(),
+            views: &press.views,
+            location_outcome: &press.location_outcome,
+        }
+    }
+}
+
+/// Lower-case hex SHA-256 over the canonical JSON of the results: fields in the order of their declaration, no
+/// spaces, every number in the shortest form that reads back as the same double.
+#[must_use]
+pub fn results_hash(analysis: &Analysis) -> String {
+    let results = Results {
+        version: analysis.version,
+        settings: &analysis.settings,
+        geometry: &analysis.geometry,
+        counts: &analysis.counts,
+        calibration: &analysis.calibration,
+        scored: &analysis.scored,
+        scored_without_exclusions: &analysis.scored_without_exclusions,
+        presses: analysis.presses.iter().map(Row::of).collect(),
+    };
+    let mut digest = Digesting(Sha256::new());
+    // Neither the writer nor any of the types can fail: no maps with odd keys, no I/O.
+    if let Err(error) = serde_json::to_writer(&mut digest, &results) {
+        digest.0.update(error.to_string());
+    }
+    let bytes = digest.0.finalize();
+    bytes.iter().map(|b| format!("{b:02x}")).collect()
+}
+
+struct Digesting(Sha256);
+
+impl std::io::Write for Digesting {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        self.0.update(bytes);
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        Ok(())
+    }
+}

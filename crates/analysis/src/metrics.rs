@@ -1,0 +1,188 @@
+//! How well the skin localises: errors over the scored presses, with bootstrap intervals.
+//!
+//! Intervals are percentile intervals of a bootstrap that resamples *locations* with all their repetitions:
+//! presses at one place share its systematic error and are not independent.
+
+use rayon::prelude::*;
+use skinrig_model::SkinOutline;
+
+use crate::result::{Estimate, Metrics};
+use crate::seeded;
+use crate::sets::{ScoreSet, Scored};
+
+/// Share of a 95 % interval that lies outside on each side.
+const TAIL: f64 = 0.025;
+/// Metrics with an interval, in the order of [`Values`].
+const COUNT: usize = 9;
+/// (value, n) of each metric: rmse, x, y, bias x, bias y, median, p95, repeat std, located rate.
+type Values = [(Option<f64>, u32); COUNT];
+
+/// Which presses give an estimate that counts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Exclusions {
+    /// Only valid presses.
+    Applied,
+    /// Every press with an estimate, whatever its verdict.
+    Ignored,
+}
+
+/// The presses of one location.
+struct Place {
+    attempted: u32,
+    errors: Vec<[f64; 2]>,
+    lengths: Vec<f64>,
+    /// Standard deviation between repetitions at each depth that has at least two.
+    repeat_std: Vec<f64>,
+}
+
+/// The metrics of `set` on a skin with this outline, with `resamples` bootstrap samples from `seed`.
+#[must_use]
+pub fn metrics(
+    set: &ScoreSet,
+    exclusions: Exclusions,
+    outline: &SkinOutline,
+    resamples: u32,
+    seed: u64,
+) -> Metrics {
+    let places = places(set, exclusions);
+    let all: Vec<&Place> = places.iter().collect();
+    let values = evaluate(&all);
+    let intervals = bootstrap(&places, resamples, seed);
+    let estimate = |k: usize| {
+        let (value, n) = values[k];
+        let (low, high) = value
+            .and(intervals[k])
+            .map_or((None, None), |(l, h)| (Some(l), Some(h)));
+        Estimate {
+            value,
+            low,
+            high,
+            n,
+        }
+    };
+    let rmse_mm = estimate(0);
+    Metrics {
+        rmse_mm,
+        rmse_x_mm: estimate(1),
+        rmse_y_mm: estimate(2),
+        bias_x_mm: estimate(3),
+        bias_y_mm: estimate(4),
+        median_mm: estimate(5),
+        p95_mm: estimate(6),
+        repeat_std_mm: estimate(7),
+        located_rate: estimate(8),
+        rmse_diagonal_percent: rmse_mm.value.map(|r| 100.0 * r / outline.diagonal_mm()),
+    }
+}
+
+fn places(set: &ScoreSet, exclusions: Exclusions) -> Vec<Place> {
+    let mut presses: Vec<&Scored> = set.presses().iter().collect();
+    presses.sort_by_key(|p| p.location);
+    presses
+        .chunk_by(|a, b| a.location == b.location)
+        .map(|group| place(group, exclusions))
+        .collect()
+}
+
+fn place(group: &[&Scored], exclusions: Exclusions) -> Place {
+    let counts = |p: &Scored| exclusions == Exclusions::Ignored || p.valid;
+    let mut found: Vec<_> = group
+        .iter()
+        .filter(|p| counts(p))
+        .filter_map(|p| p.found.map(|(at, error)| (p.depth_mm, at, error)))
+        .collect();
+    let errors: Vec<[f64; 2]> = found.iter().map(|(.., e)| *e).collect();
+    found.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let repeat_std = found
+        .chunk_by(|a, b| a.0 == b.0)
+        .filter(|repeats| repeats.len() >= 2)
+        .map(|repeats| {
+            let n = repeats.len() as f64;
+            let mean = |f: fn(&skinrig_model::Point2) -> f64| {
+                repeats.iter().map(|(_, at, _)| f(at)).sum::<f64>() / n
+            };
+            let (mx, my) = (mean(|p| p.x_mm), mean(|p| p.y_mm));
+            let squares: f64 = repeats
+                .iter()
+                .map(|(_, at, _)| (at.x_mm - mx).powi(2) + (at.y_mm - my).powi(2))
+                .sum();
+            (squares / (n - 1.0)).sqrt()
+        })
+        .collect();
+    Place {
+        attempted: group.len() as u32,
+        lengths: errors.iter().map(|e| libm::hypot(e[0], e[1])).collect(),
+        errors,
+        repeat_std,
+    }
+}
+
+fn evaluate(places: &[&Place]) -> Values {
+    let mut sums = [0.0; 4];
+    let mut lengths = Vec::new();
+    let (mut attempted, mut stds, mut std_sum) = (0u32, 0u32, 0.0);
+    for place in places {
+        attempted += place.attempted;
+        lengths.extend_from_slice(&place.lengths);
+        for [dx, dy] in &place.errors {
+            for (sum, term) in sums.iter_mut().zip([dx * dx, dy * dy, *dx, *dy]) {
+                *sum += term;
+            }
+        }
+        stds += place.repeat_std.len() as u32;
+        std_sum += place.repeat_std.iter().sum::<f64>();
+    }
+    let n = lengths.len() as u32;
+    let [xx, yy, x, y] = sums.map(|s| s / f64::from(n));
+    let some = |value: f64| (n > 0).then_some(value);
+    [
+        (some((xx + yy).sqrt()), n),
+        (some(xx.sqrt()), n),
+        (some(yy.sqrt()), n),
+        (some(x), n),
+        (some(y), n),
+        (quantile(&mut lengths, 0.5), n),
+        (quantile(&mut lengths, 0.95), n),
+        ((stds > 0).then(|| std_sum / f64::from(stds)), stds),
+        (
+            (attempted > 0).then(|| f64::from(n) / f64::from(attempted)),
+            attempted,
+        ),
+    ]
+}
+
+fn bootstrap(places: &[Place], resamples: u32, seed: u64) -> [Option<(f64, f64)>; COUNT] {
+    if places.len() < 2 || resamples < 2 {
+        return [None; COUNT];
+    }
+    let samples: Vec<Values> = (0..resamples)
+        .into_par_iter()
+        .map(|sample| {
+            let mut rng = seeded::generator(seed, u64::from(sample));
+            let drawn: Vec<&Place> = (0..places.len())
+                .map(|_| &places[seeded::index(&mut rng, places.len())])
+                .collect();
+            evaluate(&drawn)
+        })
+        .collect();
+    std::array::from_fn(|k| {
+        let mut values: Vec<f64> = samples.iter().filter_map(|s| s[k].0).collect();
+        Some((
+            quantile(&mut values, TAIL)?,
+            quantile(&mut values, 1.0 - TAIL)?,
+        ))
+    })
+}
+
+/// The quantile `q` (0..=1) with linear interpolation between order statistics (type 7 of Hyndman and Fan 1996,
+/// numpy's default); `None` without values. Reorders `values`.
+pub(crate) fn quantile(values: &mut [f64], q: f64) -> Option<f64> {
+    if values.is_empty() {
+        return None;
+    }
+    let position = q * (values.len() - 1) as f64;
+    let index = position.floor() as usize;
+    let (_, &mut low, above) = values.select_nth_unstable_by(index, f64::total_cmp);
+    let high = above.iter().copied().min_by(f64::total_cmp).unwrap_or(low);
+    Some(low + (position - index as f64) * (high - low))
+}

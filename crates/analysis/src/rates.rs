@@ -1,0 +1,170 @@
+//! Event rates: a streamed histogram in fine bins, and the thinned course that a report draws.
+
+use crate::result::{ClockFit, RateSeries};
+
+/// Most fine bins of a histogram: 46 hours of 10 ms. A stream that claims to be longer has broken times.
+const MAX_BINS: u64 = 1 << 24;
+/// Most bins of a [`RateSeries`].
+const MAX_SERIES: usize = 4000;
+
+/// Event counts in equal bins of camera time, grown as events come.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RateHistogram {
+    bin_us: u64,
+    first_bin: u64,
+    counts: Vec<u32>,
+    /// Left edge of the bin last counted in, and its place: most events fall in the same bin as the one before.
+    last_us: u64,
+    last: usize,
+    beyond: u64,
+}
+
+impl RateHistogram {
+    /// No events yet, bins of `bin_us` (at least 1).
+    #[must_use]
+    pub const fn new(bin_us: u64) -> Self {
+        Self {
+            bin_us: if bin_us == 0 { 1 } else { bin_us },
+            first_bin: 0,
+            counts: Vec::new(),
+            last_us: u64::MAX,
+            last: 0,
+            beyond: 0,
+        }
+    }
+
+    /// Counts an event at camera time `t_us`. Times may be out of order.
+    pub fn add(&mut self, t_us: u64) {
+        if t_us.wrapping_sub(self.last_us) >= self.bin_us && !self.seek(t_us / self.bin_us) {
+            self.beyond += 1;
+            return;
+        }
+        self.counts[self.last] = self.counts[self.last].saturating_add(1);
+    }
+
+    /// Makes `bin` the current one; false when that would take more than [`MAX_BINS`].
+    fn seek(&mut self, bin: u64) -> bool {
+        if self.counts.is_empty() {
+            self.first_bin = bin;
+        }
+        let end = self.first_bin + self.counts.len() as u64;
+        let (low, high) = (bin.min(self.first_bin), (bin + 1).max(end));
+        if high - low > MAX_BINS {
+            return false;
+        }
+        if low < self.first_bin {
+            let missing = (self.first_bin - low) as usize;
+            self.counts.splice(0..0, std::iter::repeat_n(0, missing));
+            self.first_bin = low;
+        }
+        self.counts.resize((high - low) as usize, 0);
+        self.last = (bin - self.first_bin) as usize;
+        self.last_us = bin * self.bin_us;
+        true
+    }
+
+    /// Width of a bin, µs.
+    #[must_use]
+    pub const fn bin_us(&self) -> u64 {
+        self.bin_us
+    }
+
+    /// Camera time of the first bin's left edge, µs.
+    #[must_use]
+    pub const fn start_us(&self) -> u64 {
+        self.first_bin * self.bin_us
+    }
+
+    /// The counts.
+    #[must_use]
+    pub fn counts(&self) -> &[u32] {
+        &self.counts
+    }
+
+    /// Events whose time lies too far from the others to be counted.
+    #[must_use]
+    pub const fn beyond(&self) -> u64 {
+        self.beyond
+    }
+
+    /// The course in at most 4000 bins; on the host clock when there is a fit.
+    #[must_use]
+    pub fn series(&self, clock: Option<&ClockFit>) -> RateSeries {
+        if self.counts.is_empty() {
+            return RateSeries::default();
+        }
+        let merge = self.counts.len().div_ceil(MAX_SERIES);
+        let camera_s = self.start_us() as f64 * 1e-6;
+        let fine_s = self.bin_us as f64 * 1e-6;
+        let (start_s, stretch) = clock.map_or((camera_s, 1.0), |c| {
+            (
+                c.host_us_of_camera(self.start_us() as f64) * 1e-6,
+                1.0 / (1.0 + c.drift_ppm * 1e-6),
+            )
+        });
+        let bins = self.counts.chunks(merge);
+        let mean = |bin: &[u32]| {
+            let sum: u64 = bin.iter().map(|c| u64::from(*c)).sum();
+            (sum as f64 / (fine_s * bin.len() as f64)) as f32
+        };
+        let peak =
+            |bin: &[u32]| (f64::from(bin.iter().copied().max().unwrap_or(0)) / fine_s) as f32;
+        RateSeries {
+            start_s,
+            bin_s: fine_s * merge as f64 * stretch,
+            mean_per_s: bins.clone().map(mean).collect(),
+            peak_per_s: bins.map(peak).collect(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn counts_survive_disorder_huge_times_and_thinning() {
+        let base = 1u64 << 44;
+        let mut h = RateHistogram::new(10_000);
+        let times: Vec<u64> = (0..50_000u64)
+            .map(|i| base + (i * 7919) % 90_000_000)
+            .collect();
+        times.iter().for_each(|t| h.add(*t));
+        assert_eq!(
+            h.counts().iter().map(|c| u64::from(*c)).sum::<u64>(),
+            50_000
+        );
+        for t in [base + 12, base + 5_000_000] {
+            let in_bin = |x: &&u64| **x / 10_000 == t / 10_000;
+            let bin = (t / 10_000 - h.start_us() / 10_000) as usize;
+            assert_eq!(
+                h.counts()[bin] as usize,
+                times.iter().filter(in_bin).count()
+            );
+        }
+        let series = h.series(None);
+        assert!(series.mean_per_s.len() <= 4000 && series.mean_per_s.len() > 2000);
+        let last = h.counts().len() % 3;
+        assert_eq!(last, 0, "the check of the sum below needs full bins");
+        let events: f64 = series
+            .mean_per_s
+            .iter()
+            .map(|r| f64::from(*r) * series.bin_s)
+            .sum();
+        assert!((events - 50_000.0).abs() < 0.1);
+        h.add(base + (1 << 43));
+        assert_eq!(h.beyond(), 1);
+        assert_eq!(
+            h.counts().iter().map(|c| u64::from(*c)).sum::<u64>(),
+            50_000
+        );
+    }
+
+    #[test]
+    fn nothing_gives_nothing() {
+        assert_eq!(
+            RateHistogram::new(10_000).series(None),
+            RateSeries::default()
+        );
+    }
+}

@@ -1,0 +1,157 @@
+//! Windows: which stretch of a camera's time belongs to which press.
+
+use skinrig_model::{AnalysisSettings, PressTiming};
+
+use crate::result::ClockFit;
+
+/// Longest idle time looked at before a press, µs.
+const IDLE_US: u64 = 500_000;
+/// Shorter idle times give no rate, µs.
+const LEAST_IDLE_US: u64 = 20_000;
+
+/// The window of one press in camera time. All intervals include their start and exclude their end, µs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Window {
+    /// Row of the press in the plan.
+    pub row: usize,
+    /// `window_before_ms` before the contact.
+    pub start_us: u64,
+    /// `window_after_ms` after the release.
+    pub end_us: u64,
+    /// The idle time before it: at most 0.5 s, up to the end of any earlier window. Equal to `start_us` when
+    /// less than 20 ms is free.
+    pub idle_start_us: u64,
+}
+
+impl Window {
+    /// Length of the window, s.
+    #[must_use]
+    pub fn length_s(&self) -> f64 {
+        (self.end_us - self.start_us) as f64 * 1e-6
+    }
+
+    /// Length of the idle time, s.
+    #[must_use]
+    pub fn idle_s(&self) -> f64 {
+        (self.start_us - self.idle_start_us) as f64 * 1e-6
+    }
+
+    /// True when bytes were lost within the window.
+    #[must_use]
+    pub fn overlaps(&self, gaps: &[(u64, u64)]) -> bool {
+        gaps.iter()
+            .any(|(from, to)| *from < self.end_us && *to >= self.start_us)
+    }
+}
+
+/// The windows of all presses with known timing, in order of their start.
+///
+/// Windows of a sane session do not overlap. If they do, each keeps all of its events, so that shared events
+/// count in both presses.
+#[must_use]
+pub fn windows(
+    timings: impl Iterator<Item = (usize, PressTiming)>,
+    clock: &ClockFit,
+    settings: &AnalysisSettings,
+) -> Vec<Window> {
+    // Before the camera's zero there are no events, so a window may begin there.
+    let tick = |us: f64| us.ceil().max(0.0) as u64;
+    let mut windows: Vec<Window> = timings
+        .map(|(row, timing)| {
+            let contact = clock.camera_us_of_host(timing.contact);
+            let release = clock.camera_us_of_host(timing.release);
+            let start_us = tick(contact - settings.window_before_ms * 1e3);
+            let end_us = tick(release + settings.window_after_ms * 1e3).max(start_us);
+            Window {
+                row,
+                start_us,
+                end_us,
+                idle_start_us: start_us,
+            }
+        })
+        .collect();
+    windows.sort_by_key(|w| (w.start_us, w.row));
+    let mut earlier_end = 0;
+    for window in &mut windows {
+        let from = window.start_us.saturating_sub(IDLE_US).max(earlier_end);
+        if from + LEAST_IDLE_US <= window.start_us {
+            window.idle_start_us = from;
+        }
+        earlier_end = earlier_end.max(window.end_us);
+    }
+    windows
+}
+
+#[cfg(test)]
+mod tests {
+    use skinrig_model::{HostDuration, HostTime};
+
+    use super::*;
+    use crate::result::ClockMethod;
+
+    fn timing(contact_s: f64, release_s: f64) -> PressTiming {
+        let t = HostTime::from_secs_f64;
+        PressTiming {
+            approach: t(contact_s) - HostDuration::from_millis(100),
+            contact: t(contact_s),
+            at_depth: t(contact_s) + HostDuration::from_millis(100),
+            retract: t(release_s) - HostDuration::from_millis(100),
+            release: t(release_s),
+            clear: t(release_s) + HostDuration::from_millis(100),
+        }
+    }
+
+    fn clock(offset_us: f64) -> ClockFit {
+        ClockFit {
+            method: ClockMethod::TriggerMarks,
+            offset_us,
+            drift_ppm: 0.0,
+            drift_se_ppm: 0.0,
+            residual_rms_us: 0.0,
+            residual_max_us: 0.0,
+            n: 3,
+            rejected: 0,
+        }
+    }
+
+    #[test]
+    fn windows_follow_measured_times_and_leave_idle_time_alone() {
+        let settings = AnalysisSettings::default();
+        let presses = [
+            (0, timing(1.0, 1.5)),
+            (1, timing(1.7, 2.2)),
+            (2, timing(2.31, 2.8)),
+        ];
+        let w = windows(presses.into_iter(), &clock(250.0), &settings);
+        assert_eq!(
+            (w[0].start_us, w[0].end_us, w[0].idle_start_us),
+            (950_250, 1_550_250, 450_250)
+        );
+        assert_eq!((w[1].start_us, w[1].idle_start_us), (1_650_250, 1_550_250));
+        // 10 ms are free before the third: too little for a rate.
+        assert_eq!((w[2].start_us, w[2].idle_start_us), (2_260_250, 2_260_250));
+    }
+
+    #[test]
+    fn a_window_before_the_camera_clock_is_empty() {
+        let settings = AnalysisSettings::default();
+        let w = windows([(0, timing(1.0, 1.5))].into_iter(), &clock(-9e6), &settings);
+        assert_eq!((w[0].start_us, w[0].end_us, w[0].idle_start_us), (0, 0, 0));
+    }
+
+    #[test]
+    fn gaps_touch_the_windows_that_they_reach_into() {
+        let settings = AnalysisSettings::default();
+        let w = windows([(0, timing(1.0, 1.5))].into_iter(), &clock(0.0), &settings)[0];
+        for (gap, touches) in [
+            ((900_000, 949_999), false),
+            ((900_000, 950_000), true),
+            ((1_000_000, 1_000_001), true),
+            ((1_549_999, 1_600_000), true),
+            ((1_550_000, 1_600_000), false),
+            ((0, 9_000_000), true),
+        ] {
+            assert_eq!(w.overlaps(&[gap]), touches, "{gap:?}");
+        }
+    }
+}

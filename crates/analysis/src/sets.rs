@@ -1,0 +1,108 @@
+//! Presses that calibrate and presses that score, kept apart by type.
+//!
+//! A [`CalibrationSet`] can only be built from presses whose role is to calibrate, a [`ScoreSet`] only from
+//! those whose role is to score. The calibration takes the one and the metrics the other, so that no press can
+//! ever do both.
+
+use skinrig_model::{Point2, PressId, PressRole, PressVerdict};
+
+use crate::result::PressResult;
+
+/// What the calibration needs of one press.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sight {
+    /// Which press.
+    pub press: PressId,
+    /// Centroid column in each camera, px.
+    pub columns: [f64; 2],
+    /// The measured position.
+    pub truth: Point2,
+}
+
+/// Presses that calibrate: seen by both cameras, truth measured, not missed, invalid or excluded.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct CalibrationSet(Vec<Sight>);
+
+impl CalibrationSet {
+    /// Takes the usable calibrating presses out of the table; where the rays of an uncalibrated geometry meet
+    /// plays no part.
+    #[must_use]
+    pub fn from_presses(presses: &[PressResult]) -> Self {
+        let usable = presses
+            .iter()
+            .filter(|p| p.role == PressRole::Calibrate && is_valid(p));
+        Self(
+            usable
+                .filter_map(|p| {
+                    let column = |k: usize| p.views[k].and_then(|v| v.centroid_u);
+                    Some(Sight {
+                        press: p.press,
+                        columns: [column(0)?, column(1)?],
+                        truth: p.truth?,
+                    })
+                })
+                .filter(|s| s.columns.iter().all(|u| u.is_finite()))
+                .collect(),
+        )
+    }
+
+    /// The presses, in plan order.
+    #[must_use]
+    pub fn sights(&self) -> &[Sight] {
+        &self.0
+    }
+}
+
+/// One attempted press that scores.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Scored {
+    /// Which press.
+    pub press: PressId,
+    /// Location, from 0.
+    pub location: u32,
+    /// Planned depth, mm.
+    pub depth_mm: f64,
+    /// Neither invalid nor excluded.
+    pub valid: bool,
+    /// Estimate and error vector (estimate - truth, mm), when both exist.
+    pub found: Option<(Point2, [f64; 2])>,
+}
+
+/// Presses that score and were attempted, whatever became of them.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct ScoreSet(Vec<Scored>);
+
+impl ScoreSet {
+    /// Takes the attempted scored presses out of the table.
+    #[must_use]
+    pub fn from_presses(presses: &[PressResult]) -> Self {
+        let missed = PressVerdict::Missed(String::new());
+        let attempted = presses
+            .iter()
+            .filter(|p| p.role == PressRole::Score && p.verdict != missed.name());
+        Self(
+            attempted
+                .map(|p| Scored {
+                    press: p.press,
+                    location: p.location,
+                    depth_mm: p.depth_mm,
+                    valid: is_valid(p),
+                    found: p
+                        .estimate()
+                        .zip(p.error_mm())
+                        .map(|(at, (dx, dy))| (at, [dx, dy])),
+                })
+                .collect(),
+        )
+    }
+
+    /// The presses, in plan order.
+    #[must_use]
+    pub fn presses(&self) -> &[Scored] {
+        &self.0
+    }
+}
+
+fn is_valid(press: &PressResult) -> bool {
+    press.verdict == PressVerdict::Valid.name()
+}

@@ -1,0 +1,91 @@
+//! Where two viewing rays meet: closed form, typed outcomes.
+
+use skinrig_model::{Point2, SkinOutline, StereoGeometry};
+
+use crate::result::LocationOutcome;
+
+/// Rays whose angle has a smaller sine than this are parallel. At the skin's size the intersection would lie
+/// tens of thousands of kilometres away or be pure rounding.
+pub const PARALLEL_SINE: f64 = 1e-9;
+
+/// The intersection of the two lines along the rays, whatever it is worth.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Intersection {
+    /// Where, mm. Infinite or NaN for parallel lines.
+    pub at: Point2,
+    /// Distance from each camera along its ray, mm; negative behind the camera.
+    pub range_mm: [f64; 2],
+    /// Sine of the angle from ray 1 to ray 2 (counter-clockwise positive).
+    pub sine: f64,
+}
+
+/// Intersects the rays at these viewing angles (degrees, clockwise from each camera's axis, skew included).
+///
+/// With unit directions d1, d2 and w = p2 - p1: `s = d1 x d2`, `r1 = (w x d2) / s`, `r2 = (w x d1) / s`,
+/// `X = p1 + r1 d1` (elementary; the published method solves the same equations iteratively). X is
+/// evaluated from the nearer camera, which keeps the rounding error proportional to the shorter range.
+#[must_use]
+pub fn intersect(geometry: &StereoGeometry, angles_deg: [f64; 2]) -> Intersection {
+    let [one, two] = geometry.cameras;
+    let d1 = one.direction(angles_deg[0]);
+    let d2 = two.direction(angles_deg[1]);
+    let w = [
+        two.position.x_mm - one.position.x_mm,
+        two.position.y_mm - one.position.y_mm,
+    ];
+    let sine = cross(d1, d2);
+    let (r1, r2) = (cross(w, d2) / sine, cross(w, d1) / sine);
+    let (from, d, r) = if r1.abs() <= r2.abs() {
+        (one.position, d1, r1)
+    } else {
+        (two.position, d2, r2)
+    };
+    Intersection {
+        at: Point2::new(from.x_mm + r * d[0], from.y_mm + r * d[1]),
+        range_mm: [r1, r2],
+        sine,
+    }
+}
+
+/// Locates a touch from the two viewing angles; NaN is a missing view.
+#[must_use]
+pub fn locate_angles(
+    geometry: &StereoGeometry,
+    outline: &SkinOutline,
+    angles_deg: [f64; 2],
+) -> LocationOutcome {
+    if !angles_deg.iter().all(|a| a.is_finite()) {
+        return LocationOutcome::Missing;
+    }
+    let Intersection { at, range_mm, sine } = intersect(geometry, angles_deg);
+    if !sine.is_finite() {
+        LocationOutcome::Missing // a camera without a direction: it sits on the point it aims at
+    } else if sine.abs() < PARALLEL_SINE {
+        LocationOutcome::Parallel { sine }
+    } else if range_mm.iter().any(|r| *r < 0.0) {
+        LocationOutcome::Behind { sine }
+    } else if outline.contains(at) {
+        LocationOutcome::Located { at, sine }
+    } else {
+        LocationOutcome::Outside { at, sine }
+    }
+}
+
+/// Locates a touch from the two centroid columns (px); `None` or NaN is a missing view.
+#[must_use]
+pub fn locate(
+    geometry: &StereoGeometry,
+    outline: &SkinOutline,
+    columns: [Option<f64>; 2],
+) -> LocationOutcome {
+    let [Some(u1), Some(u2)] = columns else {
+        return LocationOutcome::Missing;
+    };
+    let [one, two] = &geometry.cameras;
+    let angles = [one.angle_of_column_deg(u1), two.angle_of_column_deg(u2)];
+    locate_angles(geometry, outline, angles)
+}
+
+fn cross(a: [f64; 2], b: [f64; 2]) -> f64 {
+    a[0] * b[1] - a[1] * b[0]
+}

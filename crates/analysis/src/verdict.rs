@@ -1,0 +1,117 @@
+//! What counts: the verdict on each press, from its journal entry, its data and the rules in the settings.
+//!
+//! Every planned press gets exactly one verdict:
+//! - *missed*: never attempted, from the journal;
+//! - *invalid*: what happened is not what was planned (journal), or the data cannot say: bytes lost in the window,
+//!   a camera without clock, no measured times or position;
+//! - *excluded*: done and recorded, but left out by a rule that names itself. A press that the cameras did not
+//!   see, or whose rays do not meet on the skin, is a failure of the skin: excluded from the error metrics, and
+//!   still in the denominator of the located rate;
+//! - *valid*: everything else.
+//!
+//! Sync presses are judged by the journal and their data only; no rule excludes them.
+
+use skinrig_model::{AnalysisSettings, CameraId, PressOutcome, PressRole, PressVerdict};
+
+use crate::result::{LocationOutcome, PressCounts, PressResult, PressView};
+
+/// The verdict before any location is known.
+#[must_use]
+pub fn from_data(
+    role: PressRole,
+    outcome: Option<&PressOutcome>,
+    has_clock: [bool; 2],
+    data_lost: [bool; 2],
+    views: &[Option<PressView>; 2],
+    settings: &AnalysisSettings,
+) -> PressVerdict {
+    let Some(outcome) = outcome else {
+        return PressVerdict::Missed("never attempted".to_owned());
+    };
+    if outcome.verdict != PressVerdict::Valid {
+        return outcome.verdict.clone();
+    }
+    let invalid = |reason: &str| PressVerdict::Invalid(reason.to_owned());
+    if outcome.timing.is_none() {
+        return invalid("no measured times");
+    }
+    if outcome
+        .measured_at
+        .is_none_or(|p| !p.x_mm.is_finite() || !p.y_mm.is_finite())
+    {
+        return invalid("no measured position");
+    }
+    for camera in CameraId::ALL {
+        if !has_clock[camera.index()] {
+            return PressVerdict::Invalid(format!("no clock alignment ({camera})"));
+        }
+        if data_lost[camera.index()] {
+            return PressVerdict::Invalid(format!("data lost in window ({camera})"));
+        }
+    }
+    if role == PressRole::Sync {
+        return PressVerdict::Valid;
+    }
+    for camera in CameraId::ALL {
+        let view = views[camera.index()];
+        let Some(view) = view.filter(|v| v.centroid_u.is_some()) else {
+            return PressVerdict::Excluded(format!("no cluster ({camera})"));
+        };
+        if view.cluster_events < settings.min_cluster_events {
+            return PressVerdict::Excluded(format!(
+                "too few cluster events: {} < {} ({camera})",
+                view.cluster_events, settings.min_cluster_events
+            ));
+        }
+    }
+    PressVerdict::Valid
+}
+
+/// The rule that leaves a valid press out because of where its rays meet, if any.
+#[must_use]
+pub fn location_rule(outcome: &LocationOutcome, settings: &AnalysisSettings) -> Option<String> {
+    match *outcome {
+        LocationOutcome::Missing => Some("no view".to_owned()),
+        LocationOutcome::Parallel { .. } => Some("parallel rays".to_owned()),
+        LocationOutcome::Behind { .. } => Some("behind camera".to_owned()),
+        LocationOutcome::Located { sine, .. } | LocationOutcome::Outside { sine, .. }
+            if sine.abs() < settings.min_ray_sine =>
+        {
+            Some(format!(
+                "nearly parallel rays: sine {:.4} < {}",
+                sine.abs(),
+                settings.min_ray_sine
+            ))
+        }
+        LocationOutcome::Outside { .. } if settings.exclude_outside => {
+            Some("outside the skin outline".to_owned())
+        }
+        LocationOutcome::Located { .. } | LocationOutcome::Outside { .. } => None,
+    }
+}
+
+/// Writes a verdict into a row.
+pub fn put(row: &mut PressResult, verdict: &PressVerdict) {
+    row.verdict = verdict.name().to_owned();
+    row.reason = verdict.reason().map(str::to_owned);
+}
+
+/// Counts the verdicts.
+#[must_use]
+pub fn count(presses: &[PressResult]) -> PressCounts {
+    let mut counts = PressCounts::default();
+    for press in presses {
+        if press.role == PressRole::Sync {
+            counts.sync += 1;
+            continue;
+        }
+        counts.planned += 1;
+        match press.verdict.as_str() {
+            "valid" => counts.valid += 1,
+            "missed" => counts.missed += 1,
+            "invalid" => counts.invalid += 1,
+            _ => counts.excluded += 1,
+        }
+    }
+    counts
+}
