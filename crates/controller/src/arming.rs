@@ -7,7 +7,8 @@ use skinrig_protocol::plan::Step;
 use crate::core::Core;
 use crate::error::{ControllerError, Halt};
 use crate::preflight;
-use crate::states::Event;
+use crate::states::{Action, Event, State};
+use crate::steps::internal;
 
 impl Core<'_> {
     /// Brings every device from unknown to ready. Nothing moves.
@@ -42,8 +43,13 @@ impl Core<'_> {
         }
         self.indenter.arm()?;
         self.await_pose()?;
-        self.machine.fire(Event::ArmingDone);
-        Ok(())
+        if self.machine.state() == State::Retracting {
+            return Err(Halt::Stopped); // the operator did not want it to begin
+        }
+        match self.machine.fire(Event::ArmingDone) {
+            Action::Refuse => Err(internal("arming", self.machine.state())),
+            _ => Ok(()),
+        }
     }
 
     fn configure_camera(

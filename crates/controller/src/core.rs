@@ -119,6 +119,10 @@ impl<'a> Core<'a> {
         target: Point3<Skin>,
         speed_mm_s: f64,
     ) -> Result<HostTime, ControllerError> {
+        // A slow consumer of records may have held up the loop: look again before moving.
+        if self.indenter.check_fresh(self.clock.now()).is_err() {
+            self.observe_poses()?;
+        }
         self.indenter
             .command(target, speed_mm_s, self.clock.now())?;
         let t = self.clock.now();
@@ -164,6 +168,12 @@ impl<'a> Core<'a> {
         let mut fresh = std::mem::take(&mut self.fresh);
         fresh.clear();
         let mut answer = self.indenter.poll(&mut fresh);
+        if answer.is_ok() && self.indenter.is_armed() && self.indenter.position().is_some() {
+            answer = self
+                .indenter
+                .check_fresh(self.clock.now())
+                .map_err(Into::into);
+        }
         for sample in &fresh {
             if let Some(tracker) = self.open.as_mut().and_then(|o| o.tracker.as_mut()) {
                 tracker.feed(sample);
@@ -180,11 +190,7 @@ impl<'a> Core<'a> {
         if self.poses.len() >= self.settings.pose_block {
             self.emit_poses()?;
         }
-        answer?;
-        if self.indenter.is_armed() && self.indenter.position().is_some() {
-            self.indenter.check_fresh(self.now())?;
-        }
-        Ok(())
+        answer
     }
 
     fn check_limits(&self, sample: &PoseSample) -> Result<(), ControllerError> {

@@ -9,8 +9,8 @@ use crate::error::{ControllerError, Halt};
 use crate::run::RunReport;
 use crate::states::{Event, State};
 
-/// How often a robot that does not confirm is told to disarm.
-const DISARM_TRIES: u32 = 3;
+/// How often a device that does not answer is told to rise, to disarm, to stop.
+const TRIES: u32 = 3;
 
 impl Core<'_> {
     /// Runs a part of the experiment; a panic in it becomes a fault.
@@ -71,8 +71,14 @@ impl Core<'_> {
         };
 
         let (retracted, disarmed) = self.make_safe();
-        if !disarmed {
-            let warning = "the robot did not confirm that it is disarmed: switch it off by hand";
+        let warning = match (retracted, disarmed) {
+            (true, true) => None,
+            (false, true) => Some("the tip was not seen at clearance height: look where it is"),
+            (_, false) => {
+                Some("the robot did not confirm that it is disarmed: switch it off by hand")
+            }
+        };
+        if let Some(warning) = warning {
             end = RunEnd::Faulted(match end {
                 RunEnd::Completed => warning.to_owned(),
                 RunEnd::Stopped(r) | RunEnd::Faulted(r) => format!("{r}; {warning}"),
@@ -130,16 +136,15 @@ impl Core<'_> {
     fn make_safe(&mut self) -> (bool, bool) {
         let mut retracted = true;
         if self.indenter.is_armed() {
-            retracted = self.attempt("retract", Self::lift);
+            retracted = (0..TRIES).any(|_| self.attempt("retract", Self::lift));
             self.attempt("hold", |core| core.indenter.hold());
         }
         self.machine.fire(Event::Cleared);
-        let disarmed =
-            (0..DISARM_TRIES).any(|_| self.attempt("disarm", |core| core.indenter.disarm()));
+        let disarmed = (0..TRIES).any(|_| self.attempt("disarm", |core| core.indenter.disarm()));
         // What the robot and the cameras delivered until now belongs to the session.
         self.attempt("last samples", Self::observe);
         for camera in CameraId::ALL {
-            self.attempt("stop", |core| core.stop_camera(camera));
+            let _ = (0..TRIES).any(|_| self.attempt("stop", |core| core.stop_camera(camera)));
         }
         (retracted, disarmed)
     }

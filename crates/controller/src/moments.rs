@@ -318,3 +318,92 @@ fn crossing(a: &PoseSample, b: &PoseSample) -> HostTime {
     let share = za / (za - zb);
     a.t + HostDuration((share * (b.t - a.t).0 as f64).round() as i64)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LIMITS: RunLimits = RunLimits {
+        workspace_min_mm: [-50.0; 3],
+        workspace_max_mm: [50.0; 3],
+        clearance_mm: 1.0,
+        max_depth_mm: 3.0,
+        max_speed_mm_s: 100.0,
+        max_force_n: 8.0,
+        position_tolerance_mm: 0.1,
+        settle_time: HostDuration::from_millis(2),
+    };
+
+    /// Heights, one per millisecond from 1 ms on; the set point is the tip.
+    fn samples(heights: &[f64]) -> impl Iterator<Item = PoseSample> {
+        heights.iter().enumerate().map(|(i, z_mm)| PoseSample {
+            t: HostTime((i as i64 + 1) * 1_000_000),
+            commanded: Point3::new(0.0, 0.0, *z_mm),
+            measured: Point3::new(0.0, 0.0, *z_mm),
+            force_n: f64::NAN,
+        })
+    }
+
+    #[test]
+    fn settling_starts_again_when_the_tip_leaves() {
+        let target = Point3::new(0.0, 0.0, 0.0);
+        let settled = |after: i64, heights: &[f64]| {
+            let mut settling = Settling::new(target, &LIMITS, HostTime(after));
+            samples(heights).for_each(|s| settling.feed(&s));
+            settling.settled()
+        };
+        assert_eq!(settled(0, &[0.0, 0.05, 0.2, 0.0, 0.1]), None);
+        let found = settled(0, &[0.0, 0.05, 0.2, 0.0, 0.1, -0.1, 0.3]);
+        assert_eq!(found, Some(HostTime(6_000_000)));
+        // Samples up to the command do not count.
+        assert_eq!(settled(1_000_000, &[0.0, 0.0, 0.0]), None);
+        assert_eq!(settled(0, &[0.0, 0.0, 0.0]), Some(HostTime(3_000_000)));
+    }
+
+    #[test]
+    fn moments_are_interpolated_and_the_hold_is_averaged() {
+        // Down at 2 mm per ms, settled at -2 after 6 ms, held to 8 ms, up again.
+        let heights = [
+            1.0, 0.5, -1.5, -2.0, -2.02, -1.98, -2.04, -2.0, -0.6, 0.2, 1.0, 1.0, 1.0,
+        ];
+        let at = Point2::new(0.0, 0.0);
+        let mut tracker = PressTracker::new(at, 2.0, &LIMITS, HostTime(0), None);
+        for s in samples(&heights) {
+            if s.t == HostTime(4_000_000) {
+                tracker.indent_from(HostTime(3_000_000));
+            }
+            if s.t == HostTime(9_000_000) {
+                tracker.rise_from(HostTime(8_000_000));
+            }
+            tracker.feed(&s);
+        }
+        let us = |t: HostTime| t.0 / 1000;
+        let t = tracker.timing().map(|t| {
+            [
+                t.approach, t.contact, t.at_depth, t.retract, t.release, t.clear,
+            ]
+            .map(us)
+        });
+        assert_eq!(t, Ok([2000, 2250, 6000, 9000, 9750, 13000]));
+        let depth = tracker.mean().map(|m| -m.z_mm).unwrap_or_default();
+        assert!((depth - (1.98 + 2.04 + 2.0) / 3.0).abs() < 1e-12, "{depth}");
+        assert_eq!(tracker.check_hold(), Ok(()));
+        assert_eq!(tracker.peak_force_n(), None);
+    }
+
+    #[test]
+    fn what_was_not_measured_is_named() {
+        let at = Point2::new(0.0, 0.0);
+        let mut tracker = PressTracker::new(at, 2.0, &LIMITS, HostTime(0), None);
+        samples(&[1.0, 0.9, 0.5]).for_each(|s| tracker.feed(&s));
+        let found = tracker.timing();
+        assert_eq!(
+            found,
+            Err("expected a measured contact, found none".to_owned())
+        );
+        assert_eq!(
+            tracker.check_hold(),
+            Err("expected samples during the hold, found none".to_owned())
+        );
+    }
+}

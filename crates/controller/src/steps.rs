@@ -124,6 +124,7 @@ impl Core<'_> {
     }
 }
 
-fn internal(what: &str, state: State) -> Halt {
+/// The table has no such transition.
+pub(crate) fn internal(what: &str, state: State) -> Halt {
     ControllerError::Internal(format!("{what}: not possible while {state:?}")).into()
 }

@@ -1,0 +1,144 @@
+//! Arbitrary commands: nothing forbidden reaches the robot, and everything allowed does.
+
+use proptest::prelude::*;
+use skinrig_controller::{ControllerError, GuardError, GuardedIndenter};
+use skinrig_model::{HostDuration, HostTime, Point3};
+
+use crate::mock::*;
+
+#[derive(Debug, Clone)]
+enum Act {
+    Command([f64; 3], f64),
+    /// Rig time goes on, ms, and the pose stream is read.
+    Look(i64),
+    /// Rig time goes on, ms, unseen.
+    Blind(i64),
+    Hold,
+    Arm,
+    Disarm,
+}
+
+fn number(low: f64, high: f64) -> impl Strategy<Value = f64> {
+    prop_oneof![
+        6 => low..high,
+        2 => prop::sample::select(vec![0.0, 5.0, 4.9, -2.0, -3.0, -3.001, 10.0]),
+        1 => prop::sample::select(vec![f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e300, -1e300]),
+    ]
+}
+
+fn act() -> impl Strategy<Value = Act> {
+    prop_oneof![
+        6 => (number(-60.0, 80.0), number(-60.0, 60.0), number(-5.0, 45.0), number(-20.0, 130.0))
+            .prop_map(|(x, y, z, v)| Act::Command([x, y, z], v)),
+        // Straight up and down, as a press does.
+        4 => (number(-4.0, 8.0), 1.0..100.0).prop_map(|(z, v)| Act::Command([f64::MAX, f64::MAX, z], v)),
+        6 => (1i64..400).prop_map(Act::Look),
+        1 => (1i64..300).prop_map(Act::Blind),
+        1 => Just(Act::Hold),
+        2 => Just(Act::Arm),
+        1 => Just(Act::Disarm),
+    ]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 400, ..ProptestConfig::default() })]
+
+    #[test]
+    fn nothing_forbidden_reaches_the_robot(acts in prop::collection::vec(act(), 1..80)) {
+        let world = World::shared(Faults::default(), [0.0, 0.0, 10.0]);
+        let stale_after = HostDuration::from_millis(100);
+        let mut guard = GuardedIndenter::new(
+            Box::new(MockIndenter(world.clone())), robot_from_skin(), LIMITS, stale_after,
+        );
+        let mut poses = Vec::new();
+        guard.arm().map_err(|e| TestCaseError::fail(e.to_string()))?;
+        for act in acts {
+            match act {
+                Act::Command(mut target, speed) => {
+                    let (now, tip, heard) = {
+                        let w = lock(&world);
+                        (w.t, w.tip, w.commands.len())
+                    };
+                    let last = guard.position();
+                    if target[0] == f64::MAX {
+                        let place = last.map_or(tip, |p| p.measured.to_array());
+                        (target[0], target[1]) = (place[0], place[1]);
+                    }
+                    let [x, y, z] = target;
+                    let answer = guard.command(Point3::new(x, y, z), speed, HostTime(now));
+                    let w = lock(&world);
+                    let fresh = last.is_some_and(|p| now - p.t.0 <= 100 * MS);
+                    let sideways = last.is_none_or(|p| {
+                        let [a, b, c] = p.measured.to_array();
+                        (x - a).hypot(y - b) > 0.05 && z.min(c) < 4.95
+                    });
+                    let allowed = [x, y, z, speed].iter().all(|v| v.is_finite())
+                        && speed > 0.0 && speed <= 100.0
+                        && (-40.0..=60.0).contains(&x) && (-50.0..=55.0).contains(&y)
+                        && (-3.0..=40.0).contains(&z)
+                        && fresh && guard.is_armed() && !sideways;
+                    prop_assert_eq!(answer.is_ok(), allowed, "{:?} at {} -> {:?}", target, speed, answer);
+                    prop_assert_eq!(w.commands.len() - heard, usize::from(allowed));
+                }
+                Act::Look(ms) => {
+                    lock(&world).t += ms * MS;
+                    prop_assert!(guard.poll(&mut poses).is_ok());
+                }
+                Act::Blind(ms) => lock(&world).t += ms * MS,
+                Act::Hold => prop_assert!(guard.hold().is_ok()),
+                Act::Arm => prop_assert!(guard.arm().is_ok()),
+                Act::Disarm => prop_assert!(guard.disarm().is_ok()),
+            }
+        }
+        prop_assert!(poses.is_sorted_by(|a, b| a.t < b.t));
+    }
+}
+
+#[test]
+fn refusals_say_what_was_expected() {
+    let world = World::shared(Faults::default(), [0.0, 0.0, 10.0]);
+    let stale_after = HostDuration::from_millis(100);
+    let mut guard = GuardedIndenter::new(
+        Box::new(MockIndenter(world.clone())),
+        robot_from_skin(),
+        LIMITS,
+        stale_after,
+    );
+    let mut poses = Vec::new();
+    assert!(guard.arm().is_ok());
+    lock(&world).t = 50 * MS;
+    assert!(guard.poll(&mut poses).is_ok() && poses.len() == 50);
+    let mut ask = |x, y, z, speed, ms: i64| {
+        let answer = guard.command(Point3::new(x, y, z), speed, HostTime(ms * MS));
+        match answer {
+            Err(ControllerError::Guard(e)) => e.to_string(),
+            other => format!("{other:?}"),
+        }
+    };
+    let said = [
+        ask(0.0, 0.0, -2.0, 200.0, 60),
+        ask(0.0, 99.0, 10.0, 20.0, 60),
+        ask(1.0, 0.0, 2.0, 20.0, 60),
+        ask(0.0, 0.0, 6.0, 20.0, 200),
+        ask(f64::NAN, 0.0, 6.0, 20.0, 60),
+    ];
+    assert_eq!(
+        said,
+        [
+            "expected a speed above 0 and at most 100 mm/s, found 200 mm/s",
+            "expected a target with y from -50 to 55 mm, found 99 mm",
+            "expected lateral motion only at 5 mm or higher, found 1.000 mm sideways at 2.000 mm",
+            "expected a pose sample no older than 0.100000 s, found 0.150000 s",
+            "expected finite coordinates and speed, found [NaN, 0.0, 6.0] at 20 mm/s",
+        ]
+    );
+    let deep = GuardError::Depth {
+        limit_mm: 3.0,
+        found_mm: 3.5,
+    };
+    assert_eq!(
+        deep.to_string(),
+        "expected a depth of at most 3 mm, found 3.5 mm"
+    );
+    assert!(lock(&world).commands.is_empty());
+}

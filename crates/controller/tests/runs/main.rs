@@ -1,0 +1,6 @@
+//! The controller on a scripted rig.
+
+mod course;
+mod guard;
+mod mock;
+mod progress;
