@@ -1,0 +1,120 @@
+//! Events that no dent causes: leakage, shot noise, hot pixels.
+
+use skinrig_model::{Polarity, SENSOR_HEIGHT, SENSOR_WIDTH};
+
+use crate::random::{Purpose, Stream};
+use crate::scene::{GRID_NS, PixelEvent, SceneConfig};
+
+use super::config::OpticalConfig;
+use super::light::Column;
+use super::pixels::Pixels;
+
+/// All noise of one camera as one Poisson process.
+#[derive(Debug, Clone)]
+pub(super) struct Noise {
+    random: Stream,
+    leak_total_hz: f64,
+    shot_total_hz: f64,
+    hot: Vec<(u16, u16, f64)>,
+    total_hz: f64,
+    /// Brightness of each column and row of the undisturbed picture; their product is 1 at its brightest.
+    column_light: Vec<f64>,
+    row_light: Vec<f64>,
+    /// When the next noise event comes, ns after the first tip sample.
+    next_ns: f64,
+}
+
+/// Rate of shot-noise events at brightness `q` (1 = the picture's brightest) as a part of the highest rate. A dark pixel is too slow to
+/// show its noise, a bright one has little of it.
+fn shot_weight(q: f64) -> f64 {
+    /// Brightness with the most noise.
+    const WORST: f64 = 0.3;
+    let r = q / WORST;
+    4.0 * r / ((1.0 + r) * (1.0 + r))
+}
+
+/// A whole number below `n`.
+fn below(random: &mut Stream, n: u16) -> u16 {
+    (((random.bits() >> 32) * u64::from(n)) >> 32) as u16
+}
+
+impl Noise {
+    pub(super) fn new(scene: &SceneConfig, config: &OpticalConfig, columns: &[Column]) -> Self {
+        let mut random = Stream::new(scene.seed, Purpose::Pixels, 2);
+        let brightest = columns.iter().map(|c| c.total).fold(f64::MIN_POSITIVE, f64::max);
+        let column_light: Vec<f64> = columns.iter().map(|c| c.total / brightest).collect();
+        let (first, last) = (f64::from(scene.skin_rows.0), f64::from(scene.skin_rows.1));
+        let sigma = config.band_sigma_rows * (last - first + 1.0).max(1.0);
+        let row_light: Vec<f64> = (0..SENSOR_HEIGHT)
+            .map(|v| {
+                let z = (f64::from(v) - 0.5 * (first + last)) / sigma;
+                libm::exp(-0.5 * z * z)
+            })
+            .collect();
+        let weights: f64 = row_light.iter().map(|r| column_light.iter().map(|c| shot_weight(r * c)).sum::<f64>()).sum();
+        let pixels = f64::from(SENSOR_WIDTH) * f64::from(SENSOR_HEIGHT);
+        let (leak_total_hz, shot_total_hz) = (config.leak_hz * pixels, config.shot_hz * weights);
+        let mut rate = config.hot_hz;
+        let hot: Vec<_> = (0..config.hot_pixels)
+            .map(|_| {
+                let pixel = (below(&mut random, SENSOR_WIDTH), below(&mut random, SENSOR_HEIGHT), rate);
+                rate *= config.hot_ratio;
+                pixel
+            })
+            .collect();
+        let total_hz = leak_total_hz + shot_total_hz + hot.iter().map(|h| h.2).sum::<f64>();
+        let mut noise = Self { random, leak_total_hz, shot_total_hz, hot, total_hz, column_light, row_light, next_ns: 0.0 };
+        noise.wait();
+        noise
+    }
+
+    /// Expected events per second before refractory times, all pixels together.
+    pub(super) const fn total_hz(&self) -> f64 {
+        self.total_hz
+    }
+
+    fn wait(&mut self) {
+        self.next_ns = if self.total_hz > 0.0 {
+            self.next_ns + self.random.exponential() / self.total_hz * 1e9
+        } else {
+            f64::INFINITY
+        };
+    }
+
+    /// The noise of the grid step that begins at `t_ns`, `since_start_ns` after the first one.
+    pub(super) fn step(&mut self, t_ns: i64, since_start_ns: i64, pixels: &mut Pixels, out: &mut Vec<PixelEvent>) {
+        let start = since_start_ns as f64;
+        while self.next_ns < start + GRID_NS as f64 {
+            let us = (((self.next_ns - start) / 1e3) as i64).clamp(0, GRID_NS / 1000 - 1);
+            let (x, y, polarity) = self.draw();
+            pixels.strike(PixelEvent { t_ns: t_ns + us * 1000, x, y, polarity }, out);
+            self.wait();
+        }
+    }
+
+    fn draw(&mut self) -> (u16, u16, Polarity) {
+        let mut pick = self.random.unit() * self.total_hz;
+        if pick < self.leak_total_hz {
+            return (below(&mut self.random, SENSOR_WIDTH), below(&mut self.random, SENSOR_HEIGHT), Polarity::On);
+        }
+        pick -= self.leak_total_hz;
+        let polarity = Polarity::from_bit(self.random.unit() < 0.5);
+        if pick >= self.shot_total_hz {
+            pick -= self.shot_total_hz;
+            for &(x, y, rate) in &self.hot {
+                if pick < rate {
+                    return (x, y, polarity);
+                }
+                pick -= rate;
+            }
+        }
+        // Shot noise (and the last bit of rounding of the hot pixels): try pixels until one accepts.
+        loop {
+            let (x, y) = (below(&mut self.random, SENSOR_WIDTH), below(&mut self.random, SENSOR_HEIGHT));
+            let q = self.column_light[usize::from(x)] * self.row_light[usize::from(y)];
+            if self.random.unit() < shot_weight(q) {
+                return (x, y, polarity);
+            }
+        }
+    }
+}

@@ -1,0 +1,274 @@
+//! The pixels of one camera: references, thresholds, refractory time.
+//!
+//! A pixel remembers the light of its last event and speaks when the light has changed by its threshold (in log
+//! intensity) since. Light is `1 + x c` (see the `dent` module), monotone in the dent's depth: so each pixel knows the two values of
+//! `x` at which it will speak next, each column the two depths, and nothing else is looked at while the dent moves.
+
+use skinrig_model::{Polarity, SENSOR_HEIGHT, SENSOR_WIDTH};
+
+use crate::random::Stream;
+use crate::scene::{GRID_NS, PixelEvent, SceneConfig};
+
+use super::config::OpticalConfig;
+use super::dent::Dent;
+
+const NS_PER_US: i64 = 1_000;
+const STEP_US: i64 = GRID_NS / NS_PER_US;
+/// The least threshold that mismatch can leave a pixel, log intensity.
+const LEAST_THRESHOLD: f64 = 0.01;
+/// Contrasts below this count as none.
+const NO_CONTRAST: f64 = 1e-9;
+
+/// Light during one grid step: the depth goes linearly from `from_mm` to `to_mm`.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Ramp {
+    pub(super) t_ns: i64,
+    pub(super) from_mm: f64,
+    pub(super) to_mm: f64,
+}
+
+/// The lost light of one column during a step: `x` goes linearly from `from` to `to`.
+#[derive(Debug, Clone, Copy)]
+struct Loss {
+    t_ns: i64,
+    from: f64,
+    to: f64,
+}
+
+impl Loss {
+    fn at_us(&self, us: i64) -> f64 {
+        self.from + (self.to - self.from) * (us as f64 / STEP_US as f64)
+    }
+}
+
+/// One pixel that can see the skin.
+#[derive(Debug, Clone, Copy)]
+struct Pixel {
+    /// Light remembered at the last event, undisturbed = 1.
+    reference: f64,
+    /// Factor of the reference at which an ON event comes, above 1, and an OFF event, below 1.
+    on: f64,
+    off: f64,
+    /// It speaks when `x` falls below `low` or rises above `high`. Infinite while it is held.
+    low: f64,
+    high: f64,
+    /// In its refractory time; the reference is taken when that ends.
+    held: bool,
+}
+
+impl Pixel {
+    fn hold(&mut self) {
+        self.held = true;
+        (self.low, self.high) = (f64::NEG_INFINITY, f64::INFINITY);
+    }
+
+    /// Finds the next `x` to speak at, for contrast `c`.
+    fn aim(&mut self, c: f64) {
+        let (up, down) = (self.reference * self.on, self.reference * self.off);
+        if c.abs() < NO_CONTRAST {
+            // The light is 1 whatever x is: speak at once or never.
+            self.high = if up < 1.0 { -1.0 } else { f64::INFINITY };
+            self.low = if down > 1.0 { 2.0 } else { f64::NEG_INFINITY };
+        } else if c > 0.0 {
+            (self.low, self.high) = ((down - 1.0) / c, (up - 1.0) / c);
+        } else {
+            (self.low, self.high) = ((up - 1.0) / c, (down - 1.0) / c);
+        }
+    }
+}
+
+/// All pixels of a camera.
+#[derive(Debug, Clone)]
+pub(super) struct Pixels {
+    first_row: usize,
+    rows: usize,
+    /// Pixels that can see the skin, column by column.
+    skin: Vec<Pixel>,
+    /// Time of the last event of every pixel of the sensor, row by row.
+    last_ns: Vec<i64>,
+    /// (column, row) of the held pixels.
+    held: Vec<(u16, u16)>,
+    /// Depths beyond which some pixel of the column speaks.
+    low_mm: Vec<f64>,
+    high_mm: Vec<f64>,
+    refractory_ns: i64,
+    /// The dent is new: its pixels must be looked at whether it moves or not.
+    fresh: bool,
+}
+
+impl Pixels {
+    pub(super) fn new(scene: &SceneConfig, config: &OpticalConfig, random: &mut Stream) -> Self {
+        let first_row = usize::from(scene.skin_rows.0);
+        let end_row = (usize::from(scene.skin_rows.1) + 1).min(usize::from(SENSOR_HEIGHT));
+        let rows = end_row.saturating_sub(first_row);
+        let width = usize::from(SENSOR_WIDTH);
+        let skin = (0..width * rows)
+            .map(|_| {
+                let mut threshold = |mean: f64| (mean + config.threshold_sigma * random.gauss()).max(LEAST_THRESHOLD);
+                let (on, off) = (threshold(config.threshold_on), threshold(config.threshold_off));
+                // A pixel's last event, before the session, left its reference anywhere between its thresholds.
+                let reference = libm::exp(0.5 * (random.unit() * (on + off) - on));
+                Pixel {
+                    reference,
+                    on: libm::exp(on),
+                    off: libm::exp(-off),
+                    low: f64::NEG_INFINITY,
+                    high: f64::INFINITY,
+                    held: false,
+                }
+            })
+            .collect();
+        Self {
+            first_row,
+            rows,
+            skin,
+            last_ns: vec![i64::MIN; width * usize::from(SENSOR_HEIGHT)],
+            held: Vec::new(),
+            low_mm: vec![f64::NEG_INFINITY; width],
+            high_mm: vec![f64::INFINITY; width],
+            refractory_ns: i64::from(config.refractory_us) * NS_PER_US,
+            fresh: false,
+        }
+    }
+
+    /// A new dent: every pixel it reaches finds its next events.
+    pub(super) fn aim_at(&mut self, dent: &Dent) {
+        self.fresh = true;
+        for u in dent.columns.clone() {
+            for v in dent.rows.clone() {
+                let i = self.index(u, v);
+                if !self.skin[i].held {
+                    self.skin[i].aim(dent.contrast(u, v));
+                }
+            }
+            self.aim_column(dent, u);
+        }
+    }
+
+    /// Goes through one grid step with the given dent.
+    pub(super) fn step(&mut self, dent: &Dent, ramp: Ramp, out: &mut Vec<PixelEvent>) {
+        self.release(dent, ramp, out);
+        if ramp.from_mm == ramp.to_mm && !self.fresh {
+            return;
+        }
+        self.fresh = false;
+        for u in dent.columns.clone() {
+            if ramp.to_mm > self.high_mm[u] || ramp.to_mm < self.low_mm[u] {
+                let loss = loss_of(dent, ramp, u);
+                for v in dent.rows.clone() {
+                    let pixel = &self.skin[self.index(u, v)];
+                    if loss.to > pixel.high || loss.to < pixel.low {
+                        self.speak(dent, u, v, loss, 0, out);
+                    }
+                }
+                self.aim_column(dent, u);
+            }
+        }
+    }
+
+    /// An event that light did not cause. False when the pixel is in its refractory time.
+    pub(super) fn strike(&mut self, event: PixelEvent, out: &mut Vec<PixelEvent>) -> bool {
+        let (u, v) = (usize::from(event.x), usize::from(event.y));
+        let last = &mut self.last_ns[v * usize::from(SENSOR_WIDTH) + u];
+        if event.t_ns < last.saturating_add(self.refractory_ns) {
+            return false;
+        }
+        *last = event.t_ns;
+        out.push(event);
+        if (self.first_row..self.first_row + self.rows).contains(&v) {
+            let i = self.index(u, v);
+            if !self.skin[i].held {
+                self.skin[i].hold();
+                self.held.push((event.x, event.y));
+            }
+        }
+        true
+    }
+
+    fn index(&self, u: usize, v: usize) -> usize {
+        u * self.rows + v - self.first_row
+    }
+
+    /// Pixels whose refractory time ends in this step take the light of that moment as their reference.
+    fn release(&mut self, dent: &Dent, ramp: Ramp, out: &mut Vec<PixelEvent>) {
+        let mut k = 0;
+        while k < self.held.len() {
+            let (x, y) = self.held[k];
+            let (u, v) = (usize::from(x), usize::from(y));
+            let end_ns = self.last_ns[v * usize::from(SENSOR_WIDTH) + u].saturating_add(self.refractory_ns);
+            if end_ns >= ramp.t_ns + GRID_NS {
+                k += 1;
+                continue;
+            }
+            self.held.swap_remove(k);
+            let loss = loss_of(dent, ramp, u);
+            let us = ((end_ns - ramp.t_ns) / NS_PER_US).max(0);
+            let c = dent.contrast(u, v);
+            let i = self.index(u, v);
+            self.skin[i].held = false;
+            self.skin[i].reference = 1.0 + loss.at_us(us) * c;
+            self.skin[i].aim(c);
+            // Speaking may hold the pixel again, at the list's end, until a later step.
+            self.speak(dent, u, v, loss, us, out);
+            let (low, high) = (self.skin[i].low, self.skin[i].high);
+            self.low_mm[u] = self.low_mm[u].max(dent.depth_of_loss(u, low));
+            self.high_mm[u] = self.high_mm[u].min(dent.depth_of_loss(u, high));
+        }
+    }
+
+    /// Emits all events of one pixel from `from_us` to the end of the step.
+    fn speak(&mut self, dent: &Dent, u: usize, v: usize, loss: Loss, mut from_us: i64, out: &mut Vec<PixelEvent>) {
+        let c = dent.contrast(u, v);
+        let i = self.index(u, v);
+        loop {
+            let pixel = &mut self.skin[i];
+            let (bound, rising) = if loss.to > pixel.high {
+                (pixel.high, true)
+            } else if loss.to < pixel.low {
+                (pixel.low, false)
+            } else {
+                return;
+            };
+            let part = (bound - loss.from) / (loss.to - loss.from);
+            let us = if part > 0.0 { (part * STEP_US as f64) as i64 } else { 0 };
+            let us = us.clamp(from_us, STEP_US - 1);
+            let t_ns = loss.t_ns + us * NS_PER_US;
+            out.push(PixelEvent {
+                t_ns,
+                x: u as u16,
+                y: v as u16,
+                polarity: Polarity::from_bit(rising == (c >= 0.0)),
+            });
+            self.last_ns[v * usize::from(SENSOR_WIDTH) + u] = t_ns;
+            let end_us = us + self.refractory_ns / NS_PER_US;
+            if end_us >= STEP_US {
+                pixel.hold();
+                self.held.push((u as u16, v as u16));
+                return;
+            }
+            from_us = end_us;
+            pixel.reference = 1.0 + loss.at_us(end_us) * c;
+            pixel.aim(c);
+        }
+    }
+
+    fn aim_column(&mut self, dent: &Dent, u: usize) {
+        let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
+        if !dent.rows.is_empty() {
+            for pixel in &self.skin[self.index(u, dent.rows.start)..self.index(u, dent.rows.end)] {
+                low = low.max(pixel.low);
+                high = high.min(pixel.high);
+            }
+        }
+        self.low_mm[u] = dent.depth_of_loss(u, low);
+        self.high_mm[u] = dent.depth_of_loss(u, high);
+    }
+}
+
+fn loss_of(dent: &Dent, ramp: Ramp, u: usize) -> Loss {
+    Loss {
+        t_ns: ramp.t_ns,
+        from: dent.lost(u, ramp.from_mm),
+        to: dent.lost(u, ramp.to_mm),
+    }
+}
