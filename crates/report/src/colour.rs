@@ -17,7 +17,11 @@ const VIRIDIS: [[u8; 3]; 9] = [
 /// The colour at `share` of the scale (0..=1, clamped: the scale's ends are labelled as such), `#rrggbb`.
 #[must_use]
 pub fn viridis(share: f64) -> String {
-    let share = if share.is_finite() { share.clamp(0.0, 1.0) } else { 0.0 };
+    let share = if share.is_finite() {
+        share.clamp(0.0, 1.0)
+    } else {
+        0.0
+    };
     let at = share * (VIRIDIS.len() - 1) as f64;
     let i = (at as usize).min(VIRIDIS.len() - 2);
     let t = at - i as f64;

@@ -71,7 +71,12 @@ mod tests {
 
     #[test]
     fn half_an_interval_is_none() {
-        let e = Estimate { value: Some(1.0), low: Some(0.5), high: None, n: 3 };
+        let e = Estimate {
+            value: Some(1.0),
+            low: Some(0.5),
+            high: None,
+            n: 3,
+        };
         assert_eq!(interval(&e, 1.0, 2), NONE);
     }
 }

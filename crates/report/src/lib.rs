@@ -18,6 +18,7 @@ pub mod svg;
 
 mod document;
 mod format;
+mod tables;
 mod terminal;
 
 pub use document::{JSON_FORMAT, JSON_VERSION};

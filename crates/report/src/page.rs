@@ -1,7 +1,221 @@
-//! Owns the HTML page.
+//! Owns the HTML page: what the template and the script receive.
+//!
+//! The template is `assets/page.html` (minijinja, auto-escaped), the style `assets/page.css` and
+//! `assets/figure.css`, the script `assets/report.js`. The script gets one JSON value with named tables
+//! (columns and column-wise data): the press table, tooltips and CSV downloads all read it.
 
+use std::collections::BTreeMap;
+
+use minijinja::{AutoEscape, Environment, Value, context};
+use serde::Serialize;
+
+use crate::derive;
+use crate::figures::{self, Figure};
+use crate::format::{grouped, interval, number, or_missing};
+use crate::provenance::Provenance;
+use crate::svg::{FIGURE_CSS, plain_css};
+use crate::tables;
+use crate::terminal::{clock_method, metric_rows};
 use crate::{ReportError, ReportInput};
 
+const TEMPLATE: &str = include_str!("../assets/page.html");
+const PAGE_CSS: &str = include_str!("../assets/page.css");
+const SCRIPT: &str = include_str!("../assets/report.js");
+
+/// JSON that may stand inside `<script>`: `<`, `>`, `&` and the line separators of JavaScript are written as
+/// escapes, so no text can end the element or open a comment.
+///
+/// # Errors
+/// When `value` has no JSON form (a map with keys that are not strings).
+pub fn script_json<T: Serialize>(value: &T) -> Result<String, serde_json::Error> {
+    let text = serde_json::to_string(value)?;
+    let mut out = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '<' => out.push_str("\\u003c"),
+            '>' => out.push_str("\\u003e"),
+            '&' => out.push_str("\\u0026"),
+            '\u{2028}' => out.push_str("\\u2028"),
+            '\u{2029}' => out.push_str("\\u2029"),
+            c => out.push(c),
+        }
+    }
+    Ok(out)
+}
+
+/// See [`crate::html`].
 pub(crate) fn render(input: &ReportInput<'_>) -> Result<String, ReportError> {
-    Ok(input.provenance.session_id.clone())
+    let mut env = Environment::new();
+    env.set_auto_escape_callback(|_| AutoEscape::Html);
+    env.add_template("page.html", TEMPLATE)?;
+    let (a, p) = (input.analysis, &input.provenance);
+    let fig: BTreeMap<&str, Value> = figures::all(input)
+        .into_iter()
+        .map(|f| (f.id, figure_value(f)))
+        .collect();
+    let c = &a.counts;
+    let count = |key: &str, name: &str, n: u32| context! { key, name, n };
+    let page = env.get_template("page.html")?.render(context! {
+        page_css => safe(PAGE_CSS),
+        figure_css => safe(FIGURE_CSS),
+        plain_css => safe(&plain_css()),
+        script => safe(SCRIPT),
+        data => safe(&script_json(&tables::script_data(input))?),
+        session => or_missing(&p.session_id),
+        simulated => p.simulated,
+        rig_name => or_missing(&p.rig_name),
+        rig_kind => p.rig_kind.clone(),
+        started => or_missing(&p.started),
+        prototype => or_missing(&p.prototype),
+        run_end => or_missing(&p.run_end),
+        run_end_reason => p.run_end_reason.clone(),
+        metrics => metrics(input),
+        rmse_all => context! {
+            differs => a.scored_without_exclusions != a.scored,
+            value => number(a.scored_without_exclusions.rmse_mm.value, 2),
+            interval => interval(&a.scored_without_exclusions.rmse_mm, 1.0, 2),
+            n => a.scored_without_exclusions.rmse_mm.n,
+        },
+        diagonal => a.scored.rmse_diagonal_percent.map(|v| number(Some(v), 2)),
+        counts => [
+            count("valid", "valid", c.valid),
+            count("missed", "missed", c.missed),
+            count("invalid", "invalid", c.invalid),
+            count("excluded", "excluded", c.excluded),
+        ],
+        planned => c.planned,
+        sync => c.sync,
+        add_up => c.add_up(),
+        empty => a.presses.is_empty(),
+        warnings => a.warnings.clone(),
+        interruptions => p.interruptions.iter()
+            .map(|i| context! { t => number(Some(i.t_s), 1), kind => i.kind.clone(), reason => i.reason.clone() })
+            .collect::<Vec<_>>(),
+        notes => p.notes.iter()
+            .map(|n| context! { t => number(Some(n.t_s), 1), text => n.text.clone() })
+            .collect::<Vec<_>>(),
+        losses => p.lost_bytes.iter().enumerate().filter(|(_, b)| **b > 0)
+            .map(|(i, b)| context! { camera => i + 1, bytes => grouped(*b) })
+            .collect::<Vec<_>>(),
+        rejections => derive::rejections(a).into_iter()
+            .map(|(verdict, reason, n)| context! { verdict, reason, n })
+            .collect::<Vec<_>>(),
+        provenance => provenance_rows(p, a.version),
+        devices => p.devices.iter()
+            .map(|d| context! {
+                role => d.role.clone(), model => d.model.clone(), serial => d.serial.clone(),
+                firmware => d.firmware.clone()
+            })
+            .collect::<Vec<_>>(),
+        clocks => clocks(input),
+        calibration => calibration(input),
+        settings => tables::settings(a),
+        fig,
+        press_total => a.presses.len(),
+    })?;
+    Ok(page)
+}
+
+fn safe(text: &str) -> Value {
+    Value::from_safe_string(text.to_owned())
+}
+
+fn figure_value(f: Figure) -> Value {
+    context! {
+        id => f.id,
+        title => f.title,
+        caption => f.caption,
+        svg => safe(&f.svg),
+        table => f.table,
+        interaction => f.interaction,
+    }
+}
+
+fn metrics(input: &ReportInput<'_>) -> Vec<Value> {
+    metric_rows(&input.analysis.scored)
+        .into_iter()
+        .map(|r| {
+            context! { key => r.key, name => r.name, value => r.value, unit => r.unit,
+            interval => r.interval, n => r.n, what_n => r.what_n }
+        })
+        .collect()
+}
+
+fn provenance_rows(p: &Provenance, analysis_version: u32) -> Vec<Value> {
+    let row =
+        |key: &str, value: &str, code: bool| context! { key, value => or_missing(value), code };
+    let mut rows = vec![
+        row("session", &p.session_id, true),
+        row("started", &p.started, false),
+        row("operator", &p.operator, false),
+        row("prototype", &p.prototype, false),
+        row(
+            "rig",
+            &format!("{} ({})", or_missing(&p.rig_name), or_missing(&p.rig_kind)),
+            false,
+        ),
+        row("host", &p.host, false),
+        row("seed", &p.seed.to_string(), true),
+        row("software", &p.software, false),
+        row("analysis version", &analysis_version.to_string(), false),
+        row("protocol", &p.protocol_name, false),
+        row("protocol SHA-256", &p.protocol_sha256, true),
+        row("plan SHA-256", &p.plan_sha256, true),
+        row("results SHA-256", &p.results_hash, true),
+        row("command line", &p.command_line, true),
+    ];
+    if !p.overrides.is_empty() {
+        rows.push(row("overrides", &p.overrides.join("  "), true));
+    }
+    rows
+}
+
+fn clocks(input: &ReportInput<'_>) -> Vec<Value> {
+    let of = |(i, fit): (usize, &Option<skinrig_analysis::result::ClockFit>)| match fit {
+        None => context! { camera => i + 1, found => false },
+        Some(c) => context! {
+            camera => i + 1,
+            found => true,
+            method => clock_method(c.method),
+            offset => number(Some(c.offset_us), 1),
+            drift => number(Some(c.drift_ppm), 3),
+            drift_se => number(Some(c.drift_se_ppm), 3),
+            rms => number(Some(c.residual_rms_us), 2),
+            max => number(Some(c.residual_max_us), 2),
+            n => c.n,
+            rejected => c.rejected,
+        },
+    };
+    input.analysis.clocks.iter().enumerate().map(of).collect()
+}
+
+fn calibration(input: &ReportInput<'_>) -> Option<Value> {
+    let c = input.analysis.calibration.as_ref()?;
+    let rows: Vec<Value> = tables::calibration(c)
+        .into_iter()
+        .map(|r| {
+            context! { name => r.name, before => number(r.before, 4), after => number(r.after, 4),
+            se => number(r.standard_error, 4), determined => r.standard_error.is_some() }
+        })
+        .collect();
+    Some(context! {
+        rows,
+        rmse_before => number(Some(c.rmse_before_mm), 3),
+        rmse_after => number(Some(c.rmse_after_mm), 3),
+        n => c.n,
+        termination => c.termination.clone(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn script_json_cannot_end_its_element() {
+        let text = script_json(&"</script><!--\u{2028}&").unwrap();
+        assert_eq!(text, "\"\\u003c/script\\u003e\\u003c!--\\u2028\\u0026\"");
+        let back: String = serde_json::from_str(&text).unwrap();
+        assert_eq!(back, "</script><!--\u{2028}&");
+    }
 }

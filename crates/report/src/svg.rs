@@ -11,6 +11,19 @@ use std::fmt::{self, Display, Write};
 /// Style of the figures: classes and theme variables, light by default.
 pub const FIGURE_CSS: &str = include_str!("../assets/figure.css");
 
+/// [`FIGURE_CSS`] with every `var(--name)` replaced by its light value, for programs that know no variables.
+#[must_use]
+pub fn plain_css() -> String {
+    let mut css = FIGURE_CSS.to_owned();
+    let block = FIGURE_CSS.split(['{', '}']).nth(1).unwrap_or("");
+    for (name, value) in block.split(';').filter_map(|d| d.split_once(':')) {
+        if name.trim().starts_with("--") {
+            css = css.replace(&format!("var({})", name.trim()), value.trim());
+        }
+    }
+    css
+}
+
 /// Writes text with the five XML specials escaped and characters that XML forbids replaced.
 struct Escaping<'a>(&'a mut String);
 
@@ -160,7 +173,13 @@ impl Svg {
 pub fn polyline(points: impl IntoIterator<Item = (f64, f64)>, close: bool) -> String {
     let mut d = String::new();
     for (x, y) in points {
-        let _ = write!(d, "{}{} {}", if d.is_empty() { 'M' } else { 'L' }, Px(x), Px(y));
+        let _ = write!(
+            d,
+            "{}{} {}",
+            if d.is_empty() { 'M' } else { 'L' },
+            Px(x),
+            Px(y)
+        );
     }
     if close && !d.is_empty() {
         d.push('Z');
@@ -199,7 +218,11 @@ pub fn ticks(low: f64, high: f64, wanted: u32) -> Vec<f64> {
 /// Writes a tick with as many decimals as the distance `step` between ticks needs.
 #[must_use]
 pub fn tick_label(value: f64, step: f64) -> String {
-    let digits = if step > 0.0 { (-step.log10().floor()).max(0.0) as usize } else { 0 };
+    let digits = if step > 0.0 {
+        (-step.log10().floor()).max(0.0) as usize
+    } else {
+        0
+    };
     crate::format::number(Some(value), digits.min(9))
 }
 
@@ -223,7 +246,10 @@ impl Scale {
         if high <= low {
             high = low + 1.0;
         }
-        Self { data: (low, high), px }
+        Self {
+            data: (low, high),
+            px,
+        }
     }
 
     /// Pixel position of `value`.
@@ -264,26 +290,46 @@ impl Axes {
         let xs = ticks(self.x.data.0, self.x.data.1, self.tick_count.0);
         let ys = ticks(self.y.data.0, self.y.data.1, self.tick_count.1);
         let step = |v: &[f64]| if v.len() > 1 { v[1] - v[0] } else { 1.0 };
+        svg.open("g", &[("class", &"x-ticks")]);
         for &t in &xs {
             let x = self.x.at(t);
             svg.line("grid", (x, top), (x, bottom));
-            svg.text((x, bottom + 16.0), "tick", "middle", &tick_label(t, step(&xs)));
+            svg.text(
+                (x, bottom + 16.0),
+                "tick",
+                "middle",
+                &tick_label(t, step(&xs)),
+            );
         }
+        svg.close();
         for &t in &ys {
             let y = self.y.at(t);
             svg.line("grid", (left, y), (right, y));
-            svg.text((left - 7.0, y + 4.0), "tick", "end", &tick_label(t, step(&ys)));
+            svg.text(
+                (left - 7.0, y + 4.0),
+                "tick",
+                "end",
+                &tick_label(t, step(&ys)),
+            );
         }
         svg.line("axis", (left, bottom), (right, bottom));
         svg.line("axis", (left, top), (left, bottom));
-        svg.text(((left + right) / 2.0, bottom + 36.0), "label", "middle", &self.x_label);
+        svg.text(
+            ((left + right) / 2.0, bottom + 36.0),
+            "label",
+            "middle",
+            &self.x_label,
+        );
         let (x, y) = (left - 46.0, (top + bottom) / 2.0);
         svg.holding(
             "text",
             &[
                 ("class", &"label"),
                 ("text-anchor", &"middle"),
-                ("transform", &format_args!("translate({} {}) rotate(-90)", Px(x), Px(y))),
+                (
+                    "transform",
+                    &format_args!("translate({} {}) rotate(-90)", Px(x), Px(y)),
+                ),
             ],
             &self.y_label,
         );
@@ -316,6 +362,12 @@ mod tests {
         assert_eq!(tick_label(0.2, 0.2), "0.2");
         assert_eq!(tick_label(20.0, 20.0), "20");
         assert_eq!(tick_label(0.25, 0.05), "0.25");
+    }
+
+    #[test]
+    fn plain_css_needs_no_variables() {
+        assert!(FIGURE_CSS.contains("var(--ink)"));
+        assert!(!plain_css().contains("var("), "{}", plain_css());
     }
 
     #[test]

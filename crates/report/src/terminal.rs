@@ -1,8 +1,268 @@
 //! Owns the results table for a terminal.
 
-use crate::ReportInput;
+use std::fmt::Write as _;
 
+use skinrig_analysis::result::{ClockFit, ClockMethod, Estimate, Metrics};
+
+use crate::ReportInput;
+use crate::format::{grouped, interval, number, or_missing};
+
+const WIDTH: usize = 80;
+
+/// A metric ready to be written: name, value, unit, interval, n.
+pub(crate) struct MetricRow {
+    pub(crate) key: &'static str,
+    pub(crate) name: &'static str,
+    pub(crate) value: String,
+    pub(crate) unit: &'static str,
+    pub(crate) interval: String,
+    pub(crate) n: u32,
+    pub(crate) what_n: &'static str,
+}
+
+/// The metrics in the order in which they are read.
+pub(crate) fn metric_rows(m: &Metrics) -> Vec<MetricRow> {
+    let mm = |key, name, e: &Estimate, what_n| MetricRow {
+        key,
+        name,
+        value: number(e.value, 2),
+        unit: "mm",
+        interval: interval(e, 1.0, 2),
+        n: e.n,
+        what_n,
+    };
+    vec![
+        mm("rmse", "RMSE", &m.rmse_mm, "presses"),
+        mm("rmse-x", "RMSE along x", &m.rmse_x_mm, "presses"),
+        mm("rmse-y", "RMSE along y", &m.rmse_y_mm, "presses"),
+        mm("bias-x", "bias along x", &m.bias_x_mm, "presses"),
+        mm("bias-y", "bias along y", &m.bias_y_mm, "presses"),
+        mm("median", "median error", &m.median_mm, "presses"),
+        mm("p95", "95th percentile", &m.p95_mm, "presses"),
+        mm(
+            "repeat-std",
+            "std between repetitions",
+            &m.repeat_std_mm,
+            "locations",
+        ),
+        MetricRow {
+            key: "located",
+            name: "located rate",
+            value: number(m.located_rate.value.map(|v| 100.0 * v), 1),
+            unit: "%",
+            interval: interval(&m.located_rate, 100.0, 1),
+            n: m.located_rate.n,
+            what_n: "attempted",
+        },
+    ]
+}
+
+/// One line about a clock fit, without the camera's name.
+pub(crate) fn clock_method(method: ClockMethod) -> &'static str {
+    match method {
+        ClockMethod::TriggerMarks => "trigger marks",
+        ClockMethod::EventRates => "event rates",
+    }
+}
+
+/// User text without control characters: a terminal would obey them.
+fn plain(text: &str) -> String {
+    text.chars()
+        .map(|c| {
+            if c.is_control() {
+                char::REPLACEMENT_CHARACTER
+            } else {
+                c
+            }
+        })
+        .collect()
+}
+
+struct Paint(bool);
+
+impl Paint {
+    fn bold(&self, s: &str) -> String {
+        if self.0 {
+            format!("\x1b[1m{s}\x1b[0m")
+        } else {
+            s.to_owned()
+        }
+    }
+    fn warn(&self, s: &str) -> String {
+        if self.0 {
+            format!("\x1b[33m{s}\x1b[0m")
+        } else {
+            s.to_owned()
+        }
+    }
+}
+
+/// Words of `text` in lines of at most `WIDTH` columns; the first begins with `first`, the others with as
+/// many spaces. Words longer than a line are cut.
+fn wrap(first: &str, text: &str) -> String {
+    let indent = " ".repeat(first.chars().count());
+    let room = WIDTH - indent.len();
+    let mut lines = vec![String::new()];
+    for word in text.split_whitespace() {
+        let mut rest: Vec<char> = word.chars().collect();
+        while !rest.is_empty() {
+            let used = lines.last().map_or(0, |l| l.chars().count());
+            let needed = rest.len() + usize::from(used > 0);
+            if used > 0 && used + needed > room {
+                lines.push(String::new());
+                continue;
+            }
+            let piece: String = rest.drain(..rest.len().min(room)).collect();
+            if let Some(line) = lines.last_mut() {
+                if used > 0 {
+                    line.push(' ');
+                }
+                line.push_str(&piece);
+            }
+        }
+    }
+    let mut out = String::new();
+    for (i, line) in lines.iter().enumerate() {
+        let _ = writeln!(out, "{}{line}", if i == 0 { first } else { &indent });
+    }
+    out
+}
+
+/// See [`crate::terminal_table`].
 pub(crate) fn table(input: &ReportInput<'_>, color: bool) -> String {
-    let _ = color;
-    input.provenance.session_id.clone()
+    let paint = Paint(color);
+    let (a, p) = (input.analysis, &input.provenance);
+    let mut out = String::new();
+    out += &wrap("session   ", &plain(or_missing(&p.session_id)));
+    let rig = plain(or_missing(&p.rig_name));
+    if p.simulated {
+        out += &paint.warn(&wrap(
+            "rig       ",
+            &format!("{rig} - SIMULATED, not measured on hardware"),
+        ));
+    } else {
+        out += &wrap("rig       ", &rig);
+    }
+    out += &wrap(
+        "protocol  ",
+        &plain(&format!(
+            "{}, seed {}",
+            or_missing(&p.protocol_name),
+            p.seed
+        )),
+    );
+    let end = match &p.run_end_reason {
+        Some(why) => format!("{}: {why}", or_missing(&p.run_end)),
+        None => or_missing(&p.run_end).to_owned(),
+    };
+    out += &wrap("run       ", &plain(&end));
+    out.push('\n');
+
+    let head = format!(
+        "{:<26}{:>10}     {:^20}{:>7}",
+        "scored presses", "value", "95 % interval", "n"
+    );
+    let _ = writeln!(out, "{}", paint.bold(&head));
+    for r in metric_rows(&a.scored) {
+        let line = format!(
+            "{:<26}{:>10} {:<3} {:^20}{:>7} {}",
+            r.name, r.value, r.unit, r.interval, r.n, r.what_n
+        );
+        let line = if r.key == "rmse" {
+            paint.bold(&line)
+        } else {
+            line
+        };
+        let _ = writeln!(out, "{line}");
+    }
+    if let Some(share) = a.scored.rmse_diagonal_percent {
+        let _ = writeln!(
+            out,
+            "{:<26}{:>10} %   of the skin's diagonal",
+            "RMSE",
+            number(Some(share), 2)
+        );
+    }
+    if a.scored_without_exclusions != a.scored {
+        let e = &a.scored_without_exclusions.rmse_mm;
+        let _ = writeln!(
+            out,
+            "{:<26}{:>10} mm  {:^20}{:>7} presses",
+            "RMSE, nothing excluded",
+            number(e.value, 2),
+            interval(e, 1.0, 2),
+            e.n
+        );
+    }
+    out.push('\n');
+
+    let c = &a.counts;
+    let _ = writeln!(
+        out,
+        "presses   {} planned = {} valid + {} missed + {} invalid + {} excluded",
+        c.planned, c.valid, c.missed, c.invalid, c.excluded
+    );
+    if !c.add_up() {
+        let _ = writeln!(
+            out,
+            "{}",
+            paint.warn("          these counts do not add up: do not trust this result")
+        );
+    }
+    if c.sync > 0 {
+        let _ = writeln!(out, "          and {} sync presses, counted apart", c.sync);
+    }
+    for (i, clock) in a.clocks.iter().enumerate() {
+        out += &clock_lines(i + 1, clock.as_ref());
+    }
+    if let Some(cal) = &a.calibration {
+        let text = format!(
+            "RMSE {} -> {} mm over {} calibrating presses",
+            number(Some(cal.rmse_before_mm), 2),
+            number(Some(cal.rmse_after_mm), 2),
+            cal.n
+        );
+        out += &wrap("fit       ", &text);
+    }
+    for (i, lost) in p.lost_bytes.iter().enumerate().filter(|(_, l)| **l > 0) {
+        let text = format!("camera {}: {} bytes lost", i + 1, grouped(*lost));
+        out += &paint.warn(&wrap("loss      ", &text));
+    }
+    for row in &p.interruptions {
+        let text = plain(&format!(
+            "{} at {} s: {}",
+            row.kind,
+            number(Some(row.t_s), 1),
+            row.reason
+        ));
+        out += &paint.warn(&wrap("event     ", &text));
+    }
+    for warning in &a.warnings {
+        out += &paint.warn(&wrap("warning   ", &plain(warning)));
+    }
+    out
+}
+
+fn clock_lines(camera: usize, clock: Option<&ClockFit>) -> String {
+    let first = format!("clock {camera}   ");
+    let Some(c) = clock else {
+        return wrap(
+            &first,
+            "not aligned: neither trigger marks nor sync presses fit",
+        );
+    };
+    let drift = format!(
+        "{} ± {}",
+        number(Some(c.drift_ppm), 3),
+        number(Some(c.drift_se_ppm), 3)
+    );
+    let text = format!(
+        "drift {drift} ppm, residual rms {} µs, max {} µs, n {} ({} rejected), from {}",
+        number(Some(c.residual_rms_us), 2),
+        number(Some(c.residual_max_us), 2),
+        c.n,
+        c.rejected,
+        clock_method(c.method)
+    );
+    wrap(&first, &text)
 }

@@ -1,1 +1,147 @@
-//! Owns the figures.
+//! Owns the figures: one function each, from an analysis to a labelled SVG with title and description.
+
+mod centroids;
+mod errors;
+mod map;
+mod pictures;
+mod rates;
+
+pub use centroids::centroid_tracks;
+pub use errors::{error_distribution, error_scatter};
+pub use map::{repeat_map, skin_map};
+pub use pictures::press_pictures;
+pub use rates::{event_rates, press_rates};
+
+use crate::ReportInput;
+use crate::format::or_missing;
+use crate::svg::{Attributes, Px, Svg, plain_css};
+
+/// A figure.
+#[derive(Debug, Clone)]
+pub struct Figure {
+    /// Identifier, unique in a page; also the stem of downloaded files.
+    pub id: &'static str,
+    /// Headline, plain text.
+    pub title: &'static str,
+    /// What is drawn and how to read it, plain text.
+    pub caption: String,
+    /// The `<svg>` element, without style (see [`Figure::standalone`]).
+    pub svg: String,
+    /// Name of the data table behind the figure in the page's script data.
+    pub table: &'static str,
+    /// What the figure lets its reader do: `select` (presses), `zoom` (time axis) or nothing.
+    pub interaction: &'static str,
+}
+
+impl Figure {
+    /// The figure as a file of its own: with XML declaration and style.
+    #[must_use]
+    pub fn standalone(&self) -> String {
+        let styled = self.svg.replacen(
+            "</title>",
+            &format!("</title><style>{}</style>", plain_css()),
+            1,
+        );
+        format!("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n{styled}\n")
+    }
+}
+
+/// All figures in the order of the page. Figures without any data are left out where they are optional.
+#[must_use]
+pub fn all(input: &ReportInput<'_>) -> Vec<Figure> {
+    let mut figures = vec![
+        skin_map(input),
+        event_rates(input),
+        error_distribution(input),
+        error_scatter(input),
+        centroid_tracks(input),
+        repeat_map(input),
+    ];
+    figures.extend(press_rates(input));
+    figures.extend(press_pictures(input));
+    figures
+}
+
+/// A figure being drawn.
+struct Canvas<'a> {
+    svg: Svg,
+    id: &'static str,
+    title: &'static str,
+    input: &'a ReportInput<'a>,
+    size: (f64, f64),
+    caption: String,
+}
+
+impl<'a> Canvas<'a> {
+    /// Opens the `<svg>` element with its title and description.
+    fn new(
+        input: &'a ReportInput<'a>,
+        id: &'static str,
+        title: &'static str,
+        caption: String,
+        size: (f64, f64),
+        extra: Attributes<'_>,
+    ) -> Self {
+        let mut svg = Svg::new();
+        let (title_id, desc_id) = (format!("{id}-title"), format!("{id}-desc"));
+        let view = format!("0 0 {} {}", Px(size.0), Px(size.1));
+        let labelled = format!("{title_id} {desc_id}");
+        let mut attributes: Vec<(&str, &dyn std::fmt::Display)> = vec![
+            ("xmlns", &"http://www.w3.org/2000/svg"),
+            ("class", &"fig"),
+            ("id", &id),
+            ("viewBox", &view),
+            ("role", &"img"),
+            ("aria-labelledby", &labelled),
+        ];
+        attributes.extend_from_slice(extra);
+        svg.open("svg", &attributes);
+        svg.holding("title", &[("id", &title_id)], title);
+        svg.holding("desc", &[("id", &desc_id)], &caption);
+        Self {
+            svg,
+            id,
+            title,
+            input,
+            size,
+            caption,
+        }
+    }
+
+    /// Says in the middle of the figure why it is empty.
+    fn empty(&mut self, why: &str) {
+        let (w, h) = self.size;
+        self.svg.text((w / 2.0, h / 2.0), "empty", "middle", why);
+    }
+
+    /// Writes the foot line (session, simulated or not, n) and closes.
+    fn finish(mut self, n: &str, table: &'static str, interaction: &'static str) -> Figure {
+        let p = &self.input.provenance;
+        let simulated = if p.simulated { " · simulated rig" } else { "" };
+        let foot = format!("session {}{simulated}", or_missing(&p.session_id));
+        let (w, h) = self.size;
+        self.svg.text((10.0, h - 8.0), "foot", "start", &foot);
+        self.svg.text((w - 10.0, h - 8.0), "foot", "end", n);
+        Figure {
+            id: self.id,
+            title: self.title,
+            caption: self.caption,
+            svg: self.svg.finish(),
+            table,
+            interaction,
+        }
+    }
+}
+
+/// The smallest of 1, 1.5, 2, 3, 4, 5, 6, 8, 10 times a power of ten that is not below `value`.
+fn nice_above(value: f64) -> f64 {
+    if !(value.is_finite() && value > 0.0) {
+        return 1.0;
+    }
+    let power = 10f64.powf(value.log10().floor());
+    [1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0]
+        .into_iter()
+        .map(|m| m * power)
+        .find(|c| *c >= value * (1.0 - 1e-12))
+        .unwrap_or(10.0 * power)
+}

@@ -1,0 +1,433 @@
+//! Owns the maps of the skin: localisation errors and spread between repetitions, per location.
+
+use skinrig_model::{CameraModel, Point2, PressRole, SENSOR_WIDTH};
+
+use super::{Canvas, Figure, nice_above};
+use crate::ReportInput;
+use crate::colour::viridis;
+use crate::derive::{self, LocationSummary};
+use crate::svg::{Axes, Px, Scale, Svg, dots, polyline, tick_label, ticks};
+
+const SIZE: (f64, f64) = (860.0, 700.0);
+
+/// Where the skin lies in the figure.
+struct Layout {
+    axes: Axes,
+    outline: Vec<Point2>,
+}
+
+impl Layout {
+    fn new(input: &ReportInput<'_>) -> Self {
+        let outline = input.analysis.rig.outline.polygon(24);
+        let cameras = input.analysis.geometry.cameras.map(|c| c.position);
+        let all = || {
+            outline
+                .iter()
+                .chain(&cameras)
+                .filter(|p| p.x_mm.is_finite() && p.y_mm.is_finite())
+        };
+        let range = |f: fn(&Point2) -> f64| {
+            let low = all().map(f).fold(f64::INFINITY, f64::min);
+            let high = all().map(f).fold(f64::NEG_INFINITY, f64::max);
+            (low - 5.0, high + 5.0)
+        };
+        let (xs, ys) = (range(|p| p.x_mm), range(|p| p.y_mm));
+        let (left, top, width, height) = (66.0, 18.0, 660.0, 610.0);
+        // One scale for both axes.
+        let k = (width / (xs.1 - xs.0)).min(height / (ys.1 - ys.0));
+        let right = left + k * (xs.1 - xs.0);
+        let bottom = top + k * (ys.1 - ys.0);
+        let axes = Axes {
+            x: Scale::new(xs, (left, right)),
+            y: Scale::new(ys, (bottom, top)),
+            x_label: "x, skin frame (mm)".into(),
+            y_label: "y, skin frame (mm)".into(),
+            tick_count: (7, 7),
+        };
+        Self { axes, outline }
+    }
+
+    fn px(&self, p: Point2) -> (f64, f64) {
+        (self.axes.x.at(p.x_mm), self.axes.y.at(p.y_mm))
+    }
+
+    fn skin(&self) -> String {
+        polyline(self.outline.iter().map(|p| self.px(*p)), true)
+    }
+
+    /// Radius of a location's disc: a share of the distance to its nearest neighbour, 3 to 8 px.
+    fn radius(&self, locations: &[LocationSummary]) -> f64 {
+        let mut nearest = f64::INFINITY;
+        for (i, a) in locations.iter().enumerate() {
+            for b in &locations[..i] {
+                let d = a.planned.distance_mm(b.planned);
+                if d > 1e-6 {
+                    nearest = nearest.min(d);
+                }
+            }
+        }
+        (0.42 * nearest * self.axes.x.per_unit()).clamp(3.0, 8.0)
+    }
+
+    /// Part of the plane that `camera` sees: from it along the rays of columns 0 to 640.
+    fn field_of_view(&self, camera: &CameraModel) -> String {
+        const REACH_MM: f64 = 400.0; // beyond any skin; the outline clips it
+        let width = f64::from(SENSOR_WIDTH);
+        let rim = (0..=32).map(|i| {
+            let [dx, dy] =
+                camera.direction(camera.angle_of_column_deg(width * f64::from(i) / 32.0));
+            Point2::new(
+                camera.position.x_mm + REACH_MM * dx,
+                camera.position.y_mm + REACH_MM * dy,
+            )
+        });
+        polyline(
+            std::iter::once(camera.position)
+                .chain(rim)
+                .map(|p| self.px(p)),
+            true,
+        )
+    }
+
+    fn cameras(&self, svg: &mut Svg, input: &ReportInput<'_>) {
+        for (i, camera) in input.analysis.geometry.cameras.iter().enumerate() {
+            let (x, y) = self.px(camera.position);
+            let [dx, dy] = camera.direction(camera.skew_deg);
+            let angle = (-dy).atan2(dx).to_degrees();
+            svg.leaf(
+                "path",
+                &[
+                    ("class", &format_args!("f{}", i + 1)),
+                    ("d", &"M9 0L-7 8V-8Z"),
+                    (
+                        "transform",
+                        &format_args!("translate({} {}) rotate({})", Px(x), Px(y), Px(angle)),
+                    ),
+                ],
+            );
+            svg.text(
+                (x - 14.0 * dx + 6.0, y + 14.0 * dy + 18.0 * dy.signum()),
+                &format!("f{}", i + 1),
+                "start",
+                &format!("camera {}", i + 1),
+            );
+        }
+    }
+}
+
+/// A colour bar in mm with its title, at the right edge; says when locations lie above its end.
+fn colour_bar(svg: &mut Svg, title: &str, top_mm: f64, beyond: usize) {
+    const STEPS: u32 = 48;
+    let (x, top, height, width) = (776.0, 70.0, 260.0, 18.0);
+    let step = height / f64::from(STEPS);
+    svg.open("g", &[("class", &"colour-bar")]);
+    for (i, line) in title.split('\n').enumerate() {
+        svg.text(
+            (x - 30.0, top - 32.0 + 15.0 * i as f64),
+            "label",
+            "start",
+            line,
+        );
+    }
+    for i in 0..STEPS {
+        let share = (f64::from(i) + 0.5) / f64::from(STEPS);
+        svg.leaf(
+            "rect",
+            &[
+                ("x", &Px(x)),
+                ("y", &Px(top + height - f64::from(i + 1) * step)),
+                ("width", &Px(width)),
+                ("height", &Px(step + 0.4)),
+                ("fill", &viridis(share)),
+            ],
+        );
+    }
+    let scale = Scale::new((0.0, top_mm), (top + height, top));
+    let marks = ticks(0.0, top_mm, 5);
+    let distance = if marks.len() > 1 {
+        marks[1] - marks[0]
+    } else {
+        top_mm
+    };
+    for t in marks {
+        svg.line(
+            "axis",
+            (x + width, scale.at(t)),
+            (x + width + 4.0, scale.at(t)),
+        );
+        svg.text(
+            (x + width + 8.0, scale.at(t) + 4.0),
+            "tick",
+            "start",
+            &tick_label(t, distance),
+        );
+    }
+    if beyond > 0 {
+        svg.text(
+            (x - 30.0, top + height + 22.0),
+            "note",
+            "start",
+            &format!("{beyond} above scale"),
+        );
+    }
+    svg.close();
+}
+
+/// End of the colour scale: a round number above 98 % of the values.
+fn scale_end(mut values: Vec<f64>) -> f64 {
+    values.retain(|v| v.is_finite());
+    values.sort_by(f64::total_cmp);
+    let at = (values.len().saturating_sub(1)) as f64 * 0.98;
+    values
+        .get(at.round() as usize)
+        .map_or(1.0, |v| nice_above(*v))
+}
+
+fn discs(
+    svg: &mut Svg,
+    layout: &Layout,
+    locations: &[LocationSummary],
+    value: impl Fn(&LocationSummary) -> Option<f64>,
+    end: f64,
+) {
+    let r = layout.radius(locations);
+    svg.open("g", &[("class", &"locations")]);
+    for l in locations {
+        let Some(v) = value(l) else { continue };
+        let (x, y) = layout.px(l.planned);
+        svg.leaf(
+            "circle",
+            &[
+                ("class", &"press"),
+                ("cx", &Px(x)),
+                ("cy", &Px(y)),
+                ("r", &Px(r)),
+                ("fill", &viridis(v / end)),
+            ],
+        );
+    }
+    svg.close();
+}
+
+fn backdrop(canvas: &mut Canvas<'_>, layout: &Layout) {
+    let clip = format!("{}-clip", canvas.id);
+    let svg = &mut canvas.svg;
+    layout.axes.draw(svg);
+    svg.open("clipPath", &[("id", &clip)]);
+    svg.path("clip", &layout.skin());
+    svg.close();
+    svg.path("skin", &layout.skin());
+}
+
+fn attributes(layout: &Layout) -> [String; 3] {
+    [
+        layout.axes.x.at(0.0),
+        layout.axes.y.at(0.0),
+        layout.axes.x.per_unit(),
+    ]
+    .map(|v| format!("{v:.4}"))
+}
+
+/// The skin with both cameras, their fields of view, the press path, the mean error at every location and a
+/// vector from truth to estimate for every scored press that counts.
+#[must_use]
+pub fn skin_map(input: &ReportInput<'_>) -> Figure {
+    let layout = Layout::new(input);
+    let locations = derive::locations(input.analysis);
+    let counted: Vec<_> = input
+        .analysis
+        .presses
+        .iter()
+        .filter(|p| derive::counts(p))
+        .collect();
+    let others: Vec<_> = input
+        .analysis
+        .presses
+        .iter()
+        .filter(|p| p.role == PressRole::Score && !derive::counts(p))
+        .collect();
+    let caption = format!(
+        "Localisation error over the skin. Discs: scored locations, coloured by the mean Euclidean error of \
+         their presses. Lines run from each measured position (truth) to its estimate, which ends in a dot \
+         ({} presses at {} locations). Open squares: {} scored presses that do not count. Thin grey line: \
+         press path of the first repetition. Tinted: fields of view of camera 1 and camera 2; both tints \
+         together mark the overlap, where a press can be located.",
+        counted.len(),
+        locations.len(),
+        others.len()
+    );
+    let [ox, oy, k] = attributes(&layout);
+    let mut canvas = Canvas::new(
+        input,
+        "skin-map",
+        "Skin map",
+        caption,
+        SIZE,
+        &[("data-ox", &ox), ("data-oy", &oy), ("data-k", &k)],
+    );
+    backdrop(&mut canvas, &layout);
+    let svg = &mut canvas.svg;
+    svg.open(
+        "g",
+        &[
+            ("class", &"layer-fov"),
+            ("clip-path", &"url(#skin-map-clip)"),
+        ],
+    );
+    for (i, camera) in input.analysis.geometry.cameras.iter().enumerate() {
+        let class = format!("fov f{0} c{0}", i + 1);
+        svg.path(&class, &layout.field_of_view(camera));
+    }
+    svg.close();
+    svg.path("skin-edge", &layout.skin());
+    let first = input
+        .analysis
+        .presses
+        .iter()
+        .filter(|p| p.role != PressRole::Sync)
+        .map(|p| p.repetition)
+        .min();
+    let path = input
+        .analysis
+        .presses
+        .iter()
+        .filter(|p| p.role != PressRole::Sync && Some(p.repetition) == first);
+    svg.open("g", &[("class", &"layer-path")]);
+    svg.path("path", &polyline(path.map(|p| layout.px(p.planned)), false));
+    svg.close();
+    let end = scale_end(locations.iter().map(|l| l.mean_error_mm).collect());
+    discs(svg, &layout, &locations, |l| Some(l.mean_error_mm), end);
+    let mut vectors = String::new();
+    let mut tips = Vec::with_capacity(counted.len());
+    for p in &counted {
+        if let (Some(t), Some(e)) = (p.truth, p.estimate()) {
+            vectors.push_str(&polyline([layout.px(t), layout.px(e)], false));
+            tips.push(layout.px(e));
+        }
+    }
+    let dense = if counted.len() > 600 { " dense" } else { "" };
+    svg.open("g", &[("class", &format_args!("layer-vectors{dense}"))]);
+    svg.path("vector", &vectors);
+    svg.path("dots tips", &dots(tips));
+    svg.close();
+    let mut squares = String::new();
+    for p in &others {
+        let (x, y) = layout.px(p.truth.unwrap_or(p.planned));
+        squares.push_str(&polyline(
+            [
+                (x - 5.0, y - 5.0),
+                (x + 5.0, y - 5.0),
+                (x + 5.0, y + 5.0),
+                (x - 5.0, y + 5.0),
+            ],
+            true,
+        ));
+    }
+    svg.open("g", &[("class", &"layer-others")]);
+    svg.path("other", &squares);
+    svg.close();
+    layout.cameras(svg, input);
+    colour_bar(
+        svg,
+        "mean error\n(mm)",
+        end,
+        locations.iter().filter(|l| l.mean_error_mm > end).count(),
+    );
+    legend(svg);
+    svg.leaf("g", &[("class", &"selection")]);
+    if counted.is_empty() {
+        canvas.empty("no scored press was located");
+    }
+    canvas.finish(
+        &format!(
+            "n = {} presses, {} locations",
+            counted.len(),
+            locations.len()
+        ),
+        "presses",
+        "select",
+    )
+}
+
+fn legend(svg: &mut Svg) {
+    let (x, mut y) = (746.0, 400.0);
+    let mut row = |svg: &mut Svg, label: &str, draw: &dyn Fn(&mut Svg, f64)| {
+        draw(svg, y);
+        svg.text((x + 24.0, y + 4.0), "tick", "start", label);
+        y += 21.0;
+    };
+    let swatch = |class: &'static str| {
+        move |svg: &mut Svg, y: f64| {
+            svg.leaf(
+                "rect",
+                &[
+                    ("class", &class),
+                    ("x", &Px(x)),
+                    ("y", &Px(y - 6.0)),
+                    ("width", &"18"),
+                    ("height", &"12"),
+                ],
+            );
+        }
+    };
+    row(svg, "seen by camera 1", &swatch("fov strong f1 c1"));
+    row(svg, "seen by camera 2", &swatch("fov strong f2 c2"));
+    row(svg, "press path", &|svg, y| {
+        svg.line("path", (x, y), (x + 18.0, y));
+    });
+    row(svg, "truth to estimate", &|svg, y| {
+        svg.line("vector", (x, y), (x + 16.0, y));
+        svg.path("dots tips", &dots([(x + 16.0, y)]));
+    });
+    row(svg, "not counted", &|svg, y| {
+        svg.leaf(
+            "rect",
+            &[
+                ("class", &"other"),
+                ("x", &Px(x + 4.0)),
+                ("y", &Px(y - 5.0)),
+                ("width", &"10"),
+                ("height", &"10"),
+            ],
+        );
+    });
+}
+
+/// The standard deviation between repetitions at every location.
+#[must_use]
+pub fn repeat_map(input: &ReportInput<'_>) -> Figure {
+    let layout = Layout::new(input);
+    let mut locations = derive::locations(input.analysis);
+    locations.retain(|l| l.std_mm.is_some());
+    let caption = format!(
+        "Spread between repetitions over the skin. Discs: the sample standard deviation (n - 1, Euclidean) of \
+         the error vectors at a location, for the {} locations with at least two presses that count.",
+        locations.len()
+    );
+    let mut canvas = Canvas::new(
+        input,
+        "repeat-map",
+        "Spread between repetitions",
+        caption,
+        SIZE,
+        &[],
+    );
+    backdrop(&mut canvas, &layout);
+    let svg = &mut canvas.svg;
+    let end = scale_end(locations.iter().filter_map(|l| l.std_mm).collect());
+    discs(svg, &layout, &locations, |l| l.std_mm, end);
+    layout.cameras(svg, input);
+    let beyond = locations
+        .iter()
+        .filter(|l| l.std_mm.is_some_and(|s| s > end))
+        .count();
+    colour_bar(svg, "std between\nrepetitions (mm)", end, beyond);
+    if locations.is_empty() {
+        canvas.empty("no location has two presses that count");
+    }
+    canvas.finish(
+        &format!("n = {} locations", locations.len()),
+        "locations",
+        "",
+    )
+}
