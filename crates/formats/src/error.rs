@@ -37,4 +37,65 @@ pub enum FormatsError {
         /// What the system said.
         source: std::io::Error,
     },
+    /// An HDF5 file that the HDF5 library refuses; truncated files end here too.
+    #[error("{}: expected a readable HDF5 file: {problem}", path.display())]
+    Hdf5 {
+        /// The file.
+        path: PathBuf,
+        /// What the library said.
+        problem: String,
+    },
+    /// A file that is not what it should be as a whole.
+    #[error("{}: expected {expected}, found {found}", path.display())]
+    Container {
+        /// The file.
+        path: PathBuf,
+        /// What was needed.
+        expected: String,
+        /// What is there, and what to do next.
+        found: String,
+    },
+    /// One dataset of a container does not fit.
+    #[error("{}: dataset {dataset}: expected {expected}, found {found}", path.display())]
+    Dataset {
+        /// The file.
+        path: PathBuf,
+        /// The dataset's path inside the file.
+        dataset: String,
+        /// What was needed.
+        expected: String,
+        /// What is there.
+        found: String,
+    },
+    /// One value of a dataset is impossible.
+    #[error("{}: dataset {dataset}, row {row}: expected {expected}, found {found}", path.display())]
+    Row {
+        /// The file.
+        path: PathBuf,
+        /// The dataset's path inside the file.
+        dataset: String,
+        /// Index of the value, 0 for the first.
+        row: u64,
+        /// What was needed.
+        expected: String,
+        /// What is there.
+        found: String,
+    },
+}
+
+impl FormatsError {
+    /// Names the file of an I/O error.
+    pub(crate) fn io(path: &std::path::Path) -> impl FnOnce(std::io::Error) -> Self {
+        let path = path.to_owned();
+        move |source| Self::Io { path, source }
+    }
+
+    /// Names the file of an HDF5 library error.
+    pub(crate) fn hdf5(path: &std::path::Path) -> impl FnOnce(rust_hdf5::Hdf5Error) -> Self {
+        let path = path.to_owned();
+        move |error| Self::Hdf5 {
+            path,
+            problem: error.to_string(),
+        }
+    }
 }

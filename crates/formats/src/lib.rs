@@ -5,6 +5,7 @@
 //! what was expected. Words that a decoder does not deliver are counted in [`StreamStats`].
 
 pub mod error;
+pub mod hdf5;
 pub mod stream;
 
 pub use error::FormatsError;

@@ -1,0 +1,134 @@
+//! One integer column of a dvs dictionary, of whatever width the file has.
+
+use std::path::Path;
+
+use rust_hdf5::{DatatypeMessage, H5Dataset, Hdf5Error};
+
+use crate::error::FormatsError;
+
+/// A column of pixels or polarities, read slice by slice into a reused buffer.
+pub(super) struct IntColumn {
+    dataset: H5Dataset,
+    pub name: String,
+    buffer: Buffer,
+}
+
+macro_rules! buffers {
+    ($($variant:ident $int:ty, $size:literal $signed:literal;)*) => {
+        enum Buffer { $($variant(Vec<$int>),)* }
+
+        impl Buffer {
+            fn of_type(size: u32, signed: bool) -> Option<Self> {
+                match (size, signed) {
+                    $(($size, $signed) => Some(Self::$variant(Vec::new())),)*
+                    _ => None,
+                }
+            }
+
+            /// Reads `rows` values from `start` on and stores them in `out`; what does not fit becomes
+            /// `u16::MAX`, which no valid value has.
+            fn read(
+                &mut self,
+                dataset: &H5Dataset,
+                start: usize,
+                out: &mut [u16],
+            ) -> Result<(), Hdf5Error> {
+                match self {
+                    $(Self::$variant(values) => {
+                        values.resize(out.len(), 0);
+                        dataset.read_slice_into(values, &[start], &[out.len()])?;
+                        for (out, value) in out.iter_mut().zip(values) {
+                            let low = *value as u16;
+                            *out = if low as $int == *value { low } else { u16::MAX };
+                        }
+                    })*
+                }
+                Ok(())
+            }
+
+            /// The value at `row` of the last slice, for messages.
+            fn value(&self, row: usize) -> Option<String> {
+                match self {
+                    $(Self::$variant(values) => values.get(row).map(ToString::to_string),)*
+                }
+            }
+        }
+    };
+}
+
+buffers! {
+    I8 i8, 1 true;
+    U8 u8, 1 false;
+    I16 i16, 2 true;
+    U16 u16, 2 false;
+    I32 i32, 4 true;
+    U32 u32, 4 false;
+    I64 i64, 8 true;
+    U64 u64, 8 false;
+}
+
+impl IntColumn {
+    /// Takes an opened dataset of integers, or of an enumeration (h5py's booleans).
+    pub fn new(dataset: H5Dataset, name: &str, path: &Path) -> Result<Self, FormatsError> {
+        let wrong = |found: String| FormatsError::Dataset {
+            path: path.into(),
+            dataset: name.into(),
+            expected: "integers or booleans".into(),
+            found,
+        };
+        let datatype = dataset.datatype().map_err(|e| wrong(e.to_string()))?;
+        let integer = match &datatype {
+            DatatypeMessage::Enum { base, .. } => base,
+            other => other,
+        };
+        let buffer = match integer {
+            DatatypeMessage::FixedPoint { size, signed, .. } => Buffer::of_type(*size, *signed),
+            _ => None,
+        };
+        Ok(Self {
+            buffer: buffer.ok_or_else(|| wrong(format!("{datatype:?}")))?,
+            dataset,
+            name: name.into(),
+        })
+    }
+
+    /// Reads the values from row `start` on into `out`.
+    pub fn read(&mut self, start: usize, out: &mut [u16], path: &Path) -> Result<(), FormatsError> {
+        self.buffer
+            .read(&self.dataset, start, out)
+            .map_err(|error| unreadable(path, &self.name, start, out.len(), &error))
+    }
+
+    /// The error for the value at `row` of the last slice, which began at `start`.
+    pub fn bad_value(
+        &self,
+        start: usize,
+        row: usize,
+        expected: String,
+        path: &Path,
+    ) -> FormatsError {
+        FormatsError::Row {
+            path: path.into(),
+            dataset: self.name.clone(),
+            row: (start + row) as u64,
+            expected,
+            found: self.buffer.value(row).unwrap_or_default(),
+        }
+    }
+}
+
+/// The error for rows that the library cannot read, as in a truncated file.
+pub(super) fn unreadable(
+    path: &Path,
+    dataset: &str,
+    start: usize,
+    rows: usize,
+    error: &Hdf5Error,
+) -> FormatsError {
+    FormatsError::Dataset {
+        path: path.into(),
+        dataset: dataset.into(),
+        expected: format!("readable rows {start}..{}", start + rows),
+        found: error.to_string(),
+    }
+}
