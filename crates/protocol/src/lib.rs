@@ -1,2 +1,44 @@
-//! YAML to plan (being written).
+//! YAML text to a checked protocol to a flat plan of steps. Pure: no device, no clock, no file that is not injected.
+//!
+//! 1. [`Protocol::parse`] reads a protocol and reports everything that is wrong with it at once, each finding with
+//!    file, line, column, key path, expected, found and the line itself ([`Diagnostics`]).
+//! 2. [`Protocol::compile`] turns it into a [`Plan`](plan::Plan): seeds resolved, orders shuffled, positions absolute.
+//! 3. [`check()`] holds every segment of the plan against workspace, skin outline, keep-outs and limits.
+//! 4. [`Plan::summary`](plan::Plan::summary) and [`path_svg`] show it to people.
+//!
+//! [`Schedule`] describes a recording that was made without skinrig, for imports. The keys of both languages stand in
+//! one table each, which also yields their JSON Schemas ([`schema_json`], [`schedule_schema_json`]).
+
+pub mod area;
+mod build;
+mod build_path;
+pub mod check;
+mod compile;
+pub mod diagnostic;
+mod keys;
+mod overrides;
 pub mod plan;
+pub mod protocol;
+pub mod quantity;
+mod read;
+pub mod schedule;
+mod schedule_keys;
+mod schema;
+mod settings;
+mod shape;
+mod source;
+pub mod summary;
+mod svg;
+pub mod timing;
+mod yaml;
+
+pub use area::{Area, KeepOut, Surroundings};
+pub use check::{Segment, Violation, check};
+pub use diagnostic::{Diagnostic, Diagnostics};
+pub use plan::{Plan, PressStep, RunLimits, Step};
+pub use protocol::{CameraRequest, Loader, Motion, Pace, Protocol, Prototype, Scene, Sync};
+pub use schedule::{PressPhases, Schedule};
+pub use schema::{schedule_schema_json, schema_json};
+pub use source::Location;
+pub use summary::PlanSummary;
+pub use svg::path_svg;

@@ -1,0 +1,314 @@
+//! The locations of a path: meander, circles, explicit points, CSV, random.
+
+use std::collections::HashMap;
+use std::path::Path;
+
+use rand_xoshiro::Xoshiro256PlusPlus;
+use rand_xoshiro::rand_core::{Rng, SeedableRng};
+use skinrig_model::Point2;
+
+use crate::area::Surroundings;
+use crate::diagnostic::Collector;
+use crate::protocol::Loader;
+use crate::shape::Field;
+use crate::source::Span;
+use crate::yaml;
+
+/// The kind of path and its locations in order.
+pub(crate) fn locations(
+    path: &Field,
+    surroundings: Option<&Surroundings>,
+    seed: u64,
+    folder: &Path,
+    loader: Loader<'_>,
+    out: &mut Collector,
+) -> Option<(&'static str, Vec<Point2>)> {
+    let (kind, field) = path.entries().first()?;
+    match kind.as_str() {
+        "meander" => Some(("meander", meander(field, out)?)),
+        "circles" => Some(("circles", circles(field)?)),
+        "points" => {
+            let points = field.items().iter();
+            let points = points.map(|p| p.pair().map(|[x, y]| Point2::new(x, y)));
+            Some(("points", points.collect::<Option<_>>()?))
+        }
+        "csv" => Some(("csv", csv(field, folder, loader, out)?)),
+        "random" => Some(("random", random(field, surroundings?, seed, out)?)),
+        _ => None,
+    }
+}
+
+fn point(f: &Field, key: &str) -> Option<Point2> {
+    f.get(key)?.pair().map(|[x, y]| Point2::new(x, y))
+}
+
+fn meander(f: &Field, out: &mut Collector) -> Option<Vec<Point2>> {
+    let origin = point(f, "origin")?;
+    let pitch = f.quantity("pitch")?;
+    let (columns, rows) = (f.count("columns")?, f.count("rows")?);
+    let all = u64::from(columns) * u64::from(rows);
+    let count = match f.get("count") {
+        Some(field) => {
+            let count = u64::from(f.count("count")?);
+            if count > all {
+                out.error(field.span, field.path.as_str(), "more than the grid has")
+                    .expected(format!("at most {all}, {columns} columns x {rows} rows"))
+                    .found(count.to_string());
+                return None;
+            }
+            count
+        }
+        None => all,
+    };
+    let along_x = f.word("line_direction")? == "x";
+    let length = u64::from(if along_x { columns } else { rows });
+    if count > crate::keys::MOST_POINTS.unsigned_abs() {
+        out.error(f.span, f.path.as_str(), "too many locations")
+            .expected(format!("at most {}", crate::keys::MOST_POINTS))
+            .found(count.to_string());
+        return None;
+    }
+    Some(
+        (0..count)
+            .map(|k| {
+                let (line, step) = (k / length, k % length);
+                let step = if line % 2 == 0 {
+                    step
+                } else {
+                    length - 1 - step
+                };
+                let (i, j) = if along_x { (step, line) } else { (line, step) };
+                Point2::new(
+                    origin.x_mm + pitch * i as f64,
+                    origin.y_mm + pitch * j as f64,
+                )
+            })
+            .collect(),
+    )
+}
+
+fn circles(f: &Field) -> Option<Vec<Point2>> {
+    let centre = point(f, "centre")?;
+    let start = f.quantity("start_angle")?;
+    let mut points = Vec::new();
+    for ring in f.get("rings")?.items() {
+        let (radius, presses) = (ring.quantity("radius")?, ring.count("presses")?);
+        for k in 0..presses {
+            let angle = (start + 360.0 * f64::from(k) / f64::from(presses)).to_radians();
+            let (sin, cos) = sine_cosine(angle);
+            points.push(Point2::new(
+                centre.x_mm + radius * cos,
+                centre.y_mm + radius * sin,
+            ));
+        }
+    }
+    Some(points)
+}
+
+/// Sine and cosine with the last-bit noise near 0 removed, so that plans are the same on every machine.
+fn sine_cosine(angle: f64) -> (f64, f64) {
+    let tidy = |v: f64| (v * 1e12).round() / 1e12 + 0.0;
+    (tidy(angle.sin()), tidy(angle.cos()))
+}
+
+fn csv(f: &Field, folder: &Path, loader: Loader<'_>, out: &mut Collector) -> Option<Vec<Point2>> {
+    let file = f.get("file")?;
+    let name = f.text("file")?;
+    let path = folder.join(&name);
+    let shown = path.display().to_string();
+    let bytes = match loader(&path) {
+        Ok(bytes) => bytes,
+        Err(e) => {
+            out.error(file.span, file.path.as_str(), "the file cannot be read")
+                .expected("a CSV file, named relative to the protocol's folder")
+                .found(format!("{shown}: {e}"));
+            return None;
+        }
+    };
+    let text = match yaml::decode(&bytes) {
+        Ok(text) => text,
+        Err((at, found)) => {
+            out.error(
+                file.span,
+                file.path.as_str(),
+                "the file is no text of reasonable size",
+            )
+            .expected(format!(
+                "UTF-8 text of at most {} bytes",
+                yaml::LARGEST_TEXT
+            ))
+            .found(format!("{found} at byte {at} of {shown}"));
+            return None;
+        }
+    };
+    let scale = match f.word("unit")? {
+        "m" => 1000.0,
+        "cm" => 10.0,
+        _ => 1.0,
+    };
+    let skip_blank = f.flag("skip_blank_rows")?;
+    let source = out.sources.add(shown, text.trim_start_matches('\u{feff}'));
+    let points = csv_points(source, scale, skip_blank, out)?;
+    let count = match f.get("count") {
+        Some(field) => {
+            let count = f.count("count")? as usize;
+            if count > points.len() {
+                out.error(field.span, field.path.as_str(), "more than the file has")
+                    .expected(format!("at most {}, the rows of {name}", points.len()))
+                    .found(count.to_string());
+                return None;
+            }
+            count
+        }
+        None => points.len(),
+    };
+    if points.is_empty() || points.len() > crate::keys::MOST_POINTS as usize {
+        out.error(
+            file.span,
+            file.path.as_str(),
+            "the number of locations is out of range",
+        )
+        .expected(format!("1 to {} rows", crate::keys::MOST_POINTS))
+        .found(points.len().to_string());
+        return None;
+    }
+    points.get(..count).map(<[Point2]>::to_vec)
+}
+
+/// The columns `x` and `y` of source number `source`. Plain CSV: commas, no quotes.
+fn csv_points(
+    source: usize,
+    scale: f64,
+    skip_blank: bool,
+    out: &mut Collector,
+) -> Option<Vec<Point2>> {
+    let text = out.sources.text(source).to_owned();
+    let mut at = 0;
+    let mut lines = Vec::new();
+    for line in text.split('\n') {
+        lines.push((at, line.strip_suffix('\r').unwrap_or(line)));
+        at += line.len() + 1;
+    }
+    let (_, header) = *lines.first()?;
+    let names: Vec<&str> = header.split(',').map(str::trim).collect();
+    let mut columns = [0; 2];
+    for (slot, wanted) in columns.iter_mut().zip(["x", "y"]) {
+        match names.iter().position(|n| *n == wanted) {
+            Some(column) => *slot = column,
+            None => {
+                out.error(
+                    Span::new(source, 0, header.len()),
+                    "",
+                    format!("the column `{wanted}` is missing"),
+                )
+                .expected("a header line with `x` and `y`, separated by commas")
+                .found(yaml::quote(header));
+                return None;
+            }
+        }
+    }
+    let mut points = Vec::new();
+    let mut clean = true;
+    for (row, (start, line)) in lines.iter().enumerate().skip(1) {
+        if line.is_empty() && row + 1 == lines.len() {
+            continue; // what follows the last line break
+        }
+        let span = Span::new(source, *start, start + line.len());
+        if line.split(',').all(|c| c.trim().is_empty()) {
+            if !skip_blank {
+                out.error(span, "", format!("row {row} is blank"))
+                    .expected("numbers in the columns `x` and `y`")
+                    .help("remove the row, or write `skip_blank_rows: true` in the protocol");
+                clean = false;
+            }
+            continue;
+        }
+        let cells: Vec<&str> = line.split(',').map(str::trim).collect();
+        let value = |column: usize| {
+            let text = cells.get(column).copied().unwrap_or("");
+            let value = text.parse::<f64>().ok().map(|v| v * scale);
+            value.filter(|v| v.abs() <= 1000.0).ok_or(text)
+        };
+        match (value(columns[0]), value(columns[1])) {
+            (Ok(x), Ok(y)) => points.push(Point2::new(x, y)),
+            (Err(text), _) | (_, Err(text)) => {
+                out.error(span, "", format!("row {row} holds no location"))
+                    .expected("numbers within 1000 mm in the columns `x` and `y`")
+                    .found(yaml::quote(text));
+                clean = false;
+            }
+        }
+    }
+    clean.then_some(points)
+}
+
+/// A number in 0..1 with 53 random bits.
+fn unit(rng: &mut Xoshiro256PlusPlus) -> f64 {
+    (rng.next_u64() >> 11) as f64 / (1u64 << 53) as f64
+}
+
+/// Darts thrown in a row without a hit before the search gives up.
+const MOST_MISSES: u32 = 20_000;
+
+/// Dart throwing: uniform points of the enclosing rectangle from `xoshiro256++(seed)`, x before y; a dart counts
+/// when it lies inside the outline by the margins, outside every keep-out, and far enough from every other.
+fn random(f: &Field, around: &Surroundings, seed: u64, out: &mut Collector) -> Option<Vec<Point2>> {
+    let count = f.count("count")? as usize;
+    let spacing = f.quantity("spacing")?;
+    let margin = f.quantity("margin")? + around.margin_mm;
+    let seed = f.whole("seed").map_or(seed, i64::unsigned_abs);
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+    let outline = &around.outline;
+    let corner = Point2::new(
+        outline.centre.x_mm - outline.width_mm / 2.0,
+        outline.centre.y_mm - outline.height_mm / 2.0,
+    );
+    // Neighbours closer than `spacing` lie in the same or an adjacent cell of this size.
+    let cell = spacing.max(1e-3);
+    let cell_of = |p: Point2| {
+        (
+            (p.x_mm / cell).floor() as i64,
+            (p.y_mm / cell).floor() as i64,
+        )
+    };
+    let mut cells: HashMap<(i64, i64), Vec<Point2>> = HashMap::new();
+    let mut points: Vec<Point2> = Vec::with_capacity(count);
+    let mut misses = 0;
+    while points.len() < count {
+        let x = corner.x_mm + outline.width_mm * unit(&mut rng);
+        let p = Point2::new(x, corner.y_mm + outline.height_mm * unit(&mut rng));
+        let (i, j) = cell_of(p);
+        let crowded = || {
+            (-1..=1).any(|di| {
+                (-1..=1).any(|dj| {
+                    cells
+                        .get(&(i + di, j + dj))
+                        .is_some_and(|c| c.iter().any(|q| q.distance_mm(p) < spacing))
+                })
+            })
+        };
+        let free = outline.clearance_mm(p) >= margin
+            && around
+                .keep_outs
+                .iter()
+                .all(|k| k.area.distance_mm(p, p) > k.margin_mm);
+        if free && !crowded() {
+            cells.entry((i, j)).or_default().push(p);
+            points.push(p);
+            misses = 0;
+            continue;
+        }
+        misses += 1;
+        if misses > MOST_MISSES {
+            let field = f.get("count")?;
+            out.error(field.span, field.path.as_str(), "the locations do not fit")
+                .expected(format!(
+                    "{count} locations {spacing} mm apart, {margin} mm inside the outline"
+                ))
+                .found(format!("room for {} with seed {seed}", points.len()))
+                .help("ask for fewer locations, less spacing or a smaller margin");
+            return None;
+        }
+    }
+    Some(points)
+}

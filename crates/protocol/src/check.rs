@@ -1,0 +1,418 @@
+//! Checks every segment of a plan before any device is opened.
+
+use std::fmt;
+
+use serde::Serialize;
+use skinrig_model::{HostDuration, Point2, Point3, PressId, Skin};
+
+use crate::area::Surroundings;
+use crate::plan::{Plan, PressStep, Step};
+use crate::timing;
+
+/// A segment of motion that must not be made.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Violation {
+    /// The press that it belongs to, or that it leads to; `None` when no press follows.
+    pub press: Option<PressId>,
+    /// Index into [`Plan::steps`].
+    pub step: usize,
+    /// Which part of the motion.
+    pub segment: Segment,
+    /// What is wrong.
+    pub message: String,
+    /// What would have been accepted.
+    pub expected: String,
+    /// What the plan asks for.
+    pub found: String,
+    /// The key of the protocol to change.
+    pub key: &'static str,
+}
+
+/// A part of the motion.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Segment {
+    /// From where the tip waits to the first location.
+    FromHome,
+    /// Lateral motion.
+    Travel,
+    /// Down to the surface.
+    Approach,
+    /// From the surface to depth.
+    Press,
+    /// Back to clearance height.
+    Retract,
+    /// The plan as a whole.
+    Plan,
+}
+
+impl Segment {
+    /// For messages.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::FromHome => "travel from home",
+            Self::Travel => "travel",
+            Self::Approach => "approach",
+            Self::Press => "press",
+            Self::Retract => "retract",
+            Self::Plan => "plan",
+        }
+    }
+}
+
+impl fmt::Display for Violation {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.press {
+            Some(press) => write!(f, "{press}, {}: ", self.segment.name())?,
+            None => write!(f, "step {}, {}: ", self.step, self.segment.name())?,
+        }
+        write!(
+            f,
+            "{}: expected {}, found {}; change `{}`",
+            self.message, self.expected, self.found, self.key
+        )
+    }
+}
+
+/// Checks every segment of `plan`: travel, approach, press and retract, and the travel from `home` when it is known.
+///
+/// Each is held against the workspace, the true outline with its margin, the keep-outs, the clearance height for
+/// lateral motion, and the limits of speed, depth and force. An empty list means that the plan may run.
+#[must_use]
+pub fn check(plan: &Plan, around: &Surroundings, home: Option<Point3<Skin>>) -> Vec<Violation> {
+    let mut checker = Checker {
+        plan,
+        around,
+        found: Vec::new(),
+        step: 0,
+        press: None,
+    };
+    checker.limits();
+    let mut position = home;
+    for (index, step) in plan.steps.iter().enumerate() {
+        checker.step = index;
+        match step {
+            Step::Travel {
+                to,
+                speed_mm_s,
+                deadline,
+            } => {
+                checker.press =
+                    plan.steps
+                        .get(index..)
+                        .unwrap_or(&[])
+                        .iter()
+                        .find_map(|s| match s {
+                            Step::Press(p) => Some(p.press),
+                            _ => None,
+                        });
+                let first = !plan
+                    .steps
+                    .iter()
+                    .take(index)
+                    .any(|s| matches!(s, Step::Travel { .. } | Step::Press(_)));
+                let segment = if first {
+                    Segment::FromHome
+                } else {
+                    Segment::Travel
+                };
+                checker.travel(segment, position, *to, *speed_mm_s, *deadline);
+                position = Some(*to);
+            }
+            Step::Press(press) => {
+                checker.press = Some(press.press);
+                checker.press(press, position);
+                position = Some(press.at.at_height(plan.limits.clearance_mm));
+            }
+            Step::Begin { .. } => {}
+            Step::Pause { duration } => {
+                if duration.0 < 0 {
+                    checker.add(
+                        Segment::Plan,
+                        "a pause of negative length",
+                        "0 s or more",
+                        duration,
+                        "repetitions.between.pause",
+                    );
+                }
+            }
+        }
+    }
+    checker.found
+}
+
+struct Checker<'a> {
+    plan: &'a Plan,
+    around: &'a Surroundings,
+    found: Vec<Violation>,
+    step: usize,
+    press: Option<PressId>,
+}
+
+/// Rounding of coordinates that is no violation, mm.
+const TINY_MM: f64 = 1e-9;
+
+impl Checker<'_> {
+    fn add(
+        &mut self,
+        segment: Segment,
+        message: &str,
+        expected: impl fmt::Display,
+        found: impl fmt::Display,
+        key: &'static str,
+    ) {
+        self.found.push(Violation {
+            press: self.press,
+            step: self.step,
+            segment,
+            message: message.to_owned(),
+            expected: expected.to_string(),
+            found: found.to_string(),
+            key,
+        });
+    }
+
+    fn limits(&mut self) {
+        let l = self.plan.limits;
+        let positive = |v: f64| v.is_finite() && v > 0.0;
+        for (value, name, key) in [
+            (l.clearance_mm, "the clearance height", "motion.clearance"),
+            (l.max_depth_mm, "the depth limit", "limits.max_depth"),
+            (l.max_speed_mm_s, "the speed limit", "limits.max_speed"),
+            (l.max_force_n, "the force limit", "limits.max_force"),
+            (
+                l.position_tolerance_mm,
+                "the settling tolerance",
+                "motion.settle.tolerance",
+            ),
+        ] {
+            if !positive(value) {
+                self.add(
+                    Segment::Plan,
+                    &format!("{name} is senseless"),
+                    "a value above 0",
+                    value,
+                    key,
+                );
+            }
+        }
+        if l.position_tolerance_mm >= l.clearance_mm {
+            self.add(
+                Segment::Plan,
+                "a tip on the surface would count as clear",
+                format!("a tolerance below {} mm", l.clearance_mm),
+                format!("{} mm", l.position_tolerance_mm),
+                "motion.settle.tolerance",
+            );
+        }
+        for (k, press) in self.plan.presses.iter().enumerate() {
+            if press.id.0 as usize != k {
+                self.press = Some(press.id);
+                self.add(
+                    Segment::Plan,
+                    "presses are not numbered in order",
+                    k,
+                    press.id.0,
+                    "path",
+                );
+                break;
+            }
+        }
+        self.press = None;
+    }
+
+    fn workspace(&mut self, segment: Segment, p: Point3<Skin>, key: &'static str) {
+        let l = &self.plan.limits;
+        let (min, max) = (l.workspace_min_mm, l.workspace_max_mm);
+        for (k, axis) in ["x", "y", "z"].into_iter().enumerate() {
+            let v = p.to_array()[k];
+            if !(v >= min[k] - TINY_MM && v <= max[k] + TINY_MM) {
+                let key = if axis == "z" && segment != Segment::FromHome {
+                    "motion.clearance` or `limits.workspace"
+                } else {
+                    key
+                };
+                self.add(
+                    segment,
+                    &format!("{axis} leaves the workspace"),
+                    format!("{} to {} mm", min[k], max[k]),
+                    format!("{v:.3} mm"),
+                    key,
+                );
+            }
+        }
+    }
+
+    fn speed(&mut self, segment: Segment, v: f64, key: &'static str) {
+        let max = self.plan.limits.max_speed_mm_s;
+        if !(v > 0.0 && v <= max + TINY_MM) {
+            self.add(
+                segment,
+                "the speed is outside its limit",
+                format!("more than 0 and at most {max} mm/s"),
+                format!("{v} mm/s"),
+                key,
+            );
+        }
+    }
+
+    fn travel(
+        &mut self,
+        segment: Segment,
+        from: Option<Point3<Skin>>,
+        to: Point3<Skin>,
+        speed: f64,
+        deadline: HostDuration,
+    ) {
+        let clearance = self.plan.limits.clearance_mm;
+        let key = if segment == Segment::FromHome {
+            "motion.home` or `path"
+        } else {
+            "path"
+        };
+        self.workspace(segment, to, key);
+        if let Some(from) = from.filter(|_| segment == Segment::FromHome) {
+            self.workspace(segment, from, "motion.home");
+        }
+        self.speed(segment, speed, "motion.travel");
+        let start = from.unwrap_or(to);
+        let lateral = start.plane().distance_mm(to.plane()) > TINY_MM;
+        let lowest = start.to_array()[2].min(to.to_array()[2]);
+        if !(to.to_array()[2] >= clearance - TINY_MM && (!lateral || lowest >= clearance - TINY_MM))
+        {
+            self.add(
+                segment,
+                "lateral motion below clearance height",
+                format!("{clearance} mm or higher"),
+                format!("{lowest:.3} mm"),
+                "motion.clearance",
+            );
+        }
+        self.keep_outs(segment, start.plane(), to.plane(), lowest, "path");
+        let distance = start.distance_mm(to);
+        self.deadline(segment, deadline, distance / speed);
+    }
+
+    fn deadline(&mut self, segment: Segment, deadline: HostDuration, least_s: f64) {
+        if !(deadline.as_secs_f64() > least_s) {
+            self.add(
+                segment,
+                "the deadline cannot be kept",
+                format!("more than {least_s:.3} s"),
+                deadline,
+                "motion",
+            );
+        }
+    }
+
+    fn keep_outs(
+        &mut self,
+        segment: Segment,
+        a: Point2,
+        b: Point2,
+        height_mm: f64,
+        key: &'static str,
+    ) {
+        for keep_out in &self.around.keep_outs {
+            if keep_out
+                .height_mm
+                .is_some_and(|h| height_mm >= h + keep_out.margin_mm)
+            {
+                continue;
+            }
+            let distance = keep_out.area.distance_mm(a, b);
+            if distance <= keep_out.margin_mm {
+                self.add(
+                    segment,
+                    &format!("comes too close to `{}`", keep_out.name),
+                    format!("more than {} mm away", keep_out.margin_mm),
+                    format!(
+                        "{distance:.3} mm between ({:.3}, {:.3}) and ({:.3}, {:.3}) mm",
+                        a.x_mm, a.y_mm, b.x_mm, b.y_mm
+                    ),
+                    key,
+                );
+            }
+        }
+    }
+
+    fn press(&mut self, press: &PressStep, position: Option<Point3<Skin>>) {
+        let limits = self.plan.limits;
+        let at = press.at;
+        let planned = self.plan.presses.get(press.press.0 as usize);
+        let sync = planned.is_some_and(|p| p.role == skinrig_model::PressRole::Sync);
+        let key = if sync { "sync.at" } else { "path" };
+        if planned.is_none_or(|p| p.at != at || p.depth_mm != press.depth_mm) {
+            self.add(
+                Segment::Plan,
+                "the step is not the planned press",
+                "the same place and depth",
+                format!("({}, {}) mm", at.x_mm, at.y_mm),
+                key,
+            );
+        }
+        let above = at.at_height(limits.clearance_mm);
+        if position.is_none_or(|p| p.distance_mm(above) > TINY_MM) {
+            self.add(
+                Segment::Approach,
+                "the press begins away from its place",
+                format!(
+                    "the tip above ({}, {}) mm at clearance height",
+                    at.x_mm, at.y_mm
+                ),
+                position.map_or("an unknown place".to_owned(), |p| {
+                    format!("{:?} mm", p.to_array())
+                }),
+                key,
+            );
+        }
+        self.workspace(Segment::Approach, above, key);
+        self.workspace(Segment::Press, at.at_height(-press.depth_mm), key);
+        self.speed(
+            Segment::Approach,
+            press.approach_speed_mm_s,
+            "motion.approach",
+        );
+        self.speed(Segment::Press, press.indent_speed_mm_s, "motion.indent");
+        self.speed(Segment::Retract, press.retract_speed_mm_s, "motion.retract");
+        let depth = press.depth_mm;
+        if !(depth > 0.0 && depth <= limits.max_depth_mm + TINY_MM) {
+            self.add(
+                Segment::Press,
+                "the depth is outside its limit",
+                format!("more than 0 and at most {} mm", limits.max_depth_mm),
+                format!("{depth} mm"),
+                if sync { "sync.depth" } else { "depth" },
+            );
+        }
+        let inside = self.around.outline.clearance_mm(at);
+        let margin = self.around.margin_mm;
+        if !(inside >= margin - TINY_MM) {
+            let found = if inside < 0.0 {
+                format!("({:.3}, {:.3}) mm, outside", at.x_mm, at.y_mm)
+            } else {
+                format!("({:.3}, {:.3}) mm, {inside:.3} mm inside", at.x_mm, at.y_mm)
+            };
+            self.add(
+                Segment::Press,
+                "not on the skin",
+                format!("at least {margin} mm inside the outline"),
+                found,
+                key,
+            );
+        }
+        self.keep_outs(Segment::Press, at, at, -depth, key);
+        if press.hold.0 < 0 || press.start_after_begin.is_some_and(|s| s.0 < 0) {
+            self.add(
+                Segment::Press,
+                "a negative time",
+                "0 s or more",
+                press.hold,
+                "motion.hold",
+            );
+        }
+        let (moving, still) = timing::press_s(&limits, press);
+        self.deadline(Segment::Press, press.deadline, moving + still);
+    }
+}

@@ -1,0 +1,277 @@
+//! What is wrong with an input: every finding with its place, what was expected, what was found, what to do.
+
+use std::fmt;
+
+use serde::Serialize;
+
+use crate::source::{Location, Sources, Span};
+
+/// One finding. Findings are always errors: nothing in an input is repaired in silence.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Diagnostic {
+    /// What is wrong, in a few words, lower case.
+    pub message: String,
+    /// The key path, for example `path.meander.pitch`; empty for the file as a whole.
+    pub path: String,
+    /// Where.
+    pub location: Location,
+    /// What would have been accepted.
+    pub expected: Option<String>,
+    /// What is there.
+    pub found: Option<String>,
+    /// What to do next: a fix to type, or a "did you mean".
+    pub help: Option<String>,
+}
+
+/// Every finding of one input, in the order of the text. Never empty when returned as an error.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
+pub struct Diagnostics {
+    list: Vec<Diagnostic>,
+}
+
+impl Diagnostics {
+    /// The findings, in the order of the text.
+    #[must_use]
+    pub fn list(&self) -> &[Diagnostic] {
+        &self.list
+    }
+
+    /// The findings as text for people: for each one the place, the line underlined, expected, found, help.
+    /// With `color`, ANSI escapes mark severity, places and fixes.
+    #[must_use]
+    pub fn render(&self, color: bool) -> String {
+        let paint = Paint(color);
+        let mut out = String::new();
+        for diagnostic in &self.list {
+            diagnostic.write(&mut out, paint);
+            out.push('\n');
+        }
+        let count = match self.list.len() {
+            1 => "1 error".to_owned(),
+            n => format!("{n} errors"),
+        };
+        out.push_str(&paint.error(&count));
+        out.push('\n');
+        out
+    }
+}
+
+impl fmt::Display for Diagnostics {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.render(false))
+    }
+}
+
+impl std::error::Error for Diagnostics {}
+
+impl Diagnostic {
+    fn write(&self, out: &mut String, paint: Paint) {
+        let Location {
+            file,
+            line,
+            column,
+            length,
+            text,
+        } = &self.location;
+        let number = line.to_string();
+        let margin = " ".repeat(number.len());
+        let bar = paint.frame("|");
+        out.push_str(&format!("{}: {}\n", paint.error("error"), self.message));
+        let path = if self.path.is_empty() {
+            String::new()
+        } else {
+            format!("  {}", paint.strong(&self.path))
+        };
+        out.push_str(&format!(
+            "{margin}{} {file}:{line}:{column}{path}\n",
+            paint.frame("-->")
+        ));
+        out.push_str(&format!("{margin} {bar}\n"));
+        let (text, column) = excerpt(text, *column);
+        out.push_str(&format!("{} {bar} {text}\n", paint.frame(&number)));
+        let room = (text.chars().count() + 1).saturating_sub(column - 1).max(1);
+        out.push_str(&format!(
+            "{margin} {bar} {}{}\n",
+            " ".repeat(column - 1),
+            paint.error(&"^".repeat((*length).min(room)))
+        ));
+        for (label, value) in [("expected", &self.expected), ("found", &self.found)] {
+            if let Some(value) = value {
+                out.push_str(&format!("{margin} = {label}: {value}\n"));
+            }
+        }
+        if let Some(help) = &self.help {
+            out.push_str(&format!("{margin} = {}: {help}\n", paint.help("help")));
+        }
+    }
+}
+
+/// A line that fits a terminal: at most [`WIDEST`] characters around the column, and the column in it.
+fn excerpt(text: &str, column: usize) -> (String, usize) {
+    const WIDEST: usize = 120;
+    let clean = |s: &str| -> String {
+        s.chars()
+            .map(|c| if c.is_control() { ' ' } else { c })
+            .collect()
+    };
+    if text.chars().count() <= WIDEST {
+        return (clean(text), column);
+    }
+    let first = column.saturating_sub(WIDEST / 2);
+    let part: String = text.chars().skip(first).take(WIDEST).collect();
+    (clean(&part), column - first)
+}
+
+/// ANSI escapes, or none.
+#[derive(Clone, Copy)]
+struct Paint(bool);
+
+impl Paint {
+    fn with(self, code: &str, text: &str) -> String {
+        if self.0 {
+            format!("\u{1b}[{code}m{text}\u{1b}[0m")
+        } else {
+            text.to_owned()
+        }
+    }
+    fn error(self, text: &str) -> String {
+        self.with("1;31", text)
+    }
+    fn frame(self, text: &str) -> String {
+        self.with("34", text)
+    }
+    fn strong(self, text: &str) -> String {
+        self.with("1", text)
+    }
+    fn help(self, text: &str) -> String {
+        self.with("1;32", text)
+    }
+}
+
+/// How many findings are kept of one input; a file full of nonsense stops here.
+const MOST_FINDINGS: usize = 100;
+
+/// Collects findings about some sources.
+pub(crate) struct Collector {
+    /// The texts.
+    pub sources: Sources,
+    found: Vec<(Span, Diagnostic)>,
+}
+
+/// A finding under construction; it is already in the collector.
+pub(crate) struct Finding<'a>(Option<&'a mut Diagnostic>);
+
+impl Finding<'_> {
+    /// What would have been accepted.
+    pub fn expected(mut self, text: impl Into<String>) -> Self {
+        if let Some(d) = self.0.as_mut() {
+            d.expected = Some(text.into());
+        }
+        self
+    }
+
+    /// What is there.
+    pub fn found(mut self, text: impl Into<String>) -> Self {
+        if let Some(d) = self.0.as_mut() {
+            d.found = Some(text.into());
+        }
+        self
+    }
+
+    /// What to do next.
+    pub fn help(mut self, text: impl Into<String>) -> Self {
+        if let Some(d) = self.0.as_mut() {
+            d.help = Some(text.into());
+        }
+        self
+    }
+
+    /// What to do next, when there is something to say.
+    pub fn maybe_help(self, text: Option<String>) -> Self {
+        match text {
+            Some(text) => self.help(text),
+            None => self,
+        }
+    }
+}
+
+impl Collector {
+    /// No findings yet.
+    pub fn new(sources: Sources) -> Self {
+        Self {
+            sources,
+            found: Vec::new(),
+        }
+    }
+
+    /// Adds a finding at `span` of the key `path`.
+    pub fn error(
+        &mut self,
+        span: Span,
+        path: impl Into<String>,
+        message: impl Into<String>,
+    ) -> Finding<'_> {
+        if self.found.len() >= MOST_FINDINGS {
+            return Finding(None);
+        }
+        let diagnostic = Diagnostic {
+            message: message.into(),
+            path: path.into(),
+            location: self.sources.locate(span),
+            expected: None,
+            found: None,
+            help: None,
+        };
+        self.found.push((span, diagnostic));
+        Finding(self.found.last_mut().map(|(_, d)| d))
+    }
+
+    /// True when nothing is wrong so far.
+    pub fn is_clean(&self) -> bool {
+        self.found.is_empty()
+    }
+
+    /// The findings in the order of the text.
+    pub fn finish(mut self) -> Diagnostics {
+        self.found
+            .sort_by_key(|(span, _)| (span.source, span.start, span.end));
+        Diagnostics {
+            list: self.found.into_iter().map(|(_, d)| d).collect(),
+        }
+    }
+}
+
+/// The candidate that looks most like `word`, when one is close enough to be a slip.
+pub(crate) fn closest<'a>(
+    word: &str,
+    candidates: impl IntoIterator<Item = &'a str>,
+) -> Option<&'a str> {
+    let flat = |s: &str| s.to_lowercase().replace(['-', ' '], "_");
+    let wanted = flat(word);
+    candidates
+        .into_iter()
+        .map(|c| (strsim::damerau_levenshtein(&wanted, &flat(c)), c))
+        .filter(|(distance, c)| {
+            *distance <= 1.max(c.chars().count().min(wanted.chars().count()) / 3)
+        })
+        .min_by_key(|(distance, _)| *distance)
+        .map(|(_, c)| c)
+}
+
+/// `did you mean X?` for the candidate that looks most like `word`.
+pub(crate) fn did_you_mean<'a>(
+    word: &str,
+    candidates: impl IntoIterator<Item = &'a str>,
+) -> Option<String> {
+    closest(word, candidates).map(|c| format!("did you mean `{c}`?"))
+}
+
+/// `a`, `b` or `c`.
+pub(crate) fn one_of<'a>(words: impl IntoIterator<Item = &'a str>) -> String {
+    let words: Vec<String> = words.into_iter().map(|w| format!("`{w}`")).collect();
+    match words.as_slice() {
+        [] => "nothing".to_owned(),
+        [only] => only.clone(),
+        [first @ .., last] => format!("{} or {last}", first.join(", ")),
+    }
+}

@@ -1,0 +1,350 @@
+//! Quantities: a number with its unit, as people write them.
+//!
+//! `4 mm`, `0.4 cm`, `1.5e-1 s`, `20 mm/s`, `2 N`, `30 deg`, `1 kHz`, `10 px`. The space is optional. A quotient by a
+//! whole number keeps a value exact that has no short decimal form: `868 s / 289`. A bare number is an error: it
+//! could be anything.
+
+use crate::diagnostic::closest;
+
+/// What a quantity measures. Values are kept in the unit that the variant names.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Dimension {
+    /// Millimetres.
+    Length,
+    /// Seconds.
+    Time,
+    /// Millimetres per second.
+    Speed,
+    /// Newton.
+    Force,
+    /// Degrees.
+    Angle,
+    /// Hertz.
+    Frequency,
+    /// Pixels.
+    Pixels,
+}
+
+impl Dimension {
+    /// The accepted units, each with its size in the unit that values are kept in; the usual one first.
+    #[must_use]
+    pub const fn units(self) -> &'static [(&'static str, f64)] {
+        match self {
+            Self::Length => &[
+                ("mm", 1.0),
+                ("cm", 10.0),
+                ("m", 1e3),
+                ("um", 1e-3),
+                ("µm", 1e-3),
+            ],
+            Self::Time => &[
+                ("s", 1.0),
+                ("ms", 1e-3),
+                ("us", 1e-6),
+                ("µs", 1e-6),
+                ("min", 60.0),
+                ("h", 3600.0),
+            ],
+            Self::Speed => &[("mm/s", 1.0), ("cm/s", 10.0), ("m/s", 1e3), ("um/s", 1e-3)],
+            Self::Force => &[("N", 1.0), ("mN", 1e-3)],
+            Self::Angle => &[
+                ("deg", 1.0),
+                ("°", 1.0),
+                ("rad", 180.0 / std::f64::consts::PI),
+            ],
+            Self::Frequency => &[("Hz", 1.0), ("kHz", 1e3), ("MHz", 1e6)],
+            Self::Pixels => &[("px", 1.0)],
+        }
+    }
+
+    /// All dimensions.
+    const ALL: [Self; 7] = [
+        Self::Length,
+        Self::Time,
+        Self::Speed,
+        Self::Force,
+        Self::Angle,
+        Self::Frequency,
+        Self::Pixels,
+    ];
+
+    /// `a length`, `a time`, ...
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Length => "a length",
+            Self::Time => "a time",
+            Self::Speed => "a speed",
+            Self::Force => "a force",
+            Self::Angle => "an angle",
+            Self::Frequency => "a frequency",
+            Self::Pixels => "a number of pixels",
+        }
+    }
+
+    /// The unit that people usually write.
+    #[must_use]
+    pub fn usual_unit(self) -> &'static str {
+        self.units().first().map_or("", |(unit, _)| unit)
+    }
+
+    /// A value for examples.
+    #[must_use]
+    pub const fn example(self) -> &'static str {
+        match self {
+            Self::Length => "4 mm",
+            Self::Time => "1.5 s",
+            Self::Speed => "20 mm/s",
+            Self::Force => "2 N",
+            Self::Angle => "30 deg",
+            Self::Frequency => "1 kHz",
+            Self::Pixels => "10 px",
+        }
+    }
+}
+
+/// A value and what it measures.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Quantity {
+    /// In the unit of the dimension: mm, s, mm/s, N, deg, Hz or px. Finite.
+    pub value: f64,
+    /// What it measures.
+    pub dimension: Dimension,
+}
+
+/// Why a text is no quantity of a wanted dimension: fragments for "expected", "found" and "help".
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct QuantityError {
+    /// What is wrong, a few words.
+    pub message: String,
+    /// What would have been accepted.
+    pub expected: String,
+    /// What is there.
+    pub found: String,
+    /// What to type instead, when it can be told.
+    pub help: Option<String>,
+}
+
+/// Reads `text` as a quantity of one of the `wanted` dimensions (at least one).
+///
+/// # Errors
+/// [`QuantityError`] for anything else: a bare number, an unknown or a wrong unit, no number, not finite.
+pub fn parse(text: &str, wanted: &[Dimension]) -> Result<Quantity, QuantityError> {
+    let text = text.trim();
+    let expected = expectation(wanted);
+    let usual = wanted.first().map_or("mm", |d| d.usual_unit());
+    let fail = |message: &str, found: String, help: Option<String>| QuantityError {
+        message: message.to_owned(),
+        expected: expected.clone(),
+        found,
+        help,
+    };
+    let (number, rest) = split_number(text);
+    let shown: String = text.chars().take(60).collect();
+    let Some(number) = number else {
+        return Err(fail("not a quantity", format!("`{shown}`"), None));
+    };
+    if !number.is_finite() {
+        return Err(fail("the number is too large", format!("`{shown}`"), None));
+    }
+    let (unit, divisor) = match split_divisor(rest) {
+        Ok(parts) => parts,
+        Err(found) => {
+            let help =
+                Some("write a quotient as `868 s / 289`, by a whole number above 0".to_owned());
+            return Err(fail("the divisor is no whole number above 0", found, help));
+        }
+    };
+    if unit.is_empty() {
+        let help = Some(format!(
+            "write `{shown} {usual}`, or the unit that is meant"
+        ));
+        return Err(fail(
+            "the unit is missing",
+            format!("the bare number `{shown}`"),
+            help,
+        ));
+    }
+    if unit.starts_with(',') {
+        let help = Some(format!(
+            "write the decimal point as `.`: `{}`",
+            shown.replacen(',', ".", 1)
+        ));
+        return Err(fail("not a quantity", format!("`{shown}`"), help));
+    }
+    for &dimension in wanted {
+        if let Some((_, size)) = dimension.units().iter().find(|(name, _)| *name == unit) {
+            let value = number * size / divisor;
+            if !value.is_finite() {
+                return Err(fail("the number is too large", format!("`{shown}`"), None));
+            }
+            return Ok(Quantity { value, dimension });
+        }
+    }
+    for other in Dimension::ALL {
+        if other.units().iter().any(|(name, _)| *name == unit) {
+            let help = None;
+            return Err(fail(
+                "the unit does not fit",
+                format!("{}, `{shown}`", other.name()),
+                help,
+            ));
+        }
+    }
+    let known = wanted.iter().flat_map(|d| d.units()).map(|(name, _)| *name);
+    let close = known
+        .clone()
+        .find(|name| name.eq_ignore_ascii_case(unit))
+        .or_else(|| closest(unit, known));
+    let help = close.map(|name| {
+        let before = text.get(..text.len() - rest.len()).unwrap_or("").trim_end();
+        format!("did you mean `{before} {name}`?")
+    });
+    let unit: String = unit.chars().take(30).collect();
+    Err(fail("unknown unit", format!("`{unit}`"), help))
+}
+
+/// `a length with its unit, for example `4 mm` (mm, cm, m, um)`.
+fn expectation(wanted: &[Dimension]) -> String {
+    let each: Vec<String> = wanted
+        .iter()
+        .map(|d| {
+            let units: Vec<&str> = d
+                .units()
+                .iter()
+                .map(|(name, _)| *name)
+                .filter(|name| name.is_ascii())
+                .collect();
+            format!(
+                "{} such as `{}` (units: {})",
+                d.name(),
+                d.example(),
+                units.join(", ")
+            )
+        })
+        .collect();
+    each.join(" or ")
+}
+
+/// The number at the start of `text` and what follows it, without spaces between.
+pub(crate) fn split_number(text: &str) -> (Option<f64>, &str) {
+    let bytes = text.as_bytes();
+    let digits = |from: usize| {
+        let mut at = from;
+        while bytes.get(at).is_some_and(u8::is_ascii_digit) {
+            at += 1;
+        }
+        at
+    };
+    let sign = usize::from(matches!(bytes.first(), Some(b'+' | b'-')));
+    let mut end = digits(sign);
+    let mut seen = end > sign;
+    if bytes.get(end) == Some(&b'.') {
+        let fraction = digits(end + 1);
+        seen |= fraction > end + 1;
+        end = fraction;
+    }
+    if !seen {
+        return (None, text);
+    }
+    if matches!(bytes.get(end), Some(b'e' | b'E')) {
+        let sign = usize::from(matches!(bytes.get(end + 1), Some(b'+' | b'-')));
+        let exponent = digits(end + 1 + sign);
+        if exponent > end + 1 + sign {
+            end = exponent;
+        }
+    }
+    let (number, rest) = text.split_at(end);
+    (number.parse().ok(), rest.trim_start())
+}
+
+/// A unit and the divisor after it, 1 when there is none. `mm/s` is a unit, `s / 289` a quotient.
+fn split_divisor(rest: &str) -> Result<(&str, f64), String> {
+    let Some((unit, divisor)) = rest.rsplit_once('/') else {
+        return Ok((rest.trim(), 1.0));
+    };
+    let divisor = divisor.trim();
+    if !divisor.starts_with(|c: char| c.is_ascii_digit() || c == '-' || c == '+') {
+        return Ok((rest.trim(), 1.0));
+    }
+    match divisor.parse::<u32>() {
+        Ok(d) if d > 0 => Ok((unit.trim(), f64::from(d))),
+        _ => Err(format!(
+            "`{}`",
+            divisor.chars().take(30).collect::<String>()
+        )),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn units_convert() {
+        let value = |text: &str, d| parse(text, &[d]).unwrap().value;
+        assert_eq!(value("4 mm", Dimension::Length), 4.0);
+        assert_eq!(value("0.4cm", Dimension::Length), 4.0);
+        assert_eq!(value("-1.5e1 um", Dimension::Length), -0.015);
+        assert_eq!(value("50 ms", Dimension::Time), 0.05);
+        assert_eq!(value("1 min", Dimension::Time), 60.0);
+        assert_eq!(value("0.02 m/s", Dimension::Speed), 20.0);
+        assert_eq!(value("1 kHz", Dimension::Frequency), 1000.0);
+        assert_eq!(value("868 s / 289", Dimension::Time), 868.0 / 289.0);
+        assert_eq!(value("60 mm/s / 3", Dimension::Speed), 20.0);
+    }
+
+    #[test]
+    fn either_dimension() {
+        let wanted = [Dimension::Speed, Dimension::Time];
+        assert_eq!(parse("2 s", &wanted).unwrap().dimension, Dimension::Time);
+        assert_eq!(
+            parse("2 mm/s", &wanted).unwrap().dimension,
+            Dimension::Speed
+        );
+    }
+
+    #[test]
+    fn errors_show_the_fix() {
+        let error = |text: &str| parse(text, &[Dimension::Length]).unwrap_err();
+        assert_eq!(error("4").message, "the unit is missing");
+        assert_eq!(
+            error("4").help.unwrap(),
+            "write `4 mm`, or the unit that is meant"
+        );
+        assert_eq!(error("4 s").found, "a time, `4 s`");
+        assert_eq!(error("4 mmm").help.unwrap(), "did you mean `4 mm`?");
+        assert_eq!(error("4 MM").help.unwrap(), "did you mean `4 mm`?");
+        assert_eq!(
+            error("4,5 mm").help.unwrap(),
+            "write the decimal point as `.`: `4.5 mm`"
+        );
+        for text in [
+            "",
+            "mm",
+            "nan mm",
+            ".inf mm",
+            "-",
+            ".",
+            "1e999 mm",
+            "4 mm / 0",
+            "4 mm / -1",
+            "4 mm / x",
+        ] {
+            assert!(parse(text, &[Dimension::Length]).is_err(), "{text}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn never_panics(text in ".{0,40}") {
+            let _ = parse(&text, &[Dimension::Length, Dimension::Time]);
+        }
+
+        #[test]
+        fn written_values_come_back(value in -1e6f64..1e6) {
+            prop_assert_eq!(parse(&format!("{value} mm"), &[Dimension::Length]).unwrap().value, value);
+        }
+    }
+}

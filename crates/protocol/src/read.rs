@@ -1,0 +1,471 @@
+//! Reads a node tree by its table: every structural error at once, and the values that could be read.
+
+use crate::diagnostic::{Collector, did_you_mean, one_of};
+use crate::quantity::{self, Dimension};
+use crate::shape::{Field, Key, Need, Range, Shape, Table, Value, Word};
+use crate::source::{Sources, Span};
+use crate::yaml::{Kind, Node, join, quote};
+
+/// Reads `node` as a mapping of `table`. Entries that could not be read are absent from the result.
+pub(crate) fn read_table(
+    node: &Node,
+    table: &'static Table,
+    path: &str,
+    out: &mut Collector,
+) -> Option<Field> {
+    let entries = match &node.kind {
+        Kind::Map(entries) => entries,
+        // `key:` with nothing after it is a mapping without keys; its required keys will be missed.
+        Kind::Null if !path.is_empty() => {
+            out.error(node.span, path, "the value is missing")
+                .expected(format!("a mapping with {}", key_names(table)))
+                .found("nothing");
+            return None;
+        }
+        _ => {
+            out.error(node.span, path, "expected a mapping")
+                .expected(format!("a mapping with {}", key_names(table)))
+                .found(node.describe());
+            return None;
+        }
+    };
+    let mut values = Vec::with_capacity(table.keys.len());
+    for entry in entries {
+        let here = join(path, &entry.key);
+        let Some(key) = table.keys.iter().find(|k| k.name == entry.key) else {
+            let names = table.keys.iter().map(|k| k.name);
+            out.error(entry.key_span, here, "unknown key")
+                .expected(key_names(table))
+                .found(quote(&entry.key))
+                .maybe_help(did_you_mean(&entry.key, names));
+            continue;
+        };
+        let place = if matches!(entry.value.kind, Kind::Null) {
+            Node {
+                span: entry.key_span,
+                kind: Kind::Null,
+            }
+        } else {
+            entry.value.clone()
+        };
+        if let Some(field) = read(&place, &key.shape, &here, out) {
+            values.push((entry.key.clone(), field));
+        }
+    }
+    let head = head_of(node, out);
+    for key in table.keys {
+        if entries.iter().any(|e| e.key == key.name) {
+            continue;
+        }
+        match key.need {
+            Need::Optional => {}
+            Need::Required => {
+                // A misspelt key is reported once, as an unknown key.
+                let slip = entries.iter().any(|e| {
+                    !table.keys.iter().any(|k| k.name == e.key)
+                        && crate::diagnostic::closest(&e.key, [key.name]).is_some()
+                });
+                if !slip {
+                    out.error(head, join(path, key.name), "a required key is missing")
+                        .expected(format!("`{}`: {}", key.name, expectation(&key.shape)))
+                        .help(format!("add `{}: {}`", key.name, example(&key.shape)));
+                }
+            }
+            Need::Default(text) => {
+                if let Some(value) = default_value(key, text) {
+                    let path = join(path, key.name);
+                    values.push((
+                        key.name.to_owned(),
+                        Field {
+                            span: node.span,
+                            path,
+                            ..value
+                        },
+                    ));
+                }
+            }
+        }
+    }
+    for group in table.exactly_one {
+        let given: Vec<_> = entries
+            .iter()
+            .filter(|e| group.contains(&e.key.as_str()))
+            .collect();
+        match given.as_slice() {
+            [_] => {}
+            [] => {
+                let slip = entries.iter().any(|e| {
+                    !table.keys.iter().any(|k| k.name == e.key)
+                        && crate::diagnostic::closest(&e.key, group.iter().copied()).is_some()
+                });
+                if !slip {
+                    out.error(head, path, "a required key is missing")
+                        .expected(format!("exactly one of {}", one_of(group.iter().copied())));
+                }
+            }
+            [_, others @ ..] => {
+                for other in others {
+                    out.error(
+                        other.key_span,
+                        join(path, &other.key),
+                        "only one of these keys may be given",
+                    )
+                    .expected(format!("exactly one of {}", one_of(group.iter().copied())))
+                    .found(one_of(given.iter().map(|e| e.key.as_str())).replace(" or ", " and "))
+                    .help("remove all but one");
+                }
+            }
+        }
+    }
+    Some(Field {
+        span: node.span,
+        path: path.to_owned(),
+        value: Value::Map(values),
+    })
+}
+
+/// The first line of a mapping, to point at when something is missing from it.
+fn head_of(node: &Node, out: &Collector) -> Span {
+    match &node.kind {
+        Kind::Map(entries) => entries.first().map_or(node.span, |e| e.key_span),
+        _ => Span::new(
+            node.span.source,
+            node.span.start,
+            node.span
+                .start
+                .min(out.sources.text(node.span.source).len()),
+        ),
+    }
+}
+
+/// Reads the documented default of a key with the key's own shape.
+fn default_value(key: &'static Key, text: &str) -> Option<Field> {
+    let mut sources = Sources::default();
+    let source = sources.add("default", text);
+    let mut collector = Collector::new(sources);
+    let node = crate::yaml::parse(&mut collector, source)?;
+    read(&node, &key.shape, key.name, &mut collector)
+}
+
+/// Reads `node` by `shape`.
+pub(crate) fn read(
+    node: &Node,
+    shape: &'static Shape,
+    path: &str,
+    out: &mut Collector,
+) -> Option<Field> {
+    let value = match (shape, &node.kind) {
+        (Shape::Map(table), _) => return read_table(node, table, path, out),
+        (_, Kind::Null) => {
+            out.error(node.span, path, "the value is missing")
+                .expected(expectation(shape))
+                .found("nothing");
+            return None;
+        }
+        (Shape::Text, Kind::Scalar { text, .. }) if !text.trim().is_empty() => {
+            Value::Text(text.trim().to_owned())
+        }
+        (Shape::Flag, Kind::Scalar { text, plain: true }) if text == "true" => Value::Flag(true),
+        (Shape::Flag, Kind::Scalar { text, plain: true }) if text == "false" => Value::Flag(false),
+        (Shape::Flag, Kind::Scalar { text, .. }) => {
+            let help = match text.to_lowercase().as_str() {
+                "yes" | "on" | "true" | "y" => Some("write `true`".to_owned()),
+                "no" | "off" | "false" | "n" => Some("write `false`".to_owned()),
+                _ => None,
+            };
+            out.error(node.span, path, "not true or false")
+                .expected(expectation(shape))
+                .found(quote(text))
+                .maybe_help(help);
+            return None;
+        }
+        (Shape::Whole { min, max }, Kind::Scalar { text, plain }) => {
+            whole(text, *plain, *min, *max, node, path, out)?
+        }
+        (Shape::Number(range), Kind::Scalar { text, plain: true }) => {
+            number(text, range, node, path, out)?
+        }
+        (Shape::Quantity(wanted, range), Kind::Scalar { text, .. }) => {
+            measured(text, wanted, range, node, path, out)?
+        }
+        (Shape::Choice(words), Kind::Scalar { text, .. }) => {
+            choice(text, words, shape, node, path, out)?
+        }
+        (Shape::WordOr(words, _), Kind::Scalar { text, .. }) => {
+            choice(text, words, shape, node, path, out)?
+        }
+        (Shape::WordOr(_, table), Kind::Map(_)) => return read_table(node, table, path, out),
+        (Shape::Tuple(of, names), Kind::List(items)) if items.len() == names.len() => {
+            list(items, of, path, out)?
+        }
+        (Shape::List { of, min, max }, Kind::List(items)) => {
+            if items.len() < *min || items.len() > *max {
+                let message = if items.len() < *min {
+                    "the list is too short"
+                } else {
+                    "the list is too long"
+                };
+                out.error(node.span, path, message)
+                    .expected(format!("{min} to {max} items"))
+                    .found(format!("{}", items.len()));
+                return None;
+            }
+            list(items, of, path, out)?
+        }
+        (Shape::Named(of), Kind::Map(entries)) => {
+            let mut values = Vec::new();
+            for entry in entries {
+                if let Some(field) = read(&entry.value, of, &join(path, &entry.key), out) {
+                    values.push((entry.key.clone(), field));
+                }
+            }
+            Value::Map(values)
+        }
+        (Shape::Numbers, Kind::List(items)) => numbers(items, path, out)?,
+        (Shape::Numbers, Kind::Scalar { .. }) => numbers(std::slice::from_ref(node), path, out)?,
+        _ => {
+            let help = match (shape, &node.kind) {
+                (Shape::List { .. }, Kind::Scalar { text, .. }) => {
+                    Some(format!("write a list: `[{text}]`"))
+                }
+                (Shape::Quantity(..), Kind::List(_)) => {
+                    Some("give one value, not a list".to_owned())
+                }
+                _ => None,
+            };
+            out.error(node.span, path, "the value has the wrong form")
+                .expected(expectation(shape))
+                .found(node.describe())
+                .maybe_help(help);
+            return None;
+        }
+    };
+    Some(Field {
+        span: node.span,
+        path: path.to_owned(),
+        value,
+    })
+}
+
+fn list(items: &[Node], of: &'static Shape, path: &str, out: &mut Collector) -> Option<Value> {
+    let read: Vec<Option<Field>> = items
+        .iter()
+        .enumerate()
+        .map(|(i, item)| read(item, of, &join(path, &format!("[{i}]")), out))
+        .collect();
+    read.into_iter()
+        .collect::<Option<Vec<_>>>()
+        .map(Value::List)
+}
+
+fn choice(
+    text: &str,
+    words: &'static [Word],
+    shape: &'static Shape,
+    node: &Node,
+    path: &str,
+    out: &mut Collector,
+) -> Option<Value> {
+    if let Some((word, _)) = words.iter().find(|(word, _)| *word == text) {
+        return Some(Value::Word(word));
+    }
+    out.error(node.span, path, "unknown word")
+        .expected(expectation(shape))
+        .found(quote(text))
+        .maybe_help(did_you_mean(text, words.iter().map(|(word, _)| *word)));
+    None
+}
+
+fn whole(
+    text: &str,
+    plain: bool,
+    min: i64,
+    max: i64,
+    node: &Node,
+    path: &str,
+    out: &mut Collector,
+) -> Option<Value> {
+    let expected = expectation(&Shape::Whole { min, max });
+    match text.parse::<i64>() {
+        Ok(n) if plain && (min..=max).contains(&n) => return Some(Value::Whole(n)),
+        Ok(_) if plain => out
+            .error(node.span, path, "the number is out of range")
+            .expected(expected)
+            .found(quote(text)),
+        Ok(_) => out
+            .error(node.span, path, "a text where a number is wanted")
+            .expected(expected)
+            .found(format!("\"{text}\""))
+            .help("remove the quotes"),
+        Err(_) => {
+            let help = match quantity::split_number(text) {
+                (Some(n), rest) if !rest.is_empty() && n.fract() == 0.0 => {
+                    Some(format!("counts carry no unit: write `{n}`"))
+                }
+                (Some(_), "") => None,
+                _ => None,
+            };
+            out.error(node.span, path, "not a whole number")
+                .expected(expected)
+                .found(quote(text))
+                .maybe_help(help)
+        }
+    };
+    None
+}
+
+fn number(
+    text: &str,
+    range: &Range,
+    node: &Node,
+    path: &str,
+    out: &mut Collector,
+) -> Option<Value> {
+    match quantity::split_number(text) {
+        (Some(n), "") if range.contains(n) => return Some(Value::Number(n)),
+        (Some(n), "") => out
+            .error(node.span, path, "the number is out of range")
+            .expected(range.describe(""))
+            .found(format!("`{n}`")),
+        _ => out
+            .error(node.span, path, "not a number")
+            .expected(format!("a number without a unit, {}", range.describe("")))
+            .found(quote(text)),
+    };
+    None
+}
+
+fn measured(
+    text: &str,
+    wanted: &[Dimension],
+    range: &Range,
+    node: &Node,
+    path: &str,
+    out: &mut Collector,
+) -> Option<Value> {
+    match quantity::parse(text, wanted) {
+        Ok(q) if range.contains(q.value) => return Some(Value::Quantity(q.value, q.dimension)),
+        Ok(q) => {
+            out.error(node.span, path, "the value is out of range")
+                .expected(range.describe(q.dimension.usual_unit()))
+                .found(quote(text));
+        }
+        Err(e) => {
+            out.error(node.span, path, e.message)
+                .expected(e.expected)
+                .found(e.found)
+                .maybe_help(e.help);
+        }
+    }
+    None
+}
+
+/// Numbers from 1 and spans such as `2-10`.
+fn numbers(items: &[Node], path: &str, out: &mut Collector) -> Option<Value> {
+    let mut values = Vec::new();
+    let mut clean = true;
+    for (i, item) in items.iter().enumerate() {
+        let Kind::Scalar { text, .. } = &item.kind else {
+            out.error(
+                item.span,
+                join(path, &format!("[{i}]")),
+                "the value has the wrong form",
+            )
+            .expected(expectation(&Shape::Numbers))
+            .found(item.describe());
+            clean = false;
+            continue;
+        };
+        let parse = |t: &str| t.trim().parse::<u32>().ok().filter(|n| *n >= 1);
+        let span = match text.split_once('-') {
+            Some((a, b)) => parse(a).zip(parse(b)).filter(|(a, b)| a <= b),
+            None => parse(text).map(|n| (n, n)),
+        };
+        match span {
+            Some((a, b)) => values.push((a, b, item.span)),
+            None => {
+                let help = (text == "0").then(|| "counting starts at 1".to_owned());
+                out.error(
+                    item.span,
+                    join(path, &format!("[{i}]")),
+                    "not a number or span of numbers",
+                )
+                .expected(expectation(&Shape::Numbers))
+                .found(quote(text))
+                .maybe_help(help);
+                clean = false;
+            }
+        }
+    }
+    clean.then_some(Value::Numbers(values))
+}
+
+/// The keys of a table for "expected".
+fn key_names(table: &Table) -> String {
+    match table.keys {
+        [only] => format!("the key `{}`", only.name),
+        keys => format!(
+            "the keys {}",
+            one_of(keys.iter().map(|k| k.name)).replace(" or `", " and `")
+        ),
+    }
+}
+
+/// A shape in words, for "expected".
+pub(crate) fn expectation(shape: &Shape) -> String {
+    match shape {
+        Shape::Text => "a text".to_owned(),
+        Shape::Whole { min, max: i64::MAX } => {
+            format!("a whole number of at least {min}, without a unit")
+        }
+        Shape::Whole { min, max } => format!("a whole number from {min} to {max}, without a unit"),
+        Shape::Number(range) => format!("a number without a unit, {}", range.describe("")),
+        Shape::Flag => "`true` or `false`".to_owned(),
+        Shape::Quantity(wanted, _) => wanted
+            .iter()
+            .map(|d| format!("{} such as `{}`", d.name(), d.example()))
+            .collect::<Vec<_>>()
+            .join(" or "),
+        Shape::Choice(words) => one_of(words.iter().map(|(w, _)| *w)),
+        Shape::Tuple(of, names) => {
+            format!("a list [{}], each {}", names.join(", "), expectation(of))
+        }
+        Shape::List { of, .. } => format!("a list, each item {}", expectation(of)),
+        Shape::Map(table) => format!("a mapping with {}", key_names(table)),
+        Shape::WordOr(words, table) => format!(
+            "{}, or a mapping with {}",
+            one_of(words.iter().map(|(w, _)| *w)),
+            key_names(table)
+        ),
+        Shape::Named(of) => format!("a mapping from names to values, each {}", expectation(of)),
+        Shape::Numbers => "a list of numbers counted from 1 or spans such as `2-10`".to_owned(),
+    }
+}
+
+/// A value of this shape that could be typed.
+fn example(shape: &Shape) -> String {
+    match shape {
+        Shape::Text => "...".to_owned(),
+        Shape::Whole { min, .. } => min.max(&1).to_string(),
+        Shape::Number(range) => range.max.to_string(),
+        Shape::Flag => "true".to_owned(),
+        Shape::Quantity(wanted, _) => wanted.first().map_or("...", |d| d.example()).to_owned(),
+        Shape::Choice(words) | Shape::WordOr(words, _) => {
+            words.first().map_or("...", |(w, _)| *w).to_owned()
+        }
+        Shape::Tuple(of, names) => format!("[{}]", vec![example(of); names.len()].join(", ")),
+        Shape::List { of, .. } => format!("[{}]", example(of)),
+        Shape::Map(table) => {
+            let first = |k: &&Key| matches!(k.need, Need::Required);
+            let inner: Vec<String> = table
+                .keys
+                .iter()
+                .filter(first)
+                .map(|k| format!("{}: {}", k.name, example(&k.shape)))
+                .collect();
+            format!("{{{}}}", inner.join(", "))
+        }
+        Shape::Named(_) => "{}".to_owned(),
+        Shape::Numbers => "[1]".to_owned(),
+    }
+}

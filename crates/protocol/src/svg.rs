@@ -1,0 +1,318 @@
+//! The path of a plan as a picture: numbered, with outline, keep-outs, units and legend.
+
+use std::fmt::Write;
+
+use skinrig_model::{Point2, PressRole};
+
+use crate::area::{Area, Surroundings};
+use crate::plan::Plan;
+
+/// Millimetres around the skin for axes and legend.
+const BORDER_MM: f64 = 14.0;
+/// Locations up to which every one is numbered; beyond it line ends and every tenth.
+const NUMBER_ALL: usize = 120;
+
+/// The path of `plan` as an SVG, seen from above: x to the right, y up, 6 px per mm, light and dark by the viewer's
+/// preference. Locations are numbered from 1 in the order in which the first repetition visits them.
+#[must_use]
+pub fn path_svg(plan: &Plan, around: &Surroundings) -> String {
+    let outline = around.outline;
+    let corners = outline.polygon(24);
+    let (mut low, mut high) = (outline.centre, outline.centre);
+    let mut include = |p: Point2| {
+        low = Point2::new(low.x_mm.min(p.x_mm), low.y_mm.min(p.y_mm));
+        high = Point2::new(high.x_mm.max(p.x_mm), high.y_mm.max(p.y_mm));
+    };
+    corners.iter().for_each(|p| include(*p));
+    plan.presses.iter().for_each(|p| include(p.at));
+    for keep_out in &around.keep_outs {
+        match &keep_out.area {
+            Area::Circle { centre, radius_mm } => {
+                include(Point2::new(
+                    centre.x_mm - radius_mm,
+                    centre.y_mm - radius_mm,
+                ));
+                include(Point2::new(
+                    centre.x_mm + radius_mm,
+                    centre.y_mm + radius_mm,
+                ));
+            }
+            Area::Polygon(points) => points.iter().for_each(|p| include(*p)),
+        }
+    }
+    let (width, height) = (high.x_mm - low.x_mm, high.y_mm - low.y_mm);
+    let legend = 22.0;
+    let full = [width + 2.0 * BORDER_MM, height + 2.0 * BORDER_MM + legend];
+    let mut svg = String::new();
+    let mut put = |text: String| {
+        svg.push_str(&text);
+        svg.push('\n');
+    };
+    // Picture coordinates: mm, y down.
+    let at = |p: Point2| {
+        (
+            p.x_mm - low.x_mm + BORDER_MM,
+            high.y_mm - p.y_mm + BORDER_MM,
+        )
+    };
+    put(format!(
+        r#"<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {:.1} {:.1}" width="{:.0}" height="{:.0}" role="img" aria-label="press path of {}">"#,
+        full[0],
+        full[1],
+        full[0] * 6.0,
+        full[1] * 6.0,
+        escape(&plan.name)
+    ));
+    put(STYLE.to_owned());
+    put(r#"<rect class="paper" width="100%" height="100%"/>"#.to_owned());
+    grid(&mut put, low, high, &at);
+    put(format!(
+        r#"<polygon class="skin" points="{}"/>"#,
+        points(&corners, &at)
+    ));
+    for keep_out in &around.keep_outs {
+        let title = escape(&keep_out.name);
+        match &keep_out.area {
+            Area::Circle { centre, radius_mm } => {
+                let (x, y) = at(*centre);
+                if keep_out.margin_mm > 0.0 {
+                    put(format!(
+                        r#"<circle class="margin" cx="{x:.2}" cy="{y:.2}" r="{:.2}"/>"#,
+                        radius_mm + keep_out.margin_mm
+                    ));
+                }
+                put(format!(
+                    r#"<circle class="keepout" cx="{x:.2}" cy="{y:.2}" r="{radius_mm:.2}"><title>{title}</title></circle>"#
+                ));
+            }
+            Area::Polygon(corners) => {
+                if keep_out.margin_mm > 0.0 {
+                    put(format!(
+                        r#"<polygon class="margin" style="stroke-width:{:.2}" points="{}"/>"#,
+                        2.0 * keep_out.margin_mm,
+                        points(corners, &at)
+                    ));
+                }
+                put(format!(
+                    r#"<polygon class="keepout" points="{}"><title>{title}</title></polygon>"#,
+                    points(corners, &at)
+                ));
+            }
+        }
+    }
+    let visits = first_visits(plan);
+    if visits.len() > 1 {
+        put(format!(
+            r#"<polyline class="path" points="{}"/>"#,
+            points(&visits, &at)
+        ));
+    }
+    let nearest = closest_pair_mm(&visits).clamp(0.5, 8.0);
+    let radius = (nearest * 0.18).clamp(0.3, 1.1);
+    let text = (nearest * 0.38).clamp(0.8, 2.2);
+    for (number, p) in (1..).zip(&visits) {
+        let (x, y) = at(*p);
+        let class = match number {
+            1 => "press first",
+            n if n == visits.len() => "press last",
+            _ => "press",
+        };
+        put(format!(
+            r#"<circle class="{class}" cx="{x:.2}" cy="{y:.2}" r="{radius:.2}"><title>{number}: ({:.2}, {:.2}) mm</title></circle>"#,
+            p.x_mm, p.y_mm
+        ));
+        let ends_line = turns(&visits, number - 1);
+        if visits.len() <= NUMBER_ALL
+            || number == 1
+            || number == visits.len()
+            || ends_line
+            || number % 10 == 0
+        {
+            put(format!(
+                r#"<text class="number" font-size="{text:.2}" x="{:.2}" y="{:.2}">{number}</text>"#,
+                x + radius * 0.9,
+                y - radius * 0.9
+            ));
+        }
+    }
+    let sync = plan.presses.iter().filter(|p| p.role == PressRole::Sync);
+    if let Some(press) = sync.clone().next() {
+        let (x, y) = at(press.at);
+        let s = radius * 2.2;
+        put(format!(
+            r#"<path class="sync" d="M{:.2} {y:.2}h{:.2}M{x:.2} {:.2}v{:.2}"/>"#,
+            x - s,
+            2.0 * s,
+            y - s,
+            2.0 * s
+        ));
+    }
+    let mut y = BORDER_MM + height + 11.0;
+    let mut line = |mark: &str, text: &str| {
+        let mark = mark.replace("{y}", &format!("{:.2}", y - 0.9));
+        put(format!(
+            r#"{mark}<text class="legend" x="{:.1}" y="{y:.2}">{}</text>"#,
+            BORDER_MM + 6.0,
+            escape(text)
+        ));
+        y += 4.2;
+    };
+    let x = BORDER_MM + 2.0;
+    line(
+        "",
+        &format!("{}: {}", plan.name, legend_text(plan, visits.len())),
+    );
+    line(
+        &format!(
+            r#"<circle class="press first" cx="{:.1}" cy="{{y}}" r="1"/><circle class="press last" cx="{:.1}" cy="{{y}}" r="1"/>"#,
+            x - 1.2,
+            x + 1.6
+        ),
+        "first and last press; numbers count the presses of the first repetition, in their order",
+    );
+    if sync.clone().next().is_some() {
+        line(
+            &format!(
+                r#"<path class="sync" d="M{:.1} {{y}}h3.2M{x:.1} {{y}}m0 -1.6v3.2"/>"#,
+                x - 1.6
+            ),
+            &format!("{} sync presses", sync.count()),
+        );
+    }
+    if !around.keep_outs.is_empty() {
+        line(
+            &format!(r#"<circle class="keepout" cx="{x:.1}" cy="{{y}}" r="1.2"/>"#),
+            "keep-out areas with their margins",
+        );
+    }
+    put("</svg>".to_owned());
+    svg
+}
+
+/// Colours by role; the dark set follows the viewer's preference.
+const STYLE: &str = "<style>\n\
+.paper{fill:#ffffff}.skin{fill:#f3efe6;stroke:#5d5648;stroke-width:.5}.grid{stroke:#cfd4da;stroke-width:.15}\n\
+.axis,.legend{font:2.6px sans-serif;fill:#3c434b}.number{font-family:sans-serif;fill:#1f2933}\n\
+.path{fill:none;stroke:#2b6cb0;stroke-width:.3;stroke-linejoin:round}.press{fill:#2b6cb0}.first{fill:#1c7c54}.last{fill:#b83227}\n\
+.sync{stroke:#8a3ffc;stroke-width:.6;fill:none}.keepout{fill:#b8322733;stroke:#b83227;stroke-width:.3}\n\
+.margin{fill:#b832271a;stroke:#b832271a;stroke-linejoin:round}\n\
+@media (prefers-color-scheme: dark){.paper{fill:#15181c}.skin{fill:#262b31;stroke:#a79f8d}.grid{stroke:#3a424b}\n\
+.axis,.legend{fill:#c3cad2}.number{fill:#e6ebf0}.path{stroke:#6fb1f0}.press{fill:#6fb1f0}.first{fill:#58c896}.last{fill:#ff8577}\n\
+.sync{stroke:#b794ff}.keepout{stroke:#ff8577}}\n\
+</style>";
+
+fn grid(
+    put: &mut impl FnMut(String),
+    low: Point2,
+    high: Point2,
+    at: &impl Fn(Point2) -> (f64, f64),
+) {
+    let step = 10.0;
+    let lines = |from: f64, to: f64| {
+        let first = (from / step).ceil() as i64;
+        let last = (to / step).floor() as i64;
+        first..=last
+    };
+    for k in lines(low.x_mm, high.x_mm) {
+        let v = k as f64 * step;
+        let (x, top) = at(Point2::new(v, high.y_mm));
+        let (_, bottom) = at(Point2::new(v, low.y_mm));
+        put(format!(
+            r#"<line class="grid" x1="{x:.2}" y1="{top:.2}" x2="{x:.2}" y2="{bottom:.2}"/>"#
+        ));
+        put(format!(
+            r#"<text class="axis" text-anchor="middle" x="{x:.2}" y="{:.2}">{v:.0}</text>"#,
+            bottom + 4.0
+        ));
+    }
+    for k in lines(low.y_mm, high.y_mm) {
+        let v = k as f64 * step;
+        let (left, y) = at(Point2::new(low.x_mm, v));
+        let (right, _) = at(Point2::new(high.x_mm, v));
+        put(format!(
+            r#"<line class="grid" x1="{left:.2}" y1="{y:.2}" x2="{right:.2}" y2="{y:.2}"/>"#
+        ));
+        put(format!(
+            r#"<text class="axis" text-anchor="end" x="{:.2}" y="{:.2}">{v:.0}</text>"#,
+            left - 1.5,
+            y + 0.9
+        ));
+    }
+    let (right, bottom) = at(Point2::new(high.x_mm, low.y_mm));
+    put(format!(
+        r#"<text class="axis" text-anchor="end" x="{:.2}" y="{:.2}">x, mm</text>"#,
+        right + 12.0,
+        bottom + 4.0
+    ));
+    let (left, top) = at(Point2::new(low.x_mm, high.y_mm));
+    put(format!(
+        r#"<text class="axis" x="{:.2}" y="{:.2}">y, mm</text>"#,
+        left - 9.0,
+        top - 4.0
+    ));
+}
+
+fn points(list: &[Point2], at: &impl Fn(Point2) -> (f64, f64)) -> String {
+    let mut text = String::new();
+    for p in list {
+        let (x, y) = at(*p);
+        let _ = write!(text, "{x:.2},{y:.2} ");
+    }
+    text.truncate(text.trim_end().len());
+    text
+}
+
+/// Where the first repetition presses at its first depth, in its order; repeated places once.
+fn first_visits(plan: &Plan) -> Vec<Point2> {
+    let mut seen = std::collections::HashSet::new();
+    plan.presses
+        .iter()
+        .filter(|p| p.role != PressRole::Sync && p.repetition == 0)
+        .filter(|p| seen.insert(p.location))
+        .map(|p| p.at)
+        .collect()
+}
+
+/// True when the path changes its direction at place `k`.
+fn turns(visits: &[Point2], k: usize) -> bool {
+    let (Some(a), Some(b), Some(c)) = (
+        k.checked_sub(1).and_then(|i| visits.get(i)),
+        visits.get(k),
+        visits.get(k + 1),
+    ) else {
+        return false;
+    };
+    let cross = (b.x_mm - a.x_mm) * (c.y_mm - b.y_mm) - (b.y_mm - a.y_mm) * (c.x_mm - b.x_mm);
+    visits.len() > NUMBER_ALL && cross.abs() > 1e-6
+}
+
+/// Distance of the two closest of the first few hundred places, mm; sets the size of dots and numbers.
+fn closest_pair_mm(visits: &[Point2]) -> f64 {
+    let some = visits.get(..visits.len().min(600)).unwrap_or(&[]);
+    let mut nearest = f64::INFINITY;
+    for (i, p) in some.iter().enumerate() {
+        for q in some.iter().skip(i + 1) {
+            let d = p.distance_mm(*q);
+            if d > 1e-9 {
+                nearest = nearest.min(d);
+            }
+        }
+    }
+    if nearest.is_finite() { nearest } else { 8.0 }
+}
+
+fn legend_text(plan: &Plan, locations: usize) -> String {
+    let s = plan.summary();
+    format!(
+        "{locations} locations, {} repetitions, {} presses in all; skin seen from above",
+        s.repetitions,
+        plan.presses.len()
+    )
+}
+
+fn escape(text: &str) -> String {
+    text.replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('>', "&gt;")
+        .replace('"', "&quot;")
+}

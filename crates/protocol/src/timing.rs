@@ -1,0 +1,186 @@
+//! How long the steps of a plan take: estimates for deadlines, feasibility and summaries.
+//!
+//! The estimate moves along each straight line with a trapezoidal speed profile of an assumed acceleration. Only
+//! deadlines, the check of periods and printed durations rest on it; nothing that is measured does.
+
+use skinrig_model::{HostDuration, MarkKind, Point3, Skin};
+
+use crate::plan::{Plan, PressStep, RunLimits, Step};
+
+/// Acceleration assumed for estimates, mm/s². A choice of this project, far below what a haptic robot reaches.
+pub const ASSUMED_ACCELERATION_MM_S2: f64 = 1000.0;
+/// A period must be this many times the estimated time of what happens in it.
+pub const FIT_RESERVE: f64 = 1.1;
+/// A deadline is this many times the estimate ...
+pub const DEADLINE_FACTOR: f64 = 3.0;
+/// ... plus this, s.
+pub const DEADLINE_SLACK_S: f64 = 1.0;
+
+/// Time of a straight motion from rest to rest, s.
+#[must_use]
+pub fn motion_s(distance_mm: f64, speed_mm_s: f64) -> f64 {
+    let ramp = speed_mm_s * speed_mm_s / ASSUMED_ACCELERATION_MM_S2;
+    if distance_mm > ramp {
+        distance_mm / speed_mm_s + speed_mm_s / ASSUMED_ACCELERATION_MM_S2
+    } else {
+        2.0 * (distance_mm / ASSUMED_ACCELERATION_MM_S2).sqrt()
+    }
+}
+
+/// The estimated moments of a press, s after its begin, in order: the marks, without the end.
+pub(crate) fn moments_s(limits: &RunLimits, press: &PressStep) -> [(MarkKind, f64); 5] {
+    let settle = limits.settle_time.as_secs_f64();
+    let contact = motion_s(limits.clearance_mm, press.approach_speed_mm_s) + settle;
+    let at_depth = contact + motion_s(press.depth_mm, press.indent_speed_mm_s) + settle;
+    let retract = at_depth + press.hold.as_secs_f64();
+    let release = retract + press.depth_mm / press.retract_speed_mm_s;
+    [
+        (MarkKind::Approach, 0.0),
+        (MarkKind::Contact, contact),
+        (MarkKind::AtDepth, at_depth),
+        (MarkKind::Retract, retract),
+        (MarkKind::Release, release),
+    ]
+}
+
+/// The estimated time of a press in motion and at rest (hold and three times settling), s.
+pub(crate) fn press_s(limits: &RunLimits, press: &PressStep) -> (f64, f64) {
+    let motion = motion_s(limits.clearance_mm, press.approach_speed_mm_s)
+        + motion_s(press.depth_mm, press.indent_speed_mm_s)
+        + motion_s(
+            limits.clearance_mm + press.depth_mm,
+            press.retract_speed_mm_s,
+        );
+    let still = press.hold.as_secs_f64() + 3.0 * limits.settle_time.as_secs_f64();
+    (motion, still)
+}
+
+/// The estimated time of a travel with settling, s.
+pub(crate) fn travel_s(limits: &RunLimits, distance_mm: f64, speed_mm_s: f64) -> f64 {
+    motion_s(distance_mm, speed_mm_s) + limits.settle_time.as_secs_f64()
+}
+
+/// The deadline for something that should take `estimate_s`.
+pub(crate) fn deadline(estimate_s: f64) -> HostDuration {
+    HostDuration::from_secs_f64(estimate_s * DEADLINE_FACTOR + DEADLINE_SLACK_S)
+}
+
+/// Presses that differ in more than their place, to check timing once for each kind.
+pub(crate) fn distinct_presses(plan: &Plan) -> Vec<&PressStep> {
+    let mut kinds: Vec<&PressStep> = Vec::new();
+    for step in &plan.steps {
+        if let Step::Press(p) = step
+            && !kinds.iter().any(|k| k.depth_mm == p.depth_mm)
+        {
+            kinds.push(p);
+        }
+    }
+    kinds
+}
+
+/// A press that does not fit between its begin and the next one's.
+pub(crate) struct Misfit {
+    pub sync: bool,
+    pub press: String,
+    pub needed_s: f64,
+    pub period_s: f64,
+    pub motion_s: f64,
+    pub still_s: f64,
+    pub travel_s: f64,
+}
+
+/// The press that is furthest from fitting between its begin and the next one's, if any.
+pub(crate) fn first_misfit(plan: &Plan) -> Option<Misfit> {
+    let mut worst: Option<Misfit> = None;
+    let mut sync = false;
+    let mut before: Option<&PressStep> = None;
+    let mut position: Option<Point3<Skin>> = None;
+    let mut travel = 0.0;
+    for step in &plan.steps {
+        match step {
+            Step::Begin { repetition } => {
+                sync = repetition.is_none();
+                before = None;
+                travel = 0.0;
+            }
+            Step::Travel { to, speed_mm_s, .. } => {
+                let distance = position.map_or(0.0, |p| p.distance_mm(*to));
+                travel += travel_s(&plan.limits, distance, *speed_mm_s);
+                position = Some(*to);
+            }
+            Step::Pause { duration } => travel += duration.as_secs_f64(),
+            Step::Press(press) => {
+                position = Some(press.at.at_height(plan.limits.clearance_mm));
+                if let (Some(previous), Some(start)) = (before, press.start_after_begin)
+                    && let Some(from) = previous.start_after_begin
+                {
+                    let (motion, still) = press_s(&plan.limits, previous);
+                    let needed = (motion + still + travel) * FIT_RESERVE;
+                    let period = (start.0 - from.0) as f64 * 1e-9;
+                    let excess = |m: &Misfit| m.needed_s - m.period_s;
+                    if needed > period && worst.as_ref().is_none_or(|w| needed - period > excess(w))
+                    {
+                        worst = Some(Misfit {
+                            sync,
+                            press: previous.press.to_string(),
+                            needed_s: needed,
+                            period_s: period,
+                            motion_s: motion,
+                            still_s: still,
+                            travel_s: travel,
+                        });
+                    }
+                }
+                before = Some(press);
+                travel = 0.0;
+            }
+        }
+    }
+    worst
+}
+
+/// Estimated duration of the whole plan, s, and of the time that the tip is in contact with the skin, s.
+pub(crate) fn duration_s(plan: &Plan) -> (f64, f64) {
+    let limits = &plan.limits;
+    let (mut now, mut begin, mut contact) = (0.0f64, 0.0f64, 0.0f64);
+    let mut position: Option<Point3<Skin>> = None;
+    for step in &plan.steps {
+        match step {
+            Step::Begin { .. } => begin = now,
+            Step::Travel { to, speed_mm_s, .. } => {
+                now += travel_s(
+                    limits,
+                    position.map_or(0.0, |p| p.distance_mm(*to)),
+                    *speed_mm_s,
+                );
+                position = Some(*to);
+            }
+            Step::Pause { duration } => now += duration.as_secs_f64(),
+            Step::Press(press) => {
+                if let Some(start) = press.start_after_begin {
+                    now = now.max(begin + start.as_secs_f64());
+                }
+                let (motion, still) = press_s(limits, press);
+                now += motion + still;
+                let [_, (_, down), _, _, (_, up)] = moments_s(limits, press);
+                contact += up - down;
+                position = Some(press.at.at_height(limits.clearance_mm));
+            }
+        }
+    }
+    (now, contact)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn trapezoid_and_triangle() {
+        // 100 mm at 50 mm/s: 2 s, and 50/1000 s for the two ramps together.
+        assert!((motion_s(100.0, 50.0) - 2.05).abs() < 1e-12);
+        // Too short to reach the speed: d = a (t/2)^2.
+        assert!((motion_s(1.0, 100.0) - 2.0 * 0.001f64.sqrt()).abs() < 1e-12);
+        assert_eq!(motion_s(0.0, 100.0), 0.0);
+    }
+}
