@@ -21,3 +21,211 @@ fn a_campaign_fits_into_three_megabytes() {
     }
     assert!(page.len() < 3_000_000, "{} bytes", page.len());
 }
+
+const HOSTILE: &str = "</script><img src=x onerror=alert(1)>\"'><!--]]>&{{ 7*7 }}\u{2028}\u{0}";
+
+/// Only these may carry an address: the namespace of SVG.
+#[test]
+fn the_page_refers_to_nothing_outside() {
+    let analysis = support::analysis(5, 3);
+    let page = html(&input(&analysis)).unwrap();
+    let rest = page.replace("http://www.w3.org/2000/svg", "");
+    for forbidden in [
+        "http:", "https:", "src=", "@import", "<link", "<iframe", "<object", "<embed",
+    ] {
+        assert!(!rest.contains(forbidden), "found `{forbidden}`");
+    }
+    assert!(
+        !rest.contains("url(") || rest.matches("url(").count() == rest.matches("url(#").count()
+    );
+}
+
+#[test]
+fn hostile_text_stays_text() {
+    let mut analysis = support::analysis(4, 3);
+    analysis.warnings = vec![HOSTILE.into()];
+    for press in &mut analysis.presses {
+        if press.reason.is_some() {
+            press.reason = Some(HOSTILE.into());
+            press.verdict = HOSTILE.into();
+        }
+    }
+    if let Some(c) = &mut analysis.calibration {
+        c.termination = HOSTILE.into();
+        c.names[0] = HOSTILE.into();
+    }
+    let text = || HOSTILE.to_owned();
+    let mut provenance = support::provenance();
+    provenance.session_id = text();
+    provenance.prototype = text();
+    provenance.operator = text();
+    provenance.rig_name = text();
+    provenance.rig_kind = text();
+    provenance.protocol_name = text();
+    provenance.command_line = text();
+    provenance.run_end = text();
+    provenance.run_end_reason = Some(text());
+    provenance.overrides = vec![text()];
+    provenance.notes[0].text = text();
+    provenance.interruptions[0].reason = text();
+    provenance.interruptions[0].kind = text();
+    provenance.devices[0].model = text();
+    let input = ReportInput {
+        analysis: &analysis,
+        provenance,
+    };
+    let page = html(&input).unwrap();
+    assert!(!page.contains("<img"), "an element came through");
+    assert!(!page.contains("<!--"));
+    assert!(!page.contains("49}}") && page.contains("7*7"));
+    // The page's own three scripts and no other end.
+    assert_eq!(page.matches("<script").count(), 3);
+    assert_eq!(page.matches("</script>").count(), 3);
+    let data = page
+        .split("id=\"report-data\">")
+        .nth(1)
+        .unwrap()
+        .split("</script>")
+        .next()
+        .unwrap();
+    let data: serde_json::Value = serde_json::from_str(data).unwrap();
+    assert_eq!(data["session"], HOSTILE);
+    for figure in skinrig_report::figures::all(&input) {
+        assert!(
+            !figure.svg.contains("<img") && !figure.svg.contains("<script"),
+            "{}",
+            figure.id
+        );
+        assert!(!figure.svg.contains('\u{0}'), "{}", figure.id);
+    }
+}
+
+#[test]
+fn simulated_is_said_in_page_and_in_every_figure() {
+    let analysis = support::analysis(4, 3);
+    let mut input = input(&analysis);
+    assert!(html(&input).unwrap().contains("data-testid=\"simulated\""));
+    for figure in skinrig_report::figures::all(&input) {
+        assert!(figure.svg.contains("simulated rig"), "{}", figure.id);
+        assert!(
+            figure.svg.contains("2026-03-02_14-05-09_meander"),
+            "{}",
+            figure.id
+        );
+        assert!(figure.standalone().contains("<style>"), "{}", figure.id);
+        assert!(!figure.standalone().contains("var("), "{}", figure.id);
+    }
+    input.provenance.simulated = false;
+    input.provenance.rig_kind = "bench".into();
+    assert!(!html(&input).unwrap().contains("data-testid=\"simulated\""));
+    assert!(
+        skinrig_report::figures::all(&input)
+            .iter()
+            .all(|f| !f.svg.contains("simulated rig"))
+    );
+}
+
+#[test]
+fn a_session_without_presses_says_so() {
+    let analysis = support::empty();
+    let page = html(&input(&analysis)).unwrap();
+    assert!(page.contains("This session has no presses"));
+    assert!(page.contains("no scored press was located"));
+    assert!(page.contains("no events in this camera"));
+    assert!(page.contains("not aligned"));
+    assert!(
+        !page.contains("NaN") && !page.contains("inf "),
+        "a number leaked"
+    );
+}
+
+#[test]
+fn presses_without_estimates_and_broken_numbers_are_drawn_as_absent() {
+    let mut analysis = support::analysis(4, 3);
+    for (i, press) in analysis.presses.iter_mut().enumerate() {
+        press.location_outcome = if i % 2 == 0 {
+            skinrig_analysis::result::LocationOutcome::Missing
+        } else {
+            let at = skinrig_model::Point2::new(f64::NAN, f64::INFINITY);
+            skinrig_analysis::result::LocationOutcome::Outside { at, sine: f64::NAN }
+        };
+        if let Some(view) = &mut press.views[0] {
+            view.centroid_u = Some(f64::NAN);
+        }
+    }
+    for series in &mut analysis.rates {
+        series.mean_per_s[3] = f32::NAN;
+        series.peak_per_s[4] = f32::INFINITY;
+    }
+    analysis.scored.rmse_mm.value = Some(f64::NAN);
+    let page = html(&input(&analysis)).unwrap();
+    assert!(page.contains("no scored press was located"));
+    let figures: String = skinrig_report::figures::all(&input(&analysis))
+        .iter()
+        .map(|f| f.svg.clone())
+        .collect();
+    assert!(!figures.contains("NaN") && !figures.contains("inf"));
+}
+
+#[test]
+fn everything_a_browser_test_needs_has_a_name() {
+    let analysis = support::analysis(4, 3);
+    let page = html(&input(&analysis)).unwrap();
+    for id in [
+        "results",
+        "counts",
+        "notices",
+        "exclusions",
+        "provenance",
+        "metric-rmse",
+        "figure-skin-map",
+        "figure-event-rates",
+        "figure-error-distribution",
+        "figure-error-scatter",
+        "figure-centroid-tracks",
+        "figure-repeat-map",
+        "figure-press-rates",
+        "figure-press-pictures",
+        "clocks",
+        "calibration",
+        "press-table",
+        "inspector",
+        "filter-verdict",
+        "theme",
+    ] {
+        assert_eq!(
+            page.matches(&format!("data-testid=\"{id}\"")).count(),
+            1,
+            "{id}"
+        );
+    }
+    assert_eq!(
+        page.matches("<title id=").count(),
+        page.matches("role=\"img\"").count()
+    );
+}
+
+/// Every id once, and every reference to one has its target.
+#[test]
+fn ids_are_unique_and_references_lead_somewhere() {
+    let analysis = support::analysis(4, 3);
+    let page = html(&input(&analysis)).unwrap();
+    let values = |attribute: &str| -> Vec<String> {
+        page.split(&format!(" {attribute}=\""))
+            .skip(1)
+            .filter_map(|s| s.split('"').next())
+            .map(str::to_owned)
+            .collect()
+    };
+    let ids = values("id");
+    let mut unique = ids.clone();
+    unique.sort();
+    unique.dedup();
+    assert_eq!(unique.len(), ids.len());
+    for target in values("aria-labelledby").iter().flat_map(|v| v.split(' ')) {
+        assert!(ids.iter().any(|i| i == target), "{target}");
+    }
+    for target in values("href").iter().filter_map(|v| v.strip_prefix('#')) {
+        assert!(ids.iter().any(|i| i == target), "{target}");
+    }
+}

@@ -8,7 +8,7 @@ use crate::colour::viridis;
 use crate::derive::{self, LocationSummary};
 use crate::svg::{Axes, Px, Scale, Svg, dots, polyline, tick_label, ticks};
 
-const SIZE: (f64, f64) = (860.0, 700.0);
+const SIZE: (f64, f64) = (900.0, 700.0);
 
 /// Where the skin lies in the figure.
 struct Layout {
@@ -118,7 +118,7 @@ impl Layout {
 /// A colour bar in mm with its title, at the right edge; says when locations lie above its end.
 fn colour_bar(svg: &mut Svg, title: &str, top_mm: f64, beyond: usize) {
     const STEPS: u32 = 48;
-    let (x, top, height, width) = (776.0, 70.0, 260.0, 18.0);
+    let (x, top, height, width) = (786.0, 70.0, 260.0, 18.0);
     let step = height / f64::from(STEPS);
     svg.open("g", &[("class", &"colour-bar")]);
     for (i, line) in title.split('\n').enumerate() {
@@ -350,7 +350,7 @@ pub fn skin_map(input: &ReportInput<'_>) -> Figure {
 }
 
 fn legend(svg: &mut Svg) {
-    let (x, mut y) = (746.0, 400.0);
+    let (x, mut y) = (756.0, 400.0);
     let mut row = |svg: &mut Svg, label: &str, draw: &dyn Fn(&mut Svg, f64)| {
         draw(svg, y);
         svg.text((x + 24.0, y + 4.0), "tick", "start", label);

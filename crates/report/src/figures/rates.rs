@@ -6,6 +6,7 @@ use skinrig_analysis::result::{RateSeries, RateZoom};
 
 use super::{Canvas, Figure, nice_above};
 use crate::ReportInput;
+use crate::format::number;
 use crate::svg::{Axes, Px, Scale, polyline};
 
 /// A readable unit for rates up to `most` events per second: divisor and name.
@@ -70,9 +71,15 @@ pub fn event_rates(input: &ReportInput<'_>) -> Figure {
         .flat_map(|s| [s.start_s, s.start_s + s.bin_s * s.mean_per_s.len() as f64]);
     let low = ends.clone().fold(f64::INFINITY, f64::min);
     let high = ends.fold(f64::NEG_INFINITY, f64::max);
-    let bin = |s: &RateSeries| crate::format::number(Some(s.bin_s * 1e3), 0);
+    let bin = |s: &RateSeries| {
+        if s.bin_s >= 1.0 {
+            format!("{} s", number(Some(s.bin_s), 2))
+        } else {
+            format!("{} ms", number(Some(s.bin_s * 1e3), 0))
+        }
+    };
     let caption = format!(
-        "Event rates over the session (rows of the crop). A: camera 1, bins of {} ms; B: camera 2, bins of {} ms. \
+        "Event rates over the session (rows of the crop). A: camera 1, bins of {}; B: camera 2, bins of {}. \
          Strong line: mean in a bin; light line: highest fine bin within it. Ticks between the panels: \
          measured contacts ({}). Zoom with the buttons or the keys + and -, move by dragging or with the arrow keys.",
         bin(&series[0]),

@@ -288,7 +288,10 @@ fn metrics(presses: &[PressResult], valid_only: bool) -> Metrics {
         median_mm: e(quantile(0.5), n),
         p95_mm: e(quantile(0.95), n),
         repeat_std_mm: e(1.83, if n > 0 { 250 } else { 0 }),
-        located_rate: e(f64::from(n) / f64::from(attempted.max(1)), attempted),
+        located_rate: Estimate {
+            high: Some(1.0),
+            ..e(f64::from(n) / f64::from(attempted.max(1)), attempted)
+        },
         rmse_diagonal_percent: (n > 0).then_some(rmse / 141.42 * 100.0),
     }
 }
@@ -410,5 +413,23 @@ pub fn provenance() -> Provenance {
             text: "blinds closed".into(),
         }],
         lost_bytes: [0, 4096],
+    }
+}
+
+/// A session in which nothing happened.
+pub fn empty() -> Analysis {
+    let full = analysis(2, 1);
+    Analysis {
+        counts: PressCounts::default(),
+        clocks: [None, None],
+        calibration: None,
+        scored: metrics(&[], true),
+        scored_without_exclusions: metrics(&[], false),
+        rates: [RateSeries::default(), RateSeries::default()],
+        presses: vec![],
+        warnings: vec![],
+        pictures: vec![],
+        zooms: vec![],
+        ..full
     }
 }

@@ -1,0 +1,86 @@
+//! What people and programs read outside a browser: terminal table and JSON, as snapshots.
+
+mod support;
+
+use skinrig_report::{JSON_VERSION, ReportInput, json, terminal_table};
+
+#[test]
+fn terminal_table_reads_like_this() {
+    let analysis = support::analysis(16, 10);
+    let input = ReportInput {
+        analysis: &analysis,
+        provenance: support::provenance(),
+    };
+    let table = terminal_table(&input, false);
+    insta::assert_snapshot!("terminal_table", table);
+    assert!(table.lines().all(|l| l.chars().count() <= 80), "{table}");
+    let colored = terminal_table(&input, true);
+    assert!(colored.contains("\x1b[33m"));
+    let bare = colored
+        .replace("\x1b[33m", "")
+        .replace("\x1b[1m", "")
+        .replace("\x1b[0m", "");
+    assert_eq!(bare, table, "colour changes the layout");
+}
+
+#[test]
+fn terminal_table_of_an_empty_session() {
+    let analysis = support::empty();
+    let mut provenance = skinrig_report::Provenance::default();
+    provenance.run_end = "faulted".into();
+    provenance.run_end_reason = Some("camera 2 stopped answering".into());
+    let input = ReportInput {
+        analysis: &analysis,
+        provenance,
+    };
+    insta::assert_snapshot!("terminal_table_empty", terminal_table(&input, false));
+}
+
+#[test]
+fn a_terminal_gets_no_foreign_control_characters() {
+    let mut analysis = support::analysis(3, 2);
+    analysis.warnings = vec!["\x1b]0;title\x07 and\x1b[2J".into(), "w".repeat(300)];
+    let mut provenance = support::provenance();
+    provenance.session_id = "a\x1b[31mb".into();
+    let table = terminal_table(
+        &ReportInput {
+            analysis: &analysis,
+            provenance,
+        },
+        false,
+    );
+    assert!(
+        table.chars().all(|c| c == '\n' || !c.is_control()),
+        "{table:?}"
+    );
+    assert!(table.lines().all(|l| l.chars().count() <= 80), "{table}");
+}
+
+#[test]
+fn counts_that_do_not_add_up_are_called_out() {
+    let mut analysis = support::analysis(3, 2);
+    analysis.counts.valid += 1;
+    let input = ReportInput {
+        analysis: &analysis,
+        provenance: support::provenance(),
+    };
+    assert!(terminal_table(&input, false).contains("do not add up"));
+    assert!(
+        skinrig_report::html(&input)
+            .unwrap()
+            .contains("do not add up")
+    );
+}
+
+#[test]
+fn json_document_has_this_layout() {
+    let mut analysis = support::analysis(2, 2);
+    analysis.presses.truncate(4);
+    let input = ReportInput {
+        analysis: &analysis,
+        provenance: support::provenance(),
+    };
+    let document = json(&input);
+    assert_eq!(document["format_version"], JSON_VERSION);
+    insta::assert_snapshot!("json", serde_json::to_string_pretty(&document).unwrap());
+}
