@@ -29,7 +29,10 @@ fn height_mm(ms: f64) -> f64 {
 fn grid(i: usize) -> Point2 {
     let (line, k) = (i / 17, i % 17);
     let row = if line % 2 == 0 { k } else { 16 - k };
-    Point2::new(10.0 + 4.0 * (line as f64 - 8.0), 2.0 + 4.0 * (row as f64 - 8.0))
+    Point2::new(
+        10.0 + 4.0 * (line as f64 - 8.0),
+        2.0 + 4.0 * (row as f64 - 8.0),
+    )
 }
 
 /// Column centroid of the densest connected patch of 10 px cells with at least 10 events: a stand-in for clustering.
@@ -50,7 +53,16 @@ fn centroid(events: &[PixelEvent], rows: (u16, u16)) -> Option<f64> {
             sum = (sum.0 + cells[i].0, sum.1 + cells[i].1);
             cells[i].0 = 0;
             let (x, y) = ((i % 64) as i64, (i / 64) as i64);
-            for (nx, ny) in [(x - 1, y), (x + 1, y), (x, y - 1), (x, y + 1), (x - 1, y - 1), (x + 1, y + 1), (x - 1, y + 1), (x + 1, y - 1)] {
+            for (nx, ny) in [
+                (x - 1, y),
+                (x + 1, y),
+                (x, y - 1),
+                (x, y + 1),
+                (x - 1, y - 1),
+                (x + 1, y + 1),
+                (x - 1, y + 1),
+                (x + 1, y - 1),
+            ] {
                 if (0..64).contains(&nx) && (0..48).contains(&ny) {
                     stack.push((ny * 64 + nx) as usize);
                 }
@@ -68,9 +80,13 @@ fn intersect(geometry: &StereoGeometry, u: [f64; 2]) -> Option<Point2> {
     let d = a.direction(a.angle_of_column_deg(u[0]));
     let e = b.direction(b.angle_of_column_deg(u[1]));
     let cross = d[0] * e[1] - d[1] * e[0];
-    let (px, py) = (b.position.x_mm - a.position.x_mm, b.position.y_mm - a.position.y_mm);
+    let (px, py) = (
+        b.position.x_mm - a.position.x_mm,
+        b.position.y_mm - a.position.y_mm,
+    );
     let s = (px * e[1] - py * e[0]) / cross;
-    (cross.abs() > 0.02).then(|| Point2::new(a.position.x_mm + s * d[0], a.position.y_mm + s * d[1]))
+    (cross.abs() > 0.02)
+        .then(|| Point2::new(a.position.x_mm + s * d[0], a.position.y_mm + s * d[1]))
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -92,10 +108,15 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             skin_thickness_mm: 4.0,
         })
     });
-    println!("noise: {:.0} / {:.0} events/s", models[0].noise_hz(), models[1].noise_hz());
+    println!(
+        "noise: {:.0} / {:.0} events/s",
+        models[0].noise_hz(),
+        models[1].noise_hz()
+    );
     let mut last = 0;
     let mut columns = vec![[None; 2]; presses];
-    let (mut press_events, mut gap_events, mut all_events, mut on) = ([0usize; 2], [0usize; 2], 0usize, [0usize; 2]);
+    let (mut press_events, mut gap_events, mut all_events, mut on) =
+        ([0usize; 2], [0usize; 2], 0usize, [0usize; 2]);
     let mut per_press = vec![[0usize; 2]; presses];
     let start = Instant::now();
     for (i, (found, counts)) in columns.iter_mut().zip(&mut per_press).enumerate() {
@@ -113,14 +134,24 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             model.advance(&tips, &mut events);
             all_events += events.len();
             let ms = |e: &PixelEvent| (e.t_ns / GRID_NS - t0 - 1000) as f64;
-            let window: Vec<PixelEvent> = events.iter().copied().filter(|e| (0.0..700.0).contains(&ms(e))).collect();
-            let burst = events.iter().filter(|e| (0.0..550.0).contains(&ms(e)) && (CROP[c].0..=CROP[c].1).contains(&e.y));
+            let window: Vec<PixelEvent> = events
+                .iter()
+                .copied()
+                .filter(|e| (0.0..700.0).contains(&ms(e)))
+                .collect();
+            let burst = events.iter().filter(|e| {
+                (0.0..550.0).contains(&ms(e)) && (CROP[c].0..=CROP[c].1).contains(&e.y)
+            });
             counts[c] = burst.count();
             press_events[c] += counts[c];
-            gap_events[c] += events.iter().filter(|e| ms(e) >= 1500.0 && (CROP[c].0..=CROP[c].1).contains(&e.y)).count();
+            gap_events[c] += events
+                .iter()
+                .filter(|e| ms(e) >= 1500.0 && (CROP[c].0..=CROP[c].1).contains(&e.y))
+                .count();
             for (k, range) in [(0, 0.0..250.0), (1, 400.0..700.0)] {
                 let phase: Vec<_> = events.iter().filter(|e| range.contains(&ms(e))).collect();
-                on[k] += phase.iter().filter(|e| e.polarity == Polarity::On).count() * 1000 / phase.len().max(1);
+                on[k] += phase.iter().filter(|e| e.polarity == Polarity::On).count() * 1000
+                    / phase.len().max(1);
             }
             found[c] = centroid(&window, CROP[c]);
             if let Some((path, n)) = dump
@@ -128,20 +159,49 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             {
                 let mut file = std::fs::File::create(format!("{path}{}", c + 1))?;
                 for e in &events {
-                    writeln!(file, "{},{},{},{}", ms(e) + (e.t_ns % GRID_NS) as f64 * 1e-6, e.x, e.y, e.polarity.bit())?;
+                    writeln!(
+                        file,
+                        "{},{},{},{}",
+                        ms(e) + (e.t_ns % GRID_NS) as f64 * 1e-6,
+                        e.x,
+                        e.y,
+                        e.polarity.bit()
+                    )?;
                 }
             }
         }
     }
-    let (wall, simulated) = (start.elapsed().as_secs_f64(), presses as f64 * PERIOD_STEPS as f64 * 1e-3);
+    let (wall, simulated) = (
+        start.elapsed().as_secs_f64(),
+        presses as f64 * PERIOD_STEPS as f64 * 1e-3,
+    );
     let n = presses as f64;
-    println!("press: {:.0} + {:.0} events in the crop in 0.55 s (paper: 15.7 k together)", press_events[0] as f64 / n, press_events[1] as f64 / n);
+    println!(
+        "press: {:.0} + {:.0} events in the crop in 0.55 s (paper: 15.7 k together)",
+        press_events[0] as f64 / n,
+        press_events[1] as f64 / n
+    );
     let gap_s = n * (PERIOD_STEPS - 2500) as f64 * 1e-3;
-    println!("gap:   {:.0} + {:.0} events/s in the crop, 1.5 s to 2 s after the press began (paper: 9.1 k together)", gap_events[0] as f64 / gap_s, gap_events[1] as f64 / gap_s);
-    println!("ON part: {:.2} going down, {:.2} going up", on[0] as f64 / n / 2000.0, on[1] as f64 / n / 2000.0);
+    println!(
+        "gap:   {:.0} + {:.0} events/s in the crop, 1.5 s to 2 s after the press began (paper: 9.1 k together)",
+        gap_events[0] as f64 / gap_s,
+        gap_events[1] as f64 / gap_s
+    );
+    println!(
+        "ON part: {:.2} going down, {:.2} going up",
+        on[0] as f64 / n / 2000.0,
+        on[1] as f64 / n / 2000.0
+    );
     let mut least = per_press.iter().flatten().copied().collect::<Vec<_>>();
     least.sort_unstable();
-    println!("events per press and camera: min {} p10 {} median {} p90 {} max {}", least[0], least[least.len() / 10], least[least.len() / 2], least[least.len() * 9 / 10], least[least.len() - 1]);
+    println!(
+        "events per press and camera: min {} p10 {} median {} p90 {} max {}",
+        least[0],
+        least[least.len() / 10],
+        least[least.len() / 2],
+        least[least.len() * 9 / 10],
+        least[least.len() - 1]
+    );
     let (mut square, mut x2, mut y2, mut located, mut outside) = (0.0, 0.0, 0.0, 0.0, 0);
     let mut u_error = [Vec::new(), Vec::new()];
     let mut errors = Vec::new();
@@ -165,14 +225,31 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         }
     }
     let rms = |v: f64| (v / f64::max(located, 1.0)).sqrt();
-    println!("localisation with the true geometry: RMSE {:.2} mm (x {:.2}, y {:.2}) over {located} presses, {outside} parallel or outside", rms(square), rms(x2), rms(y2));
+    println!(
+        "localisation with the true geometry: RMSE {:.2} mm (x {:.2}, y {:.2}) over {located} presses, {outside} parallel or outside",
+        rms(square),
+        rms(x2),
+        rms(y2)
+    );
     errors.sort_by(f64::total_cmp);
-    println!("error median {:.2} p95 {:.2} max {:.2} mm", errors[errors.len() / 2], errors[errors.len() * 95 / 100], errors[errors.len() - 1]);
+    println!(
+        "error median {:.2} p95 {:.2} max {:.2} mm",
+        errors[errors.len() / 2],
+        errors[errors.len() * 95 / 100],
+        errors[errors.len() - 1]
+    );
     for (c, e) in u_error.iter().enumerate() {
         let m = e.iter().sum::<f64>() / e.len() as f64;
         let s = (e.iter().map(|v| (v - m) * (v - m)).sum::<f64>() / e.len() as f64).sqrt();
-        println!("camera {}: column error mean {m:+.1} px, std {s:.1} px, n {}", c + 1, e.len());
+        println!(
+            "camera {}: column error mean {m:+.1} px, std {s:.1} px, n {}",
+            c + 1,
+            e.len()
+        );
     }
-    println!("{all_events} events, {simulated:.0} s simulated in {wall:.2} s for both cameras: {:.0} times real time", simulated / wall);
+    println!(
+        "{all_events} events, {simulated:.0} s simulated in {wall:.2} s for both cameras: {:.0} times real time",
+        simulated / wall
+    );
     Ok(())
 }

@@ -43,7 +43,7 @@ pub struct OpticalConfig {
     /// Guided light lost per mm of path and unit of surface slope, 1/mm (assumption).
     pub slope_loss_per_mm: f64,
     /// Part of the light that falls on the dent's flanks which they send on into the camera (assumption).
-    pub flank_albedo: f64,
+    pub flank_gain: f64,
     /// Part of the indentation's effect that follows with a delay, 0..=1 (assumption).
     pub creep_fraction: f64,
     /// Time constant of that part, ms (assumption: soft 30:1 PDMS).
@@ -90,27 +90,27 @@ impl Default for OpticalConfig {
         Self {
             emitters: 32,
             half_intensity_deg: 60.0,
-            emitter_sigma_mm: 4.0,
+            emitter_sigma_mm: 1.5,
             attenuation_per_mm: 0.01,
-            scatter_per_mm: 0.005,
-            stray: 0.05,
-            dent_decay_thicknesses: 0.75,
-            thinning_loss_per_mm: 0.4,
-            slope_loss_per_mm: 0.2,
-            flank_albedo: 1.0,
-            creep_fraction: 0.25,
+            scatter_per_mm: 0.003,
+            stray: 0.02,
+            dent_decay_thicknesses: 0.5,
+            thinning_loss_per_mm: 0.16,
+            slope_loss_per_mm: 0.1,
+            flank_gain: 3.0,
+            creep_fraction: 0.3,
             creep_time_ms: 700.0,
             same_place_mm: 0.25,
             band_sigma_rows: 0.2,
             dent_sigma_px: 14.0,
-            nearest_mm: 8.0,
+            nearest_mm: 15.0,
             threshold_on: 0.2,
             threshold_off: 0.2,
             threshold_sigma: 0.03,
             refractory_us: 500,
             latency_us: 200,
             leak_hz: 0.002,
-            shot_hz: 0.05,
+            shot_hz: 0.045,
             hot_pixels: 8,
             hot_hz: 300.0,
             hot_ratio: 0.45,
@@ -155,7 +155,7 @@ impl OpticalConfig {
             ("scatter_per_mm", self.scatter_per_mm),
             ("thinning_loss_per_mm", self.thinning_loss_per_mm),
             ("slope_loss_per_mm", self.slope_loss_per_mm),
-            ("flank_albedo", self.flank_albedo),
+            ("flank_gain", self.flank_gain),
             ("threshold_sigma", self.threshold_sigma),
             ("leak_hz", self.leak_hz),
             ("shot_hz", self.shot_hz),
@@ -200,7 +200,11 @@ impl OpticalConfig {
             .chain(ranged_fields);
         for (name, expected, found, good) in checked {
             if !good {
-                return Err(InvalidOpticalSetting { name, expected, found });
+                return Err(InvalidOpticalSetting {
+                    name,
+                    expected,
+                    found,
+                });
             }
         }
         Ok(())

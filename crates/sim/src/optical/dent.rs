@@ -55,7 +55,10 @@ impl DentShape {
             return (1.0, [0.0, 0.0]);
         }
         let distance = square.sqrt();
-        (libm::exp(-distance / self.decay_mm), [out[0] / distance, out[1] / distance])
+        (
+            libm::exp(-distance / self.decay_mm),
+            [out[0] / distance, out[1] / distance],
+        )
     }
 }
 
@@ -81,12 +84,20 @@ pub(super) struct Dent {
 
 impl Dent {
     /// The dent at `place`. Pixels that `replaced` changed are looked at, too.
-    pub(super) fn new(scene: &SceneConfig, config: &OpticalConfig, light: &Illumination, columns: &[Column], place: Vec2, replaced: Option<&Self>) -> Self {
+    pub(super) fn new(
+        scene: &SceneConfig,
+        config: &OpticalConfig,
+        light: &Illumination,
+        columns: &[Column],
+        place: Vec2,
+        replaced: Option<&Self>,
+    ) -> Self {
         let shape = DentShape::new(scene, config);
         let camera = &scene.camera;
         let lit = flank_light(light, place);
         let width = columns.len();
-        let (mut loss_per_mm, mut shadow, mut shine) = (vec![0.0; width], vec![0.0; width], vec![0.0; width]);
+        let (mut loss_per_mm, mut shadow, mut shine) =
+            (vec![0.0; width], vec![0.0; width], vec![0.0; width]);
         for (u, column) in columns.iter().enumerate() {
             let crossing = cross(&shape, config, camera, column, place, &lit);
             if crossing.loss_per_mm < LEAST_LOSS_PER_MM {
@@ -94,8 +105,10 @@ impl Dent {
             }
             loss_per_mm[u] = crossing.loss_per_mm;
             shadow[u] = column.beyond(crossing.nearest_mm);
-            let fade = libm::exp(-config.attenuation_per_mm * (crossing.nearest_mm - column.enter_mm));
-            shine[u] = config.flank_albedo * crossing.shine_per_mm * fade / (crossing.loss_per_mm * column.total);
+            let fade =
+                libm::exp(-config.attenuation_per_mm * (crossing.nearest_mm - column.enter_mm));
+            shine[u] = config.flank_gain * crossing.shine_per_mm * fade
+                / (crossing.loss_per_mm * column.total);
         }
         let own_columns = extent(&loss_per_mm);
         let image = Image::new(scene, config, place);
@@ -137,9 +150,17 @@ impl Dent {
         let k = self.loss_per_mm[u];
         if k == 0.0 {
             // This column is dark to the dent: x stays 0 for ever.
-            return if x < 0.0 { f64::NEG_INFINITY } else { f64::INFINITY };
+            return if x < 0.0 {
+                f64::NEG_INFINITY
+            } else {
+                f64::INFINITY
+            };
         }
-        if x >= 1.0 { f64::INFINITY } else { -libm::log1p(-x) / k }
+        if x >= 1.0 {
+            f64::INFINITY
+        } else {
+            -libm::log1p(-x) / k
+        }
     }
 
     /// `c` in `I / I0 = 1 + x c`; above -1.
@@ -163,18 +184,35 @@ struct Crossing {
     nearest_mm: f64,
 }
 
-fn cross(shape: &DentShape, config: &OpticalConfig, camera: &CameraModel, column: &Column, place: Vec2, lit: &[f64; FLANK_DIRECTIONS]) -> Crossing {
+fn cross(
+    shape: &DentShape,
+    config: &OpticalConfig,
+    camera: &CameraModel,
+    column: &Column,
+    place: Vec2,
+    lit: &[f64; FLANK_DIRECTIONS],
+) -> Crossing {
     let d = column.direction;
-    let to = [place[0] - camera.position.x_mm, place[1] - camera.position.y_mm];
+    let to = [
+        place[0] - camera.position.x_mm,
+        place[1] - camera.position.y_mm,
+    ];
     let along = dot(to, d);
     let half_chord_square = shape.reach_mm() * shape.reach_mm() - (dot(to, to) - along * along);
     let nearest_mm = along.max(column.enter_mm).min(column.exit_mm);
-    let mut crossing = Crossing { loss_per_mm: 0.0, shine_per_mm: 0.0, nearest_mm };
+    let mut crossing = Crossing {
+        loss_per_mm: 0.0,
+        shine_per_mm: 0.0,
+        nearest_mm,
+    };
     if half_chord_square <= 0.0 {
         return crossing;
     }
     let half = half_chord_square.sqrt();
-    let (from, until) = ((along - half).max(column.enter_mm), (along + half).min(column.exit_mm));
+    let (from, until) = (
+        (along - half).max(column.enter_mm),
+        (along + half).min(column.exit_mm),
+    );
     if until <= from {
         return crossing;
     }
@@ -182,10 +220,19 @@ fn cross(shape: &DentShape, config: &OpticalConfig, camera: &CameraModel, column
     let ds = (until - from) / steps;
     for k in 0..steps as u32 {
         let s = from + (f64::from(k) + 0.5) * ds - along;
-        let offset = [along * d[0] - to[0] + s * d[0], along * d[1] - to[1] + s * d[1]];
+        let offset = [
+            along * d[0] - to[0] + s * d[0],
+            along * d[1] - to[1] + s * d[1],
+        ];
         let (depth, outward) = shape.depth(offset);
-        let slope = if depth < 1.0 { depth / shape.decay_mm } else { 0.0 };
-        crossing.loss_per_mm += ds * (config.thinning_loss_per_mm * depth / shape.thickness_mm + config.slope_loss_per_mm * slope);
+        let slope = if depth < 1.0 {
+            depth / shape.decay_mm
+        } else {
+            0.0
+        };
+        crossing.loss_per_mm += ds
+            * (config.thinning_loss_per_mm * depth / shape.thickness_mm
+                + config.slope_loss_per_mm * slope);
         // The flank shines into the camera where it faces it.
         let facing = -dot(outward, d);
         if facing > 0.0 {
@@ -241,14 +288,21 @@ impl Image {
     /// The nearer the dent, the taller its image: half the skin's thickness spans `rows_per_radian * h / 2r` rows. The dent
     /// comes from the touched surface, so that its lit flank appears in the upper half.
     fn new(scene: &SceneConfig, config: &OpticalConfig, place: Vec2) -> Self {
-        let to = [place[0] - scene.camera.position.x_mm, place[1] - scene.camera.position.y_mm];
+        let to = [
+            place[0] - scene.camera.position.x_mm,
+            place[1] - scene.camera.position.y_mm,
+        ];
         let distance = dot(to, to).sqrt().max(config.nearest_mm);
         let half_width = f64::from(SENSOR_WIDTH) / 2.0;
         let rows_per_radian = half_width / scene.camera.lens.angle_deg(0.0).1.to_radians();
         let half_height = rows_per_radian * 0.5 * scene.skin_thickness_mm / distance;
-        let (first, last) = (usize::from(scene.skin_rows.0), usize::from(scene.skin_rows.1));
+        let (first, last) = (
+            usize::from(scene.skin_rows.0),
+            usize::from(scene.skin_rows.1),
+        );
         let centre = 0.5 * (first + last) as f64;
-        let sigma = (config.dent_sigma_px * config.dent_sigma_px + half_height * half_height).sqrt();
+        let sigma =
+            (config.dent_sigma_px * config.dent_sigma_px + half_height * half_height).sqrt();
         Self {
             centre,
             sigma,
@@ -276,14 +330,23 @@ mod tests {
             assert!((dot(d, d) - 1.0).abs() < 1e-12);
             assert_eq!(direction_index(d), i);
         }
-        for (d, index) in [([1.0, 0.0], 0), ([0.0, 1.0], 16), ([-1.0, 0.0], 32), ([0.0, -1.0], 48)] {
+        for (d, index) in [
+            ([1.0, 0.0], 0),
+            ([0.0, 1.0], 16),
+            ([-1.0, 0.0], 32),
+            ([0.0, -1.0], 48),
+        ] {
             assert_eq!(direction_index(d), index);
         }
     }
 
     #[test]
     fn the_dent_is_flat_under_the_tip_and_falls_off_outside() {
-        let shape = DentShape { half_side_mm: 2.0, decay_mm: 3.0, thickness_mm: 4.0 };
+        let shape = DentShape {
+            half_side_mm: 2.0,
+            decay_mm: 3.0,
+            thickness_mm: 4.0,
+        };
         assert_eq!(shape.depth([1.9, -1.9]), (1.0, [0.0, 0.0]));
         let (depth, outward) = shape.depth([5.0, 0.5]);
         assert!((depth - libm::exp(-1.0)).abs() < 1e-12);

@@ -45,17 +45,28 @@ impl Illumination {
     pub(super) fn new(outline: &SkinOutline, config: &OpticalConfig) -> Self {
         let path = emitter_path(outline);
         let total: f64 = path.windows(2).map(|w| distance(w[0], w[1])).sum();
-        let target = [outline.centre.x_mm + outline.width_mm / 2.0, outline.centre.y_mm];
+        let target = [
+            outline.centre.x_mm + outline.width_mm / 2.0,
+            outline.centre.y_mm,
+        ];
         let emitters = (0..config.emitters)
             .filter_map(|i| {
                 let s = (f64::from(i) + 0.5) / f64::from(config.emitters) * total;
                 let at = along(&path, s)?;
-                Some(Emitter { at, axis: unit([target[0] - at[0], target[1] - at[1]])? })
+                Some(Emitter {
+                    at,
+                    axis: unit([target[0] - at[0], target[1] - at[1]])?,
+                })
             })
             .collect();
         // cos^n is one half at the half-intensity angle.
-        let lobe = -core::f64::consts::LN_2 / libm::log(libm::cos(config.half_intensity_deg.to_radians()));
-        Self { emitters, lobe, attenuation_per_mm: config.attenuation_per_mm }
+        let lobe =
+            -core::f64::consts::LN_2 / libm::log(libm::cos(config.half_intensity_deg.to_radians()));
+        Self {
+            emitters,
+            lobe,
+            attenuation_per_mm: config.attenuation_per_mm,
+        }
     }
 
     /// Intensity of `emitter` in the unit direction `d`, 1 on its axis.
@@ -75,7 +86,10 @@ impl Illumination {
         let to = [p[0] - emitter.at[0], p[1] - emitter.at[1]];
         let r = length(to).max(1.0);
         let d = [to[0] / r, to[1] / r];
-        (d, self.lobe(emitter, d) * libm::exp(-self.attenuation_per_mm * r) / r)
+        (
+            d,
+            self.lobe(emitter, d) * libm::exp(-self.attenuation_per_mm * r) / r,
+        )
     }
 
     fn fluence(&self, p: Vec2) -> f64 {
@@ -87,7 +101,11 @@ impl Illumination {
         let term = |e: &Emitter| {
             let offset = [p[0] - e.at[0], p[1] - e.at[1]];
             let square = dot(offset, offset) / (sigma_mm * sigma_mm);
-            if square > 36.0 { 0.0 } else { self.lobe(e, d) * libm::exp(-0.5 * square) }
+            if square > 36.0 {
+                0.0
+            } else {
+                self.lobe(e, d) * libm::exp(-0.5 * square)
+            }
         };
         self.emitters.iter().map(term).sum()
     }
@@ -110,11 +128,21 @@ pub(super) struct Column {
 }
 
 impl Column {
-    fn new(camera: &CameraModel, x: u16, outline: &SkinOutline, light: &Illumination, config: &OpticalConfig) -> Self {
+    fn new(
+        camera: &CameraModel,
+        x: u16,
+        outline: &SkinOutline,
+        light: &Illumination,
+        config: &OpticalConfig,
+    ) -> Self {
         let direction = camera.direction(camera.angle_of_column_deg(f64::from(x)));
         let origin = [camera.position.x_mm, camera.position.y_mm];
         let at = |s: f64| [origin[0] + s * direction[0], origin[1] + s * direction[1]];
-        let (enter_mm, exit_mm) = inside(outline, at, distance(origin, [outline.centre.x_mm, outline.centre.y_mm]));
+        let (enter_mm, exit_mm) = inside(
+            outline,
+            at,
+            distance(origin, [outline.centre.x_mm, outline.centre.y_mm]),
+        );
         let fade = |s: f64| libm::exp(-config.attenuation_per_mm * (s - enter_mm));
         let mut scattered = vec![0.0];
         let mut sum = 0.0;
@@ -132,7 +160,14 @@ impl Column {
         } else {
             0.0
         };
-        Self { direction, enter_mm, exit_mm, wall, scattered, total: wall + sum + config.stray }
+        Self {
+            direction,
+            enter_mm,
+            exit_mm,
+            wall,
+            scattered,
+            total: wall + sum + config.stray,
+        }
     }
 
     /// The part of the light that comes from farther than `s` mm from the camera: 0..1.
@@ -141,14 +176,22 @@ impl Column {
         let last = self.scattered.len() - 1;
         let low = (k as usize).min(last);
         let high = (low + 1).min(last);
-        let before = self.scattered[low] + (self.scattered[high] - self.scattered[low]) * (k - low as f64).min(1.0);
+        let before = self.scattered[low]
+            + (self.scattered[high] - self.scattered[low]) * (k - low as f64).min(1.0);
         (self.wall + self.scattered[last] - before) / self.total
     }
 }
 
 /// All columns of the camera.
-pub(super) fn columns(camera: &CameraModel, outline: &SkinOutline, light: &Illumination, config: &OpticalConfig) -> Vec<Column> {
-    (0..SENSOR_WIDTH).map(|x| Column::new(camera, x, outline, light, config)).collect()
+pub(super) fn columns(
+    camera: &CameraModel,
+    outline: &SkinOutline,
+    light: &Illumination,
+    config: &OpticalConfig,
+) -> Vec<Column> {
+    (0..SENSOR_WIDTH)
+        .map(|x| Column::new(camera, x, outline, light, config))
+        .collect()
 }
 
 /// First stretch of the ray `at` inside the outline, searched up to the skin's far side.
@@ -162,7 +205,11 @@ fn inside(outline: &SkinOutline, at: impl Fn(f64) -> Vec2, to_centre_mm: f64) ->
     let border = |mut a: f64, mut b: f64, b_inside: bool| {
         for _ in 0..24 {
             let middle = 0.5 * (a + b);
-            if contains(middle) == b_inside { b = middle } else { a = middle }
+            if contains(middle) == b_inside {
+                b = middle
+            } else {
+                a = middle
+            }
         }
         0.5 * (a + b)
     };
@@ -172,8 +219,14 @@ fn inside(outline: &SkinOutline, at: impl Fn(f64) -> Vec2, to_centre_mm: f64) ->
     let Some(first) = (0..steps).find(|&k| contains(grid(k))) else {
         return (0.0, 0.0);
     };
-    let enter = if first == 0 { 0.0 } else { border(grid(first - 1), grid(first), true) };
-    let after = (first..steps).find(|&k| !contains(grid(k))).unwrap_or(steps);
+    let enter = if first == 0 {
+        0.0
+    } else {
+        border(grid(first - 1), grid(first), true)
+    };
+    let after = (first..steps)
+        .find(|&k| !contains(grid(k)))
+        .unwrap_or(steps);
     (enter, border(grid(after - 1), grid(after), false))
 }
 
@@ -192,7 +245,9 @@ fn emitter_path(outline: &SkinOutline) -> Vec<Vec2> {
     arc(r - hy, 270.0);
     arc(hy - r, 180.0);
     path.push([hx - c, hy]);
-    path.into_iter().map(|[x, y]| [x + outline.centre.x_mm, y + outline.centre.y_mm]).collect()
+    path.into_iter()
+        .map(|[x, y]| [x + outline.centre.x_mm, y + outline.centre.y_mm])
+        .collect()
 }
 
 fn distance(a: Vec2, b: Vec2) -> f64 {
@@ -210,7 +265,10 @@ fn along(path: &[Vec2], mut s: f64) -> Option<Vec2> {
         let l = distance(w[0], w[1]);
         if s <= l && l > 0.0 {
             let f = s / l;
-            return Some([w[0][0] + f * (w[1][0] - w[0][0]), w[0][1] + f * (w[1][1] - w[0][1])]);
+            return Some([
+                w[0][0] + f * (w[1][0] - w[0][0]),
+                w[0][1] + f * (w[1][1] - w[0][1]),
+            ]);
         }
         s -= l;
     }
@@ -243,9 +301,15 @@ mod tests {
 
     #[test]
     fn half_intensity_is_at_its_angle() {
-        let config = OpticalConfig { half_intensity_deg: 35.0, ..OpticalConfig::default() };
+        let config = OpticalConfig {
+            half_intensity_deg: 35.0,
+            ..OpticalConfig::default()
+        };
         let light = Illumination::new(&SkinOutline::PAPER, &config);
-        let e = Emitter { at: [0.0, 0.0], axis: [1.0, 0.0] };
+        let e = Emitter {
+            at: [0.0, 0.0],
+            axis: [1.0, 0.0],
+        };
         let (sin, cos) = libm::sincos(35.0_f64.to_radians());
         assert!((light.lobe(&e, [cos, sin]) - 0.5).abs() < 1e-12);
         assert!((light.lobe(&e, [1.0, 0.0]) - 1.0).abs() < 1e-12);

@@ -73,7 +73,10 @@ impl OpticalModel {
     ///
     /// # Errors
     /// When a constant is outside its range.
-    pub fn with_config(scene: &SceneConfig, config: OpticalConfig) -> Result<Self, InvalidOpticalSetting> {
+    pub fn with_config(
+        scene: &SceneConfig,
+        config: OpticalConfig,
+    ) -> Result<Self, InvalidOpticalSetting> {
         config.check()?;
         Ok(Self::build(scene, config))
     }
@@ -90,7 +93,11 @@ impl OpticalModel {
             seen_mm: 0.0,
         };
         let dent = Dent::new(scene, &config, &light, &columns, contact.place, None);
-        let mut pixels = Pixels::new(scene, &config, &mut Stream::new(scene.seed, Purpose::Pixels, 1));
+        let mut pixels = Pixels::new(
+            scene,
+            &config,
+            &mut Stream::new(scene.seed, Purpose::Pixels, 1),
+        );
         pixels.aim_at(&dent);
         Self {
             scene: scene.clone(),
@@ -118,7 +125,8 @@ impl OpticalModel {
         let begin = out.len();
         let ramp = self.indent(t_ns, tip);
         self.pixels.step(&self.dent, ramp, out);
-        self.noise.step(t_ns, t_ns - self.first_ns, &mut self.pixels, out);
+        self.noise
+            .step(t_ns, t_ns - self.first_ns, &mut self.pixels, out);
         out[begin..].sort_unstable_by_key(|e| (e.t_ns, e.y, e.x, e.polarity.bit()));
     }
 
@@ -126,7 +134,11 @@ impl OpticalModel {
         let c = &mut self.contact;
         // The base is rigid: the skin gives way no farther than its thickness.
         let on_skin = z < 0.0 && self.scene.outline.contains(Point2::new(x, y));
-        let depth_mm = if on_skin { (-z).min(self.scene.skin_thickness_mm) } else { 0.0 };
+        let depth_mm = if on_skin {
+            (-z).min(self.scene.skin_thickness_mm)
+        } else {
+            0.0
+        };
         let (dx, dy) = (x - c.place[0], y - c.place[1]);
         let elsewhere = dx * dx + dy * dy > self.config.same_place_mm * self.config.same_place_mm;
         if depth_mm > 0.0 && elsewhere {
@@ -135,7 +147,14 @@ impl OpticalModel {
                 (c.memory_mm, c.effect_mm, c.seen_mm) = (0.0, 0.0, 0.0);
             }
             c.place = [x, y];
-            self.dent = Dent::new(&self.scene, &self.config, &self.light, &self.columns, c.place, Some(&self.dent));
+            self.dent = Dent::new(
+                &self.scene,
+                &self.config,
+                &self.light,
+                &self.columns,
+                c.place,
+                Some(&self.dent),
+            );
             self.pixels.aim_at(&self.dent);
         }
         c.depth_mm = depth_mm;
@@ -147,7 +166,11 @@ impl OpticalModel {
         let effect_mm = (1.0 - creep) * depth_mm + creep * c.memory_mm;
         let late = f64::from(self.config.latency_us) / (GRID_NS as f64 * 1e-3);
         let seen_mm = effect_mm - (effect_mm - c.effect_mm) * late;
-        let ramp = Ramp { t_ns, from_mm: c.seen_mm, to_mm: seen_mm };
+        let ramp = Ramp {
+            t_ns,
+            from_mm: c.seen_mm,
+            to_mm: seen_mm,
+        };
         (c.effect_mm, c.seen_mm) = (effect_mm, seen_mm);
         ramp
     }

@@ -20,6 +20,9 @@ pub(super) struct Noise {
     /// Brightness of each column and row of the undisturbed picture; their product is 1 at its brightest.
     column_light: Vec<f64>,
     row_light: Vec<f64>,
+    /// Shot-noise weights: the sum of all rows up to and with this one, and the largest in each row.
+    shot_below: Vec<f64>,
+    shot_peak: Vec<f64>,
     /// When the next noise event comes, ns after the first tip sample.
     next_ns: f64,
 }
@@ -41,7 +44,10 @@ fn below(random: &mut Stream, n: u16) -> u16 {
 impl Noise {
     pub(super) fn new(scene: &SceneConfig, config: &OpticalConfig, columns: &[Column]) -> Self {
         let mut random = Stream::new(scene.seed, Purpose::Pixels, 2);
-        let brightest = columns.iter().map(|c| c.total).fold(f64::MIN_POSITIVE, f64::max);
+        let brightest = columns
+            .iter()
+            .map(|c| c.total)
+            .fold(f64::MIN_POSITIVE, f64::max);
         let column_light: Vec<f64> = columns.iter().map(|c| c.total / brightest).collect();
         let (first, last) = (f64::from(scene.skin_rows.0), f64::from(scene.skin_rows.1));
         let sigma = config.band_sigma_rows * (last - first + 1.0).max(1.0);
@@ -51,19 +57,41 @@ impl Noise {
                 libm::exp(-0.5 * z * z)
             })
             .collect();
-        let weights: f64 = row_light.iter().map(|r| column_light.iter().map(|c| shot_weight(r * c)).sum::<f64>()).sum();
+        let mut weights = 0.0;
+        let (mut shot_below, mut shot_peak) = (Vec::new(), Vec::new());
+        for row in &row_light {
+            let row_weights = column_light.iter().map(|column| shot_weight(row * column));
+            weights += row_weights.clone().sum::<f64>();
+            shot_below.push(weights);
+            shot_peak.push(row_weights.fold(0.0, f64::max));
+        }
         let pixels = f64::from(SENSOR_WIDTH) * f64::from(SENSOR_HEIGHT);
         let (leak_total_hz, shot_total_hz) = (config.leak_hz * pixels, config.shot_hz * weights);
         let mut rate = config.hot_hz;
         let hot: Vec<_> = (0..config.hot_pixels)
             .map(|_| {
-                let pixel = (below(&mut random, SENSOR_WIDTH), below(&mut random, SENSOR_HEIGHT), rate);
+                let pixel = (
+                    below(&mut random, SENSOR_WIDTH),
+                    below(&mut random, SENSOR_HEIGHT),
+                    rate,
+                );
                 rate *= config.hot_ratio;
                 pixel
             })
             .collect();
         let total_hz = leak_total_hz + shot_total_hz + hot.iter().map(|h| h.2).sum::<f64>();
-        let mut noise = Self { random, leak_total_hz, shot_total_hz, hot, total_hz, column_light, row_light, next_ns: 0.0 };
+        let mut noise = Self {
+            random,
+            leak_total_hz,
+            shot_total_hz,
+            hot,
+            total_hz,
+            column_light,
+            row_light,
+            shot_below,
+            shot_peak,
+            next_ns: 0.0,
+        };
         noise.wait();
         noise
     }
@@ -82,12 +110,26 @@ impl Noise {
     }
 
     /// The noise of the grid step that begins at `t_ns`, `since_start_ns` after the first one.
-    pub(super) fn step(&mut self, t_ns: i64, since_start_ns: i64, pixels: &mut Pixels, out: &mut Vec<PixelEvent>) {
+    pub(super) fn step(
+        &mut self,
+        t_ns: i64,
+        since_start_ns: i64,
+        pixels: &mut Pixels,
+        out: &mut Vec<PixelEvent>,
+    ) {
         let start = since_start_ns as f64;
         while self.next_ns < start + GRID_NS as f64 {
             let us = (((self.next_ns - start) / 1e3) as i64).clamp(0, GRID_NS / 1000 - 1);
             let (x, y, polarity) = self.draw();
-            pixels.strike(PixelEvent { t_ns: t_ns + us * 1000, x, y, polarity }, out);
+            pixels.strike(
+                PixelEvent {
+                    t_ns: t_ns + us * 1000,
+                    x,
+                    y,
+                    polarity,
+                },
+                out,
+            );
             self.wait();
         }
     }
@@ -95,7 +137,11 @@ impl Noise {
     fn draw(&mut self) -> (u16, u16, Polarity) {
         let mut pick = self.random.unit() * self.total_hz;
         if pick < self.leak_total_hz {
-            return (below(&mut self.random, SENSOR_WIDTH), below(&mut self.random, SENSOR_HEIGHT), Polarity::On);
+            return (
+                below(&mut self.random, SENSOR_WIDTH),
+                below(&mut self.random, SENSOR_HEIGHT),
+                Polarity::On,
+            );
         }
         pick -= self.leak_total_hz;
         let polarity = Polarity::from_bit(self.random.unit() < 0.5);
@@ -108,12 +154,17 @@ impl Noise {
                 pick -= rate;
             }
         }
-        // Shot noise (and the last bit of rounding of the hot pixels): try pixels until one accepts.
+        // Shot noise (and the last bit of rounding of the hot pixels): a row by its rate, then columns until one accepts.
+        let wanted = self.random.unit() * self.shot_below.last().copied().unwrap_or(0.0);
+        let y = self
+            .shot_below
+            .partition_point(|&sum| sum <= wanted)
+            .min(self.row_light.len() - 1);
         loop {
-            let (x, y) = (below(&mut self.random, SENSOR_WIDTH), below(&mut self.random, SENSOR_HEIGHT));
-            let q = self.column_light[usize::from(x)] * self.row_light[usize::from(y)];
-            if self.random.unit() < shot_weight(q) {
-                return (x, y, polarity);
+            let x = below(&mut self.random, SENSOR_WIDTH);
+            let weight = shot_weight(self.column_light[usize::from(x)] * self.row_light[y]);
+            if self.random.unit() * self.shot_peak[y] <= weight {
+                return (x, y as u16, polarity);
             }
         }
     }

@@ -104,8 +104,13 @@ impl Pixels {
         let width = usize::from(SENSOR_WIDTH);
         let skin = (0..width * rows)
             .map(|_| {
-                let mut threshold = |mean: f64| (mean + config.threshold_sigma * random.gauss()).max(LEAST_THRESHOLD);
-                let (on, off) = (threshold(config.threshold_on), threshold(config.threshold_off));
+                let mut threshold = |mean: f64| {
+                    (mean + config.threshold_sigma * random.gauss()).max(LEAST_THRESHOLD)
+                };
+                let (on, off) = (
+                    threshold(config.threshold_on),
+                    threshold(config.threshold_off),
+                );
                 // A pixel's last event, before the session, left its reference anywhere between its thresholds.
                 let reference = libm::exp(0.5 * (random.unit() * (on + off) - on));
                 Pixel {
@@ -195,7 +200,8 @@ impl Pixels {
         while k < self.held.len() {
             let (x, y) = self.held[k];
             let (u, v) = (usize::from(x), usize::from(y));
-            let end_ns = self.last_ns[v * usize::from(SENSOR_WIDTH) + u].saturating_add(self.refractory_ns);
+            let end_ns =
+                self.last_ns[v * usize::from(SENSOR_WIDTH) + u].saturating_add(self.refractory_ns);
             if end_ns >= ramp.t_ns + GRID_NS {
                 k += 1;
                 continue;
@@ -217,7 +223,15 @@ impl Pixels {
     }
 
     /// Emits all events of one pixel from `from_us` to the end of the step.
-    fn speak(&mut self, dent: &Dent, u: usize, v: usize, loss: Loss, mut from_us: i64, out: &mut Vec<PixelEvent>) {
+    fn speak(
+        &mut self,
+        dent: &Dent,
+        u: usize,
+        v: usize,
+        loss: Loss,
+        mut from_us: i64,
+        out: &mut Vec<PixelEvent>,
+    ) {
         let c = dent.contrast(u, v);
         let i = self.index(u, v);
         loop {
@@ -230,7 +244,11 @@ impl Pixels {
                 return;
             };
             let part = (bound - loss.from) / (loss.to - loss.from);
-            let us = if part > 0.0 { (part * STEP_US as f64) as i64 } else { 0 };
+            let us = if part > 0.0 {
+                (part * STEP_US as f64) as i64
+            } else {
+                0
+            };
             let us = us.clamp(from_us, STEP_US - 1);
             let t_ns = loss.t_ns + us * NS_PER_US;
             out.push(PixelEvent {

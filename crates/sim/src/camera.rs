@@ -1,0 +1,509 @@
+//! A simulated event camera: pixel events and trigger edges as the EVT2 bytes that a real one would send.
+
+use std::collections::{BTreeMap, VecDeque};
+
+use skinrig_device::{CameraCapabilities, CameraSettings, DeviceError, EventCamera};
+use skinrig_formats::{Scanner, evt2};
+use skinrig_model::{
+    CameraId, CdEvent, DeviceIdentity, DeviceRole, HostTime, RawChunk, SENSOR_HEIGHT, SENSOR_WIDTH,
+    Setting, StreamFormat, TriggerEdge,
+};
+
+use crate::camera_clock::CameraClock;
+use crate::config::SimConfig;
+use crate::faults::{Fault, When};
+use crate::random::{Purpose, Stream};
+use crate::scene::{GRID_NS, PixelEvent, PixelModel, TipSample};
+use crate::world::{LineEdge, Shared, World};
+
+/// Bias names, ranges and defaults in mV (evk1.md section 2.9). The simulation stores them; they have no
+/// effect on its events.
+const BIASES: [(&str, i64, i64, i64); 6] = [
+    ("bias_diff_off", 0, 1800, 221),
+    ("bias_diff_on", 0, 1800, 384),
+    ("bias_fo", 1250, 1800, 1477),
+    ("bias_hpf", 900, 1800, 1499),
+    ("bias_pr", 975, 1800, 1250),
+    ("bias_refr", 1300, 1800, 1500),
+];
+
+/// Trigger inputs of an EVK1 (evk1.md section 2.12).
+const CHANNELS: [u8; 3] = [0, 6, 7];
+
+/// The channel that the trigger box is wired to.
+pub const TRIGGER_CHANNEL: u8 = 0;
+
+/// Makes the pixel model for the n-th start of a camera; `None` when there are no pixels at this level.
+pub type PixelFactory = Box<dyn Fn(u64) -> Option<Box<dyn PixelModel>> + Send>;
+
+/// A simulated event camera.
+pub struct SimCamera {
+    shared: Shared,
+    id: CameraId,
+    serial: String,
+    chunk_bytes: usize,
+    jitter_ns: i64,
+    read_back_fault: bool,
+    lost: Vec<(When, u64)>,
+    unplug: Option<When>,
+    make_pixels: PixelFactory,
+    random: Stream,
+    draw_clock: crate::config::CameraClockConfig,
+    clock: Option<CameraClock>,
+    settings: CameraSettings,
+    starts: u64,
+    streaming: Option<Streaming>,
+    scanner: Scanner,
+    out: Outgoing,
+    gone: bool,
+}
+
+/// What exists only while streaming.
+struct Streaming {
+    grid: i64,
+    pixels: Option<Box<dyn PixelModel>>,
+    encoder: evt2::Encoder,
+    /// Trigger edges not yet encoded, with the instant at which the camera sees them.
+    edges: VecDeque<LineEdge>,
+    tips: Vec<TipSample>,
+    events: Vec<PixelEvent>,
+    fresh: Vec<u8>,
+}
+
+/// Bytes on their way to the host.
+#[derive(Default)]
+struct Outgoing {
+    seq: u64,
+    bytes: Vec<u8>,
+    /// When the last of `bytes` arrived.
+    arrived: HostTime,
+    /// Bytes lost since the last chunk.
+    lost_before: u64,
+    /// Bytes still to be lost.
+    to_lose: u64,
+    ready: VecDeque<RawChunk>,
+}
+
+impl SimCamera {
+    /// Camera `id` of a rig.
+    #[must_use]
+    pub fn new(
+        config: &SimConfig,
+        id: CameraId,
+        shared: Shared,
+        make_pixels: PixelFactory,
+    ) -> Self {
+        let mut lost = Vec::new();
+        let mut unplug = None;
+        let mut read_back_fault = false;
+        for fault in &config.faults {
+            match *fault {
+                Fault::CameraBytesLost {
+                    camera,
+                    when,
+                    words,
+                } if camera == id => {
+                    lost.push((when, words));
+                }
+                Fault::CameraUnplugged { camera, when } if camera == id => unplug = Some(when),
+                Fault::CameraReadBack(camera) if camera == id => read_back_fault = true,
+                _ => {}
+            }
+        }
+        Self {
+            shared,
+            id,
+            serial: format!("sim-{:08x}-c{}", config.seed as u32, id.number()),
+            chunk_bytes: config.camera_clock.chunk_bytes.max(4) / 4 * 4,
+            jitter_ns: config.camera_clock.trigger_jitter_ns.max(0),
+            read_back_fault,
+            lost,
+            unplug,
+            make_pixels,
+            random: Stream::new(config.seed, Purpose::CameraClock, id.index() as u64),
+            draw_clock: config.camera_clock,
+            clock: None,
+            settings: CameraSettings::default(),
+            starts: 0,
+            streaming: None,
+            scanner: Scanner::new(StreamFormat::Evt2),
+            out: Outgoing::default(),
+            gone: false,
+        }
+    }
+
+    fn role(&self) -> DeviceRole {
+        DeviceRole::of_camera(self.id)
+    }
+
+    fn refused(&self, expected: impl Into<String>, found: impl Into<String>) -> DeviceError {
+        DeviceError::Refused {
+            role: self.role(),
+            serial: self.serial.clone(),
+            expected: expected.into(),
+            found: found.into(),
+        }
+    }
+
+    fn gone_error(&self) -> DeviceError {
+        DeviceError::Lost {
+            role: self.role(),
+            serial: self.serial.clone(),
+            detail: "expected transfers, the device is unplugged".to_owned(),
+        }
+    }
+
+    fn check(&self, settings: &CameraSettings) -> Result<(), DeviceError> {
+        for (name, &value) in &settings.biases {
+            let Some((_, low, high, _)) = BIASES.iter().find(|b| b.0 == name) else {
+                let names = BIASES.map(|b| b.0).join(", ");
+                return Err(self.refused(format!("a bias out of {names}"), name));
+            };
+            if !(*low..=*high).contains(&value) {
+                return Err(self.refused(
+                    format!("{name} in {low}..={high} mV"),
+                    format!("{value} mV"),
+                ));
+            }
+        }
+        for channel in &settings.trigger_channels {
+            if !CHANNELS.contains(channel) {
+                return Err(self.refused("trigger channel 0, 6 or 7", channel.to_string()));
+            }
+        }
+        if let Some(r) = settings.roi {
+            let fits = |from: u16, size: u16, limit: u16| {
+                size > 0 && u32::from(from) + u32::from(size) <= u32::from(limit)
+            };
+            if !fits(r.x, r.width, SENSOR_WIDTH) || !fits(r.y, r.height, SENSOR_HEIGHT) {
+                return Err(self.refused(
+                    format!("a non-empty region within {SENSOR_WIDTH} x {SENSOR_HEIGHT}"),
+                    format!("{} x {} at ({}, {})", r.width, r.height, r.x, r.y),
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    /// Simulates and encodes what happened up to the present.
+    fn catch_up(&mut self) {
+        let Some(stream) = &mut self.streaming else {
+            return;
+        };
+        let index = self.id.index();
+        let (unplugged_ns, losses) = {
+            let mut world = self.shared.world();
+            world.tips_since(index, stream.grid, &mut stream.tips);
+            let jitter = |random: &mut Stream| (random.unit() * self.jitter_ns as f64) as i64;
+            for edge in world.edges[index].drain(..) {
+                let t_ns = edge.t_ns + jitter(&mut self.random);
+                stream.edges.push_back(LineEdge { t_ns, ..edge });
+            }
+            stream.grid = world.grid();
+            struck(&world, self.unplug, &mut self.lost)
+        };
+        let Some(clock) = self.clock else { return };
+        let tips = std::mem::take(&mut stream.tips);
+        for pair in tips.windows(2) {
+            let (from, to) = (pair[0], pair[1]);
+            if unplugged_ns.is_some_and(|t| t <= from.t_ns) {
+                self.gone = true;
+                break;
+            }
+            let lose: u64 = losses
+                .iter()
+                .filter(|(t, _)| (from.t_ns..to.t_ns).contains(t))
+                .map(|(_, words)| words * 4)
+                .sum();
+            if lose > 0 {
+                self.out.close(self.id, &mut self.scanner);
+                self.out.to_lose += lose;
+            }
+            stream.step(from, to, clock, &self.settings);
+            self.out.take(
+                &mut stream.fresh,
+                HostTime(to.t_ns),
+                self.id,
+                &mut self.scanner,
+                self.chunk_bytes,
+            );
+        }
+        stream.tips = tips;
+    }
+
+    fn hand_over(&mut self, chunks: &mut Vec<RawChunk>) -> Result<(), DeviceError> {
+        chunks.extend(self.out.ready.drain(..));
+        if self.gone {
+            return Err(self.gone_error());
+        }
+        Ok(())
+    }
+}
+
+/// When the camera is unplugged, and the losses that have struck, both on world time.
+fn struck(
+    world: &World,
+    unplug: Option<When>,
+    lost: &mut Vec<(When, u64)>,
+) -> (Option<i64>, Vec<(i64, u64)>) {
+    let now_ns = world.grid() * GRID_NS;
+    let known = |when: When| world.struck_at(when).filter(|&t| t < now_ns);
+    let mut losses = Vec::new();
+    lost.retain(|&(when, words)| match known(when) {
+        Some(t) => {
+            losses.push((t, words));
+            false
+        }
+        None => true,
+    });
+    (unplug.and_then(known), losses)
+}
+
+impl Streaming {
+    /// One grid step: its events and edges as bytes in `fresh`.
+    fn step(&mut self, from: TipSample, to: TipSample, clock: CameraClock, set: &CameraSettings) {
+        self.events.clear();
+        if let Some(pixels) = &mut self.pixels {
+            pixels.advance(&[from, to], &mut self.events);
+        }
+        let triggered = set.trigger_channels.contains(&TRIGGER_CHANNEL);
+        for event in &self.events {
+            while let Some(edge) = self.edges.front().copied()
+                && edge.t_ns <= event.t_ns
+            {
+                self.edges.pop_front();
+                encode_edge(&mut self.encoder, edge, triggered, clock, &mut self.fresh);
+            }
+            if set.roi.is_some_and(|r| {
+                !(r.x..r.x + r.width).contains(&event.x)
+                    || !(r.y..r.y + r.height).contains(&event.y)
+            }) {
+                continue;
+            }
+            let cd = CdEvent {
+                t_us: clock.camera_us(event.t_ns),
+                x: event.x,
+                y: event.y,
+                polarity: event.polarity,
+            };
+            let written = self.encoder.cd(cd, &mut self.fresh);
+            debug_assert!(written.is_ok(), "pixel events out of order: {written:?}");
+        }
+        while let Some(edge) = self.edges.front().copied()
+            && edge.t_ns < to.t_ns
+        {
+            self.edges.pop_front();
+            encode_edge(&mut self.encoder, edge, triggered, clock, &mut self.fresh);
+        }
+        let reached = self
+            .encoder
+            .advance_to(clock.camera_us(to.t_ns), &mut self.fresh);
+        debug_assert!(reached.is_ok(), "time ran backwards: {reached:?}");
+    }
+}
+
+fn encode_edge(
+    encoder: &mut evt2::Encoder,
+    edge: LineEdge,
+    triggered: bool,
+    clock: CameraClock,
+    out: &mut Vec<u8>,
+) {
+    if triggered {
+        let edge = TriggerEdge {
+            t_us: clock.camera_us(edge.t_ns),
+            channel: TRIGGER_CHANNEL,
+            rising: edge.rising,
+        };
+        let written = encoder.trigger(edge, out);
+        debug_assert!(written.is_ok(), "trigger edges out of order: {written:?}");
+    }
+}
+
+impl Outgoing {
+    /// Takes fresh bytes, which arrived at `at`.
+    fn take(
+        &mut self,
+        fresh: &mut Vec<u8>,
+        at: HostTime,
+        camera: CameraId,
+        scanner: &mut Scanner,
+        chunk_bytes: usize,
+    ) {
+        let dropped = usize::try_from(self.to_lose).map_or(fresh.len(), |n| n.min(fresh.len()));
+        self.to_lose -= dropped as u64;
+        self.lost_before += dropped as u64;
+        let mut rest = &fresh[dropped..];
+        self.arrived = at;
+        while self.bytes.len() + rest.len() >= chunk_bytes {
+            let (head, tail) = rest.split_at(chunk_bytes - self.bytes.len());
+            self.bytes.extend_from_slice(head);
+            rest = tail;
+            self.close(camera, scanner);
+        }
+        if self.bytes.capacity() == 0 {
+            self.bytes.reserve(chunk_bytes.min(1 << 16));
+        }
+        self.bytes.extend_from_slice(rest);
+        fresh.clear();
+    }
+
+    /// Closes the chunk under way, when there is anything to say.
+    fn close(&mut self, camera: CameraId, scanner: &mut Scanner) {
+        if self.bytes.is_empty() && self.lost_before == 0 {
+            return;
+        }
+        let bytes = std::mem::take(&mut self.bytes);
+        let (facts, triggers) = scanner.push(&bytes);
+        self.ready.push_back(RawChunk {
+            camera,
+            seq: self.seq,
+            host_time: self.arrived,
+            lost_before: std::mem::take(&mut self.lost_before),
+            bytes,
+            facts,
+            triggers,
+        });
+        self.seq += 1;
+    }
+}
+
+impl EventCamera for SimCamera {
+    fn camera(&self) -> CameraId {
+        self.id
+    }
+
+    fn identity(&self) -> DeviceIdentity {
+        DeviceIdentity {
+            model: "simulated Prophesee EVK1 Gen3.1 VGA".to_owned(),
+            serial: self.serial.clone(),
+            firmware: concat!("skinrig-sim ", env!("CARGO_PKG_VERSION")).to_owned(),
+        }
+    }
+
+    fn capabilities(&self) -> CameraCapabilities {
+        CameraCapabilities {
+            width: SENSOR_WIDTH,
+            height: SENSOR_HEIGHT,
+            format: StreamFormat::Evt2,
+            trigger_channels: CHANNELS.to_vec(),
+            biases: BIASES.iter().map(|b| b.0.to_owned()).collect(),
+        }
+    }
+
+    fn configure(&mut self, settings: &CameraSettings) -> Result<Vec<Setting>, DeviceError> {
+        if self.gone {
+            return Err(self.gone_error());
+        }
+        if self.streaming.is_some() {
+            return Err(DeviceError::State {
+                role: self.role(),
+                serial: self.serial.clone(),
+                expected: "stopped".to_owned(),
+                found: "streaming".to_owned(),
+            });
+        }
+        self.check(settings)?;
+        let mut biases: BTreeMap<String, i64> =
+            BIASES.iter().map(|b| (b.0.to_owned(), b.3)).collect();
+        biases.extend(settings.biases.iter().map(|(n, v)| (n.clone(), *v)));
+        self.settings = CameraSettings {
+            biases: biases.clone(),
+            ..settings.clone()
+        };
+        let mut read = Vec::new();
+        for (name, value) in biases {
+            let found = if self.read_back_fault && name == "bias_fo" {
+                value - 1
+            } else {
+                value
+            };
+            if found != value {
+                return Err(DeviceError::ReadBack {
+                    role: self.role(),
+                    serial: self.serial.clone(),
+                    name,
+                    expected: value.to_string(),
+                    found: found.to_string(),
+                });
+            }
+            read.push(same(name, value.to_string()));
+        }
+        let roi = settings.roi.map_or_else(
+            || "all".to_owned(),
+            |r| format!("{} x {} at ({}, {})", r.width, r.height, r.x, r.y),
+        );
+        read.push(same("roi".to_owned(), roi));
+        let channels: Vec<String> = settings
+            .trigger_channels
+            .iter()
+            .map(u8::to_string)
+            .collect();
+        read.push(same("trigger_channels".to_owned(), channels.join(",")));
+        Ok(read)
+    }
+
+    fn start(&mut self) -> Result<(), DeviceError> {
+        if self.gone {
+            return Err(self.gone_error());
+        }
+        if self.streaming.is_some() {
+            return Err(DeviceError::State {
+                role: self.role(),
+                serial: self.serial.clone(),
+                expected: "stopped".to_owned(),
+                found: "streaming".to_owned(),
+            });
+        }
+        let grid = self.shared.world().watch(self.id.index());
+        let start_ns = grid * GRID_NS;
+        let clock = match self.clock {
+            Some(clock) => clock,
+            None => CameraClock::draw(&self.draw_clock, &mut self.random, start_ns),
+        };
+        self.clock = Some(clock);
+        self.streaming = Some(Streaming {
+            grid,
+            pixels: (self.make_pixels)(self.starts),
+            encoder: evt2::Encoder::new(clock.camera_us(start_ns)),
+            edges: VecDeque::new(),
+            tips: Vec::new(),
+            events: Vec::new(),
+            fresh: Vec::new(),
+        });
+        self.starts += 1;
+        Ok(())
+    }
+
+    fn poll(&mut self, chunks: &mut Vec<RawChunk>) -> Result<(), DeviceError> {
+        self.catch_up();
+        if self.gone {
+            self.out.close(self.id, &mut self.scanner);
+        }
+        self.hand_over(chunks)
+    }
+
+    fn flush(&mut self, chunks: &mut Vec<RawChunk>) -> Result<(), DeviceError> {
+        self.catch_up();
+        self.out.close(self.id, &mut self.scanner);
+        self.hand_over(chunks)
+    }
+
+    fn stop(&mut self, chunks: &mut Vec<RawChunk>) -> Result<(), DeviceError> {
+        if self.streaming.is_none() {
+            return Ok(());
+        }
+        let flushed = self.flush(chunks);
+        self.streaming = None;
+        self.shared.world().unwatch(self.id.index());
+        flushed
+    }
+}
+
+fn same(name: String, value: String) -> Setting {
+    Setting {
+        name,
+        requested: value.clone(),
+        read_back: value,
+    }
+}

@@ -1,0 +1,197 @@
+//! Every constant of a simulated rig, with documented defaults.
+
+use skinrig_model::{
+    CameraId, CameraModel, LensModel, Point3, RigidTransform, Robot, SimLevel, Skin, SkinOutline,
+    StereoGeometry,
+};
+
+use crate::faults::Fault;
+use crate::geometric::GeometricConfig;
+use crate::motion::MotionConfig;
+use crate::random::{Purpose, Stream};
+use crate::scene::SceneConfig;
+
+/// How the cameras' clocks and trigger inputs behave. All figures are assumed: none is published for the EVK1.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CameraClockConfig {
+    /// The drift of a camera's clock is drawn from -max..=max, parts per million.
+    pub max_drift_ppm: f64,
+    /// The camera's time at the first start is drawn from 0..max, s.
+    pub max_origin_s: f64,
+    /// Trigger edges are seen late by 0..max, ns.
+    pub trigger_jitter_ns: i64,
+    /// A full chunk, bytes; a multiple of 4.
+    pub chunk_bytes: usize,
+}
+
+impl Default for CameraClockConfig {
+    fn default() -> Self {
+        Self {
+            max_drift_ppm: 40.0,
+            max_origin_s: 100.0,
+            trigger_jitter_ns: 2_500,
+            chunk_bytes: 1 << 20,
+        }
+    }
+}
+
+/// How the trigger box behaves (assumed).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct TriggerBoxConfig {
+    /// The first edge rises this long after the request at least, ns.
+    pub min_latency_ns: i64,
+    /// And at most this long, ns.
+    pub max_latency_ns: i64,
+}
+
+impl Default for TriggerBoxConfig {
+    fn default() -> Self {
+        Self {
+            min_latency_ns: 20_000,
+            max_latency_ns: 60_000,
+        }
+    }
+}
+
+/// How far the true camera geometry is from the drawn one: half widths of uniform distributions (assumed;
+/// the paper's measured and calibrated positions differ by 1 to 6 mm).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GeometryErrors {
+    /// Camera positions, per axis, mm.
+    pub position_mm: f64,
+    /// Skews, degrees.
+    pub skew_deg: f64,
+    /// Distortion W, dimensionless.
+    pub w: f64,
+}
+
+impl Default for GeometryErrors {
+    fn default() -> Self {
+        Self {
+            position_mm: 1.5,
+            skew_deg: 1.5,
+            w: 0.08,
+        }
+    }
+}
+
+/// A simulated rig.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SimConfig {
+    /// Seed of everything random.
+    pub seed: u64,
+    /// How much is simulated.
+    pub level: SimLevel,
+    /// The skin.
+    pub outline: SkinOutline,
+    /// The drawn geometry: what the rig says about itself.
+    pub nominal: StereoGeometry,
+    /// How far the truth is from it.
+    pub geometry_errors: GeometryErrors,
+    /// Where the skin lies in the robot's frame.
+    pub robot_from_skin: RigidTransform<Robot, Skin>,
+    /// Smallest and largest coordinates that the robot reaches, robot frame, mm (omega3.md: axis extremes that
+    /// users of an omega.3 report; the true workspace shrinks off the axes, and x reaches less).
+    pub workspace_mm: ([f64; 3], [f64; 3]),
+    /// Where the tip is at the beginning, skin frame.
+    pub start: Point3<Skin>,
+    /// Rows of each camera that see the skin (public code: 185..=360 and 200..=355).
+    pub skin_rows: [(u16, u16); 2],
+    /// Side of the tip's square end, mm. The paper says "cubic tip" without a size (assumed).
+    pub tip_side_mm: f64,
+    /// Thickness of the skin, mm (paper: 4).
+    pub skin_thickness_mm: f64,
+    /// The robot.
+    pub motion: MotionConfig,
+    /// Camera clocks and trigger inputs.
+    pub camera_clock: CameraClockConfig,
+    /// The trigger box.
+    pub trigger_box: TriggerBoxConfig,
+    /// Rates and spreads of the geometric level.
+    pub geometric: GeometricConfig,
+    /// What goes wrong.
+    pub faults: Vec<Fault>,
+}
+
+/// The drawn rig: cameras at the guesses that the public code gives as measured, (45, -35) and (45, 46), with
+/// an undistorted lens of 120° and no skew.
+pub const DRAWN: StereoGeometry = {
+    const fn camera(y_mm: f64) -> CameraModel {
+        CameraModel {
+            position: skinrig_model::Point2::new(45.0, y_mm),
+            aim: skinrig_model::Point2::new(10.0, 2.0),
+            skew_deg: 0.0,
+            lens: LensModel::Exponential {
+                half_fov_deg: 60.0,
+                w: 0.0,
+            },
+        }
+    }
+    StereoGeometry {
+        cameras: [camera(-38.0), camera(42.0)],
+    }
+};
+
+impl SimConfig {
+    /// The default rig with this seed and level.
+    #[must_use]
+    pub fn new(seed: u64, level: SimLevel) -> Self {
+        Self {
+            seed,
+            level,
+            outline: SkinOutline::PAPER,
+            nominal: DRAWN,
+            geometry_errors: GeometryErrors::default(),
+            // The skin lies turned by the angle of the 7-24-25 triangle about z; its centre is near the robot's.
+            robot_from_skin: RigidTransform::new(
+                [[0.96, -0.28, 0.0], [0.28, 0.96, 0.0], [0.0, 0.0, 1.0]],
+                [-6.0, -3.0, -15.0],
+            ),
+            workspace_mm: ([-90.0, -90.0, -65.0], [90.0, 90.0, 100.0]),
+            start: Point3::new(10.0, 2.0, 10.0),
+            skin_rows: [(185, 360), (200, 355)],
+            tip_side_mm: 10.0,
+            skin_thickness_mm: 4.0,
+            motion: MotionConfig::default(),
+            camera_clock: CameraClockConfig::default(),
+            trigger_box: TriggerBoxConfig::default(),
+            geometric: GeometricConfig::default(),
+            faults: Vec::new(),
+        }
+    }
+
+    /// The true geometry: the drawn one with this seed's errors.
+    #[must_use]
+    pub fn true_geometry(&self) -> StereoGeometry {
+        let errors = self.geometry_errors;
+        let mut random = Stream::new(self.seed, Purpose::Geometry, 0);
+        let mut off = |half: f64| random.between(-half, half);
+        let cameras = self.nominal.cameras.map(|drawn| {
+            let mut camera = drawn;
+            camera.position.x_mm += off(errors.position_mm);
+            camera.position.y_mm += off(errors.position_mm);
+            camera.skew_deg += off(errors.skew_deg);
+            let LensModel::Exponential { half_fov_deg, w } = drawn.lens;
+            camera.lens = LensModel::Exponential {
+                half_fov_deg,
+                w: w + off(errors.w),
+            };
+            camera
+        });
+        StereoGeometry { cameras }
+    }
+
+    /// What the pixel model of `camera` is told.
+    #[must_use]
+    pub fn scene(&self, camera: CameraId) -> SceneConfig {
+        SceneConfig {
+            seed: crate::random::derive_seed(self.seed, Purpose::Pixels, camera.index() as u64),
+            outline: self.outline,
+            camera_id: camera,
+            camera: self.true_geometry().cameras[camera.index()],
+            skin_rows: self.skin_rows[camera.index()],
+            tip_side_mm: self.tip_side_mm,
+            skin_thickness_mm: self.skin_thickness_mm,
+        }
+    }
+}

@@ -1,0 +1,149 @@
+//! The simulated robot behind the `Indenter` trait.
+
+use skinrig_device::{DeviceError, Indenter, IndenterCapabilities, MotionLimits, RobotSample};
+use skinrig_model::{DeviceIdentity, DeviceRole, Point3, Robot, Setting};
+
+use crate::config::SimConfig;
+use crate::faults::{Fault, When};
+use crate::limits;
+use crate::world::{Shared, World};
+
+/// The simulated robot: like an omega.3, with force sensing that a real one only estimates.
+pub struct SimIndenter {
+    shared: Shared,
+    serial: String,
+    workspace_mm: ([f64; 3], [f64; 3]),
+    limits: Option<MotionLimits>,
+    lost: Option<When>,
+    read_back_fault: bool,
+}
+
+impl SimIndenter {
+    /// The robot of a rig.
+    #[must_use]
+    pub fn new(config: &SimConfig, shared: Shared) -> Self {
+        let lost = config.faults.iter().find_map(|f| match f {
+            Fault::IndenterLost(when) => Some(*when),
+            _ => None,
+        });
+        Self {
+            shared,
+            serial: format!("sim-{:08x}-r", config.seed as u32),
+            workspace_mm: config.workspace_mm,
+            limits: None,
+            lost,
+            read_back_fault: config.faults.contains(&Fault::IndenterReadBack),
+        }
+    }
+
+    fn check_lost(&self, world: &World) -> Result<(), DeviceError> {
+        match self.lost.filter(|&when| world.has_struck(when)) {
+            None => Ok(()),
+            Some(_) => Err(DeviceError::Lost {
+                role: DeviceRole::Indenter,
+                serial: self.serial.clone(),
+                detail: "expected an answer, found none; the brakes are on".to_owned(),
+            }),
+        }
+    }
+}
+
+impl Indenter for SimIndenter {
+    fn identity(&self) -> DeviceIdentity {
+        DeviceIdentity {
+            model: "simulated omega.3".to_owned(),
+            serial: self.serial.clone(),
+            firmware: concat!("skinrig-sim ", env!("CARGO_PKG_VERSION")).to_owned(),
+        }
+    }
+
+    fn capabilities(&self) -> IndenterCapabilities {
+        IndenterCapabilities {
+            workspace_min_mm: self.workspace_mm.0,
+            workspace_max_mm: self.workspace_mm.1,
+            // omega3.md: 12 N; public servers move at 0.1 to 1 m/s.
+            max_speed_mm_s: 200.0,
+            max_force_n: 12.0,
+            pose_rate_hz: 1000.0,
+            reports_force: true,
+        }
+    }
+
+    fn configure(&mut self, limits: &MotionLimits) -> Result<Vec<Setting>, DeviceError> {
+        limits::check_limits(&self.serial, &self.capabilities(), limits)?;
+        let mut world = self.shared.world();
+        self.check_lost(&world)?;
+        if self.read_back_fault {
+            return Err(DeviceError::ReadBack {
+                role: DeviceRole::Indenter,
+                serial: self.serial.clone(),
+                name: "max_speed_mm_s".to_owned(),
+                expected: limits.max_speed_mm_s.to_string(),
+                found: (limits.max_speed_mm_s * 2.0).to_string(),
+            });
+        }
+        world.set_force_limit(limits.max_force_n);
+        self.limits = Some(*limits);
+        Ok(limits::settings(limits))
+    }
+
+    fn arm(&mut self) -> Result<(), DeviceError> {
+        let mut world = self.shared.world();
+        self.check_lost(&world)?;
+        if self.limits.is_none() {
+            return Err(limits::wrong_state(
+                &self.serial,
+                "configured",
+                "without limits",
+            ));
+        }
+        world.motion.power_on();
+        Ok(())
+    }
+
+    fn command(&mut self, target: Point3<Robot>, speed_mm_s: f64) -> Result<(), DeviceError> {
+        let mut world = self.shared.world();
+        self.check_lost(&world)?;
+        let Some(limits) = self.limits.filter(|_| world.motion.is_powered()) else {
+            return Err(limits::wrong_state(&self.serial, "armed", "disarmed"));
+        };
+        limits::check_command(&self.serial, &limits, target, speed_mm_s)?;
+        let rises = target.z_mm > world.motion.tip().z_mm;
+        if world.take_tripped(rises) && !rises {
+            return Err(limits::refused(
+                &self.serial,
+                format!(
+                    "a target above the tip after more than {} N",
+                    limits.max_force_n
+                ),
+                format!("z = {} mm", target.z_mm),
+            ));
+        }
+        world.motion.move_to(target, speed_mm_s);
+        Ok(())
+    }
+
+    fn poll(&mut self, samples: &mut Vec<RobotSample>) -> Result<(), DeviceError> {
+        let mut world = self.shared.world();
+        let from = samples.len();
+        world.take_samples(samples);
+        if let Some(at) = self.lost.and_then(|when| world.struck_at(when)) {
+            let new = samples.split_off(from);
+            samples.extend(new.into_iter().filter(|s| s.t.0 < at));
+        }
+        self.check_lost(&world)
+    }
+
+    fn hold(&mut self) -> Result<(), DeviceError> {
+        let mut world = self.shared.world();
+        self.check_lost(&world)?;
+        world.motion.hold();
+        Ok(())
+    }
+
+    fn disarm(&mut self) -> Result<(), DeviceError> {
+        let mut world = self.shared.world();
+        world.motion.power_off();
+        self.check_lost(&world)
+    }
+}

@@ -1,0 +1,108 @@
+//! What any indenter refuses, simulated or replayed.
+
+use skinrig_device::{DeviceError, IndenterCapabilities, MotionLimits};
+use skinrig_model::{DeviceRole, Point3, Robot, Setting};
+
+/// A refusal by the indenter `serial`.
+pub fn refused(serial: &str, expected: String, found: String) -> DeviceError {
+    DeviceError::Refused {
+        role: DeviceRole::Indenter,
+        serial: serial.to_owned(),
+        expected,
+        found,
+    }
+}
+
+/// A request that the indenter's state does not allow.
+pub fn wrong_state(serial: &str, expected: &str, found: &str) -> DeviceError {
+    DeviceError::State {
+        role: DeviceRole::Indenter,
+        serial: serial.to_owned(),
+        expected: expected.to_owned(),
+        found: found.to_owned(),
+    }
+}
+
+/// Checks `limits` against what the device can do.
+///
+/// # Errors
+/// [`DeviceError::Refused`] for limits that are wider, empty or not finite.
+pub fn check_limits(
+    serial: &str,
+    can: &IndenterCapabilities,
+    limits: &MotionLimits,
+) -> Result<(), DeviceError> {
+    for axis in 0..3 {
+        let (low, high) = (can.workspace_min_mm[axis], can.workspace_max_mm[axis]);
+        let (min, max) = (limits.min_mm[axis], limits.max_mm[axis]);
+        // NaN fails every comparison and is refused with the rest.
+        if !(low <= min && min < max && max <= high) {
+            return Err(refused(
+                serial,
+                format!("limits of axis {axis} within {low}..={high} mm"),
+                format!("{min}..={max} mm"),
+            ));
+        }
+    }
+    for (name, value, most) in [
+        ("max_speed_mm_s", limits.max_speed_mm_s, can.max_speed_mm_s),
+        ("max_force_n", limits.max_force_n, can.max_force_n),
+    ] {
+        if !(value > 0.0 && value <= most) {
+            return Err(refused(
+                serial,
+                format!("{name} above 0 and at most {most}"),
+                value.to_string(),
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// Checks a motion command against `limits`.
+///
+/// # Errors
+/// [`DeviceError::Refused`] outside the limits or not finite.
+pub fn check_command(
+    serial: &str,
+    limits: &MotionLimits,
+    target: Point3<Robot>,
+    speed_mm_s: f64,
+) -> Result<(), DeviceError> {
+    for (axis, value) in target.to_array().into_iter().enumerate() {
+        let (min, max) = (limits.min_mm[axis], limits.max_mm[axis]);
+        if !(min..=max).contains(&value) {
+            return Err(refused(
+                serial,
+                format!("coordinate {axis} of the target within {min}..={max} mm"),
+                format!("{value} mm"),
+            ));
+        }
+    }
+    if !(speed_mm_s > 0.0 && speed_mm_s <= limits.max_speed_mm_s) {
+        return Err(refused(
+            serial,
+            format!("a speed above 0 and at most {} mm/s", limits.max_speed_mm_s),
+            format!("{speed_mm_s} mm/s"),
+        ));
+    }
+    Ok(())
+}
+
+/// Limits as settings, requested and read back.
+#[must_use]
+pub fn settings(limits: &MotionLimits) -> Vec<Setting> {
+    let all = [
+        ("min_mm", format!("{:?}", limits.min_mm)),
+        ("max_mm", format!("{:?}", limits.max_mm)),
+        ("max_speed_mm_s", limits.max_speed_mm_s.to_string()),
+        ("max_force_n", limits.max_force_n.to_string()),
+    ];
+    all.into_iter()
+        .map(|(name, value)| Setting {
+            name: name.to_owned(),
+            requested: value.clone(),
+            read_back: value,
+        })
+        .collect()
+}

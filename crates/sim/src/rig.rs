@@ -1,0 +1,162 @@
+//! Puts a simulated rig together.
+
+use skinrig_device::{CameraSettings, EventCamera, Rig, TriggerBox};
+use skinrig_model::{CameraId, LensModel, RigGeometry, SimLevel, StereoGeometry};
+
+use crate::camera::{PixelFactory, SimCamera, TRIGGER_CHANNEL};
+use crate::clock::{Boxed, Paced};
+use crate::config::SimConfig;
+use crate::faults::Fault;
+use crate::geometric::GeometricModel;
+use crate::indenter::SimIndenter;
+use crate::optical::OpticalModel;
+use crate::random::{Purpose, derive_seed};
+use crate::scene::PixelModel;
+use crate::trigger::SimTriggerBox;
+use crate::world::Shared;
+
+/// The rig that `config` describes, at time 0, with the jumping clock.
+#[must_use]
+pub fn simulated_rig(config: &SimConfig) -> Rig {
+    let shared = Shared::new(config);
+    let camera = |id: CameraId| -> Box<dyn EventCamera> {
+        let pixels = pixel_factory(config, id);
+        Box::new(SimCamera::new(config, id, shared.clone(), pixels))
+    };
+    let settings = CameraSettings {
+        trigger_channels: vec![TRIGGER_CHANNEL],
+        ..CameraSettings::default()
+    };
+    let trigger_box: Box<dyn TriggerBox> = Box::new(SimTriggerBox::new(config, shared.clone()));
+    Rig {
+        kind: "simulated".to_owned(),
+        name: format!("simulated ({})", config.level),
+        indenter: Box::new(SimIndenter::new(config, shared.clone())),
+        cameras: CameraId::ALL.map(camera),
+        camera_settings: [settings.clone(), settings],
+        trigger_box: Some(trigger_box),
+        clock: Box::new(shared.clock.clone()),
+        robot_from_skin: config.robot_from_skin,
+        geometry: RigGeometry {
+            outline: config.outline,
+            nominal: config.nominal,
+            trigger_channel: Some(TRIGGER_CHANNEL),
+        },
+        description_json: describe(config),
+    }
+}
+
+/// Lets the clock of `rig` keep pace with real time.
+#[must_use]
+pub fn in_real_time(mut rig: Rig) -> Rig {
+    rig.clock = Box::new(Paced::new(Boxed(rig.clock)));
+    rig
+}
+
+fn pixel_factory(config: &SimConfig, id: CameraId) -> PixelFactory {
+    let scene = config.scene(id);
+    let level = config.level;
+    let mut geometric = config.geometric.clone();
+    for fault in &config.faults {
+        if let Fault::DeadPress { camera, contact } = *fault
+            && camera == id
+        {
+            geometric.dead_contacts.push(contact);
+        }
+    }
+    Box::new(move |start| -> Option<Box<dyn PixelModel>> {
+        let mut scene = scene.clone();
+        if start > 0 {
+            scene.seed = derive_seed(scene.seed, Purpose::Pixels, 1_000 + start);
+        }
+        match level {
+            SimLevel::Kinematic => None,
+            SimLevel::Geometric => Some(Box::new(GeometricModel::new(&scene, &geometric))),
+            SimLevel::Optical => Some(Box::new(OpticalModel::new(&scene))),
+        }
+    })
+}
+
+/// The whole configuration as JSON: drawn and true geometry, every constant, the seed.
+#[must_use]
+pub fn describe(config: &SimConfig) -> String {
+    let cameras = |g: &StereoGeometry| -> Vec<serde_json::Value> {
+        g.cameras
+            .iter()
+            .map(|c| {
+                let LensModel::Exponential { half_fov_deg, w } = c.lens;
+                serde_json::json!({
+                    "position_mm": [c.position.x_mm, c.position.y_mm],
+                    "aim_mm": [c.aim.x_mm, c.aim.y_mm],
+                    "skew_deg": c.skew_deg,
+                    "half_fov_deg": half_fov_deg,
+                    "w": w,
+                })
+            })
+            .collect()
+    };
+    let (m, c, t, g) = (
+        &config.motion,
+        &config.camera_clock,
+        &config.trigger_box,
+        &config.geometric,
+    );
+    let mut value = serde_json::json!({
+        "kind": "simulated",
+        "level": config.level.name(),
+        "seed": config.seed,
+        "drawn_cameras": cameras(&config.nominal),
+        "true_cameras": cameras(&config.true_geometry()),
+        "geometry_errors": {
+            "position_mm": config.geometry_errors.position_mm,
+            "skew_deg": config.geometry_errors.skew_deg,
+            "w": config.geometry_errors.w,
+        },
+        "workspace_mm": [config.workspace_mm.0, config.workspace_mm.1],
+        "start_mm": config.start.to_array(),
+        "skin_rows": config.skin_rows,
+        "tip_side_mm": config.tip_side_mm,
+        "skin_thickness_mm": config.skin_thickness_mm,
+        "motion": {
+            "acceleration_mm_s2": m.acceleration_mm_s2,
+            "lag_rad_s": m.lag_rad_s,
+            "damping": m.damping,
+            "wander_mm": m.wander_mm,
+            "wander_s": m.wander_s,
+            "measurement_mm": m.measurement_mm,
+            "force_noise_n": m.force_noise_n,
+            "skin_n_per_mm": m.skin_n_per_mm,
+            "skin_n_s_per_mm": m.skin_n_s_per_mm,
+        },
+        "camera_clock": {
+            "max_drift_ppm": c.max_drift_ppm,
+            "max_origin_s": c.max_origin_s,
+            "trigger_jitter_ns": c.trigger_jitter_ns,
+            "chunk_bytes": c.chunk_bytes,
+        },
+        "trigger_box": {
+            "min_latency_ns": t.min_latency_ns,
+            "max_latency_ns": t.max_latency_ns,
+        },
+        "faults": config.faults.iter().map(|f| format!("{f:?}")).collect::<Vec<_>>(),
+    });
+    if config.level == SimLevel::Geometric {
+        value["geometric"] = serde_json::json!({
+            "press_per_mm": g.press_per_mm,
+            "release_per_mm": g.release_per_mm,
+            "relax_per_mm": g.relax_per_mm,
+            "relax_s": g.relax_s,
+            "polarity_share": g.polarity_share,
+            "reference_mm": g.reference_mm,
+            "fall_off_mm": g.fall_off_mm,
+            "halo_mm": g.halo_mm,
+            "row_share": g.row_share,
+            "background_hz": g.background_hz,
+            "hot_pixels": g.hot_pixels,
+            "hottest_hz": g.hottest_hz,
+            "dead_share": g.dead_share,
+            "strength_spread": g.strength_spread,
+        });
+    }
+    value.to_string()
+}

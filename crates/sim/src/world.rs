@@ -1,0 +1,258 @@
+//! The skin world that the simulated devices share: the robot's motion on a grid of 1 ms, who has seen how
+//! much of it, and the edges on the trigger lines.
+//!
+//! The world never depends on who looks when: it goes on in steps of [`GRID_NS`], and each device reads what
+//! has happened up to the last grid point before the clock's present.
+
+use std::collections::VecDeque;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use skinrig_device::{Clock, RobotSample};
+use skinrig_model::{HostTime, RigidTransform, Robot, Skin};
+
+use crate::clock::SimClock;
+use crate::config::SimConfig;
+use crate::faults::{Fault, When};
+use crate::motion::Motion;
+use crate::scene::{GRID_NS, TipSample};
+
+/// An edge on a camera's trigger input, on world time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct LineEdge {
+    /// World time, ns.
+    pub t_ns: i64,
+    /// True for a rising edge.
+    pub rising: bool,
+}
+
+/// What the tip and the trigger lines do.
+#[derive(Debug)]
+pub struct World {
+    /// The robot.
+    pub motion: Motion,
+    skin_from_robot: RigidTransform<Skin, Robot>,
+    faults: Vec<Fault>,
+    grid: i64,
+    samples: VecDeque<RobotSample>,
+    tips: VecDeque<TipSample>,
+    /// Grid index of `tips[0]`.
+    tips_from: i64,
+    /// Next grid index that each camera wants; `None` while it does not stream.
+    wanted: [Option<i64>; 2],
+    /// Edges that the cameras have not taken yet.
+    pub edges: [VecDeque<LineEdge>; 2],
+    contacts: u32,
+    contact_times: Vec<i64>,
+    touching: bool,
+    last_z_mm: f64,
+    force_limit_n: f64,
+    tripped: bool,
+}
+
+impl World {
+    fn new(config: &SimConfig) -> Self {
+        let start = config.robot_from_skin.apply(config.start);
+        let mut world = Self {
+            motion: Motion::new(config.motion, config.seed, start),
+            skin_from_robot: config.robot_from_skin.inverse(),
+            faults: config.faults.clone(),
+            grid: 0,
+            samples: VecDeque::new(),
+            tips: VecDeque::new(),
+            tips_from: 0,
+            wanted: [None; 2],
+            edges: [VecDeque::new(), VecDeque::new()],
+            contacts: 0,
+            contact_times: Vec::new(),
+            touching: false,
+            last_z_mm: config.start.z_mm,
+            force_limit_n: f64::INFINITY,
+            tripped: false,
+        };
+        world.observe();
+        world
+    }
+
+    /// Goes on to the last grid point at or before `now`.
+    pub fn advance_to(&mut self, now: HostTime) {
+        let until = now.0.div_euclid(GRID_NS);
+        while self.grid < until {
+            self.grid += 1;
+            self.apply_faults();
+            self.motion.step();
+            self.observe();
+        }
+    }
+
+    fn apply_faults(&mut self) {
+        for fault in &self.faults {
+            match *fault {
+                Fault::Sluggish { when, percent } if self.has_struck(when) => {
+                    self.motion.sluggish = f64::from(percent) / 100.0;
+                }
+                Fault::IndenterLost(when) if self.has_struck(when) => self.motion.power_off(),
+                _ => {}
+            }
+        }
+    }
+
+    fn observe(&mut self) {
+        let t_ns = self.grid * GRID_NS;
+        let position = self.skin_from_robot.apply(self.motion.tip());
+        let rate = (self.last_z_mm - position.z_mm) / (GRID_NS as f64 * 1e-9);
+        self.last_z_mm = position.z_mm;
+        if position.z_mm < 0.0 && !self.touching {
+            self.touching = true;
+            self.contacts += 1;
+            self.contact_times.push(t_ns);
+        } else if position.z_mm > 0.05 {
+            self.touching = false;
+        }
+        let (force_n, felt_n) = self.motion.force_n(-position.z_mm, rate);
+        if force_n > self.force_limit_n && !self.tripped {
+            self.tripped = true;
+            self.motion.hold();
+        }
+        self.samples.push_back(RobotSample {
+            t: HostTime(t_ns),
+            commanded: self.motion.set_point(),
+            measured: self.motion.measure(),
+            force_n: felt_n,
+        });
+        if self.wanted.iter().any(Option::is_some) {
+            if self.tips.is_empty() {
+                self.tips_from = self.grid;
+            }
+            self.tips.push_back(TipSample { t_ns, position });
+        }
+    }
+
+    /// Grid index reached.
+    #[must_use]
+    pub const fn grid(&self) -> i64 {
+        self.grid
+    }
+
+    /// True once `when` has come.
+    #[must_use]
+    pub fn has_struck(&self, when: When) -> bool {
+        self.struck_at(when)
+            .is_some_and(|t| t <= self.grid * GRID_NS)
+    }
+
+    /// The instant of `when` on world time, ns, when it is known already.
+    #[must_use]
+    pub fn struck_at(&self, when: When) -> Option<i64> {
+        match when {
+            When::At(t) => Some(t.0),
+            When::Contact(n) => self.contact_times.get(n as usize).copied(),
+        }
+    }
+
+    /// The faults of this rig.
+    #[must_use]
+    pub fn faults(&self) -> &[Fault] {
+        &self.faults
+    }
+
+    /// How often the skin has been touched.
+    #[must_use]
+    pub const fn contacts(&self) -> u32 {
+        self.contacts
+    }
+
+    /// Sets the force at which the robot stops by itself, N.
+    pub const fn set_force_limit(&mut self, limit_n: f64) {
+        self.force_limit_n = limit_n;
+    }
+
+    /// True when the robot stopped because of its force limit; `release` lets it move again.
+    pub const fn take_tripped(&mut self, release: bool) -> bool {
+        let tripped = self.tripped;
+        if release {
+            self.tripped = false;
+        }
+        tripped
+    }
+
+    /// Takes all samples that nobody has taken yet.
+    pub fn take_samples(&mut self, out: &mut Vec<RobotSample>) {
+        out.extend(self.samples.drain(..));
+    }
+
+    /// From now on keeps tips for camera `index`, from the present grid point. Gives that grid point.
+    pub fn watch(&mut self, index: usize) -> i64 {
+        self.wanted[index] = Some(self.grid);
+        let present = TipSample {
+            t_ns: self.grid * GRID_NS,
+            position: self.skin_from_robot.apply(self.motion.tip()),
+        };
+        if self.tips.is_empty() {
+            self.tips_from = self.grid;
+            self.tips.push_back(present);
+        }
+        self.edges[index].clear();
+        self.grid
+    }
+
+    /// Camera `index` needs no more tips.
+    pub fn unwatch(&mut self, index: usize) {
+        self.wanted[index] = None;
+        self.forget();
+    }
+
+    /// The tips from grid index `from` to the present, both included; marks them as seen by camera
+    /// `index`, which next time begins with the last of them.
+    pub fn tips_since(&mut self, index: usize, from: i64, out: &mut Vec<TipSample>) {
+        out.clear();
+        let skip = usize::try_from(from - self.tips_from).unwrap_or(0);
+        out.extend(self.tips.iter().skip(skip));
+        self.wanted[index] = Some(self.grid);
+        self.forget();
+    }
+
+    fn forget(&mut self) {
+        let needed = self.wanted.iter().flatten().min().copied();
+        match needed {
+            None => self.tips.clear(),
+            Some(first) => {
+                while self.tips_from < first && self.tips.pop_front().is_some() {
+                    self.tips_from += 1;
+                }
+            }
+        }
+    }
+}
+
+/// A handle on the world and its clock.
+#[derive(Debug, Clone)]
+pub struct Shared {
+    /// The rig's clock.
+    pub clock: SimClock,
+    world: Arc<Mutex<World>>,
+}
+
+impl Shared {
+    /// A new world at time 0.
+    #[must_use]
+    pub fn new(config: &SimConfig) -> Self {
+        Self {
+            clock: SimClock::new(),
+            world: Arc::new(Mutex::new(World::new(config))),
+        }
+    }
+
+    /// The present.
+    #[must_use]
+    pub fn now(&self) -> HostTime {
+        self.clock.now()
+    }
+
+    /// The world, brought to the present.
+    pub fn world(&self) -> MutexGuard<'_, World> {
+        // A panic elsewhere leaves the world in a state that is still good enough to disarm in.
+        let mut world = self.world.lock().unwrap_or_else(PoisonError::into_inner);
+        world.advance_to(self.clock.now());
+        world
+    }
+}
