@@ -5,8 +5,8 @@ use std::path::Path;
 use sha2::{Digest, Sha256};
 use skinrig_model::pulse::{MAX_MARKED_PRESS, PULSE_PERIOD_US, PULSES_PER_TRAIN};
 use skinrig_model::{
-    CalibrationModel, HostDuration, MarkKind, Point2, Point3, PressRole, SceneNeed, SimLevel,
-    SkinOutline,
+    AnalysisSettings, CalibrationModel, HostDuration, MarkKind, Point2, Point3, PressRole,
+    SceneNeed, SimLevel, SkinOutline,
 };
 
 use crate::area::{Area, KeepOut, Surroundings};
@@ -153,16 +153,9 @@ fn assemble(
             out,
         )
     });
-    let sync = match root.get("sync") {
-        Some(f) => Some(read_sync(
-            f,
-            surroundings.as_ref(),
-            depths.as_deref(),
-            max_depth,
-            out,
-        )),
-        None => None,
-    };
+    let sync = root
+        .get("sync")
+        .map(|f| read_sync(f, surroundings.as_ref(), depths.as_deref(), max_depth, out));
     let repetitions = root.get("repetitions");
     let count = repetitions.and_then(|r| r.count("count"));
     let roles = root
@@ -172,24 +165,9 @@ fn assemble(
     let analysis = root
         .get("analysis")
         .and_then(|f| settings::analysis(f, out));
-    if let (Some(roles), Some(analysis)) = (&roles, &analysis)
-        && let Some(evaluation) = root.get("evaluation")
-        && !roles.contains(&PressRole::Calibrate)
-        && analysis.calibration != CalibrationModel::None
+    if let (Some(roles), Some(analysis), Some(field)) = (&roles, &analysis, root.get("evaluation"))
     {
-        let span = evaluation
-            .get("calibrate")
-            .map_or(evaluation.span, |f| f.span);
-        out.error(
-            span,
-            evaluation.path.clone() + ".calibrate",
-            "nothing to calibrate with",
-        )
-        .expected("at least one repetition, or `analysis.calibration: none`")
-        .found("no repetition")
-        .help(
-            "give a repetition to `evaluation.calibrate`, or write `analysis: {calibration: none}`",
-        );
+        calibration_possible(roles, analysis, field, out);
     }
     let marks = root.get("triggers").and_then(|f| marks(f, out));
     let between = repetitions.and_then(|r| r.get("between"));
@@ -605,6 +583,23 @@ pub(crate) fn roles(f: &Field, count: u32, out: &mut Collector) -> Option<Vec<Pr
         return None;
     }
     roles.into_iter().collect()
+}
+
+/// A calibration needs presses that may calibrate.
+pub(crate) fn calibration_possible(
+    roles: &[PressRole],
+    analysis: &AnalysisSettings,
+    evaluation: &Field,
+    out: &mut Collector,
+) {
+    if roles.contains(&PressRole::Calibrate) || analysis.calibration == CalibrationModel::None {
+        return;
+    }
+    let field = evaluation.get("calibrate").unwrap_or(evaluation);
+    out.error(field.span, field.path.as_str(), "nothing to calibrate with")
+        .expected("at least one repetition, or `analysis.calibration: none`")
+        .found("no repetition")
+        .help("give a repetition to `calibrate`, or write `analysis: {calibration: none}`");
 }
 
 fn marks(f: &Field, out: &mut Collector) -> Option<Vec<MarkKind>> {

@@ -295,7 +295,7 @@ impl Checker<'_> {
     }
 
     fn deadline(&mut self, segment: Segment, deadline: HostDuration, least_s: f64) {
-        if !(deadline.as_secs_f64() > least_s) {
+        if least_s.is_nan() || deadline.as_secs_f64() <= least_s {
             self.add(
                 segment,
                 "the deadline cannot be kept",
@@ -388,7 +388,7 @@ impl Checker<'_> {
         }
         let inside = self.around.outline.clearance_mm(at);
         let margin = self.around.margin_mm;
-        if !(inside >= margin - TINY_MM) {
+        if inside.is_nan() || inside < margin - TINY_MM {
             let found = if inside < 0.0 {
                 format!("({:.3}, {:.3}) mm, outside", at.x_mm, at.y_mm)
             } else {

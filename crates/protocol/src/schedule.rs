@@ -7,7 +7,7 @@ use skinrig_model::{
     PressId, PressRole, PressTiming, RigGeometry, StereoGeometry,
 };
 
-use crate::build::{open, outline, roles, seconds};
+use crate::build::{calibration_possible, open, outline, roles, seconds};
 use crate::diagnostic::{Collector, Diagnostics};
 use crate::protocol::Prototype;
 use crate::schedule_keys::SCHEDULE;
@@ -268,6 +268,11 @@ fn assemble(root: &Field, out: &mut Collector) -> Option<Schedule> {
     let analysis = root
         .get("analysis")
         .and_then(|f| crate::settings::analysis(f, out));
+    if let (Some(ScheduledRoles::Repetitions(roles)), Some(analysis)) = (&roles, &analysis)
+        && let Some(by) = evaluation.and_then(|e| e.get("repetitions"))
+    {
+        calibration_possible(roles, analysis, by, out);
+    }
     let depth = root.quantity("depth");
     let sync = match root.get("sync") {
         None => Some(None),
