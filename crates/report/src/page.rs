@@ -149,11 +149,8 @@ fn provenance_rows(p: &Provenance, analysis_version: u32) -> Vec<Value> {
         row("started", &p.started, false),
         row("operator", &p.operator, false),
         row("prototype", &p.prototype, false),
-        row(
-            "rig",
-            &format!("{} ({})", or_missing(&p.rig_name), or_missing(&p.rig_kind)),
-            false,
-        ),
+        row("rig", &p.rig_name, false),
+        row("rig kind", &p.rig_kind, false),
         row("host", &p.host, false),
         row("seed", &p.seed.to_string(), true),
         row("software", &p.software, false),

@@ -196,14 +196,14 @@ pub fn dots(points: impl IntoIterator<Item = (f64, f64)>) -> String {
     d
 }
 
-/// Tick positions at 1, 2 or 5 times a power of ten inside `low..=high`, about `wanted` of them.
+/// Tick positions at 1, 2 or 5 times a power of ten inside `low..=high`, about `wanted` of them; none for 0.
 #[must_use]
 pub fn ticks(low: f64, high: f64, wanted: u32) -> Vec<f64> {
     let span = high - low;
-    if !(span.is_finite() && span > 0.0) {
+    if wanted == 0 || !(span.is_finite() && span > 0.0) {
         return vec![];
     }
-    let raw = span / f64::from(wanted.max(1));
+    let raw = span / f64::from(wanted);
     let power = 10f64.powf(raw.log10().floor());
     let step = [1.0, 2.0, 5.0, 10.0]
         .into_iter()

@@ -4,7 +4,7 @@ use super::{Canvas, Figure, nice_above};
 use crate::ReportInput;
 use crate::derive;
 use crate::format::number;
-use crate::svg::{Axes, Px, Scale, Svg, dots};
+use crate::svg::{Axes, Px, Scale, Svg, dots, tick_label};
 
 /// Histogram and cumulative distribution of the Euclidean error, with median, RMSE and 95th percentile.
 #[must_use]
@@ -44,7 +44,7 @@ pub fn error_distribution(input: &ReportInput<'_>) -> Figure {
         x,
         y: Scale::new((0.0, f64::from(most.max(1)) * 1.06), (416.0, 274.0)),
         x_label: "Euclidean error (mm)".into(),
-        y_label: format!("presses per {} mm", number(Some(width), 2)),
+        y_label: format!("presses per {} mm", tick_label(width, width)),
         tick_count: (8, 4),
     };
     let svg = &mut canvas.svg;

@@ -401,7 +401,7 @@ pub fn repeat_map(input: &ReportInput<'_>) -> Figure {
     locations.retain(|l| l.std_mm.is_some());
     let caption = format!(
         "Spread between repetitions over the skin. Discs: the sample standard deviation (n - 1, Euclidean) of \
-         the error vectors at a location, for the {} locations with at least two presses that count.",
+         the estimates of equally deep presses at a location, for the {} locations with at least two that count.",
         locations.len()
     );
     let mut canvas = Canvas::new(

@@ -86,7 +86,7 @@ pub fn event_rates(input: &ReportInput<'_>) -> Figure {
         bin(&series[1]),
         contacts.len()
     );
-    let size = (1240.0, 520.0);
+    let size = (1240.0, 532.0);
     let plot = (66.0, 1224.0);
     let x = Scale::new((low, high), plot);
     let extra = [x.data.0, x.data.1].map(|v| format!("{v:.6}"));
@@ -111,11 +111,11 @@ pub fn event_rates(input: &ReportInput<'_>) -> Figure {
             ("x", &plot.0),
             ("y", &"0"),
             ("width", &(plot.1 - plot.0)),
-            ("height", &"470"),
+            ("height", &"482"),
         ],
     );
     svg.close();
-    for (camera, top) in [(0usize, 30.0), (1, 270.0)] {
+    for (camera, top) in [(0usize, 30.0), (1, 282.0)] {
         let s = &series[camera];
         let most = highest(s.peak_per_s.iter().chain(&s.mean_per_s));
         let (divisor, name) = unit(most);
@@ -140,7 +140,7 @@ pub fn event_rates(input: &ReportInput<'_>) -> Figure {
         if camera == 0 {
             let marks: String = contacts
                 .iter()
-                .map(|t| format!("M{} 238v14", Px(x.at(*t))))
+                .map(|t| format!("M{} 240v12", Px(x.at(*t))))
                 .collect();
             svg.path("marks", &marks);
         }
@@ -163,7 +163,7 @@ pub fn event_rates(input: &ReportInput<'_>) -> Figure {
             );
         }
     }
-    svg.text((60.0, 249.0), "tick", "end", "contacts");
+    svg.text((60.0, 250.0), "tick", "end", "contacts");
     let n = format!(
         "{} and {} bins",
         series[0].mean_per_s.len(),
