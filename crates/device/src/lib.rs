@@ -6,6 +6,7 @@
 
 pub mod camera;
 pub mod clock;
+pub mod contract;
 pub mod error;
 pub mod indenter;
 pub mod rig;
