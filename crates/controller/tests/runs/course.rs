@@ -192,7 +192,18 @@ fn a_run_is_a_function_of_its_rig() {
 
 #[test]
 fn bytes_poses_and_marks_precede_the_outcome() {
-    let told = run(faults());
+    for train_ms in [9, 250] {
+        check_order(train_ms);
+    }
+}
+
+fn check_order(train_ms: i64) {
+    let told = run(Faults {
+        train_ms,
+        ..faults()
+    });
+    assert_eq!(told.report.valid, 3);
+    let mut line_until = HostTime::ZERO;
     let mut counts = [0; 3];
     let mut seen_to = HostTime::ZERO;
     let mut bytes_to = [HostTime::ZERO; 2];
@@ -201,13 +212,18 @@ fn bytes_poses_and_marks_precede_the_outcome() {
         match r {
             Record::Poses(block) => seen_to = block.last().map_or(seen_to, |p| p.t),
             Record::Chunk(c) => bytes_to[c.camera.index()] = c.host_time,
-            Record::MarkSent(sent) => counts[sent.mark.press.0 as usize] += 1,
+            Record::MarkSent(sent) => {
+                counts[sent.mark.press.0 as usize] += 1;
+                line_until = sent.t + HostDuration::from_millis(train_ms);
+            }
             Record::Intent { attempt, .. } => moved_for = Some(attempt.press),
             Record::Command { command, .. } => {
                 assert!(command.target.z_mm >= 5.0 || moved_for.is_some());
             }
             Record::Outcome(o) => {
                 let clear = o.timing.map(|t| t.clear).unwrap_or_default();
+                // Every edge of the last mark is in the bytes.
+                assert!(bytes_to.iter().all(|t| *t >= line_until));
                 assert!(seen_to >= clear && bytes_to.iter().all(|t| *t >= clear));
                 assert_eq!(
                     counts[o.attempt.press.0 as usize], 3,
@@ -530,9 +546,9 @@ fn plans_that_do_not_hold_together_never_arm() {
         ("too deep", |p| p.limits.max_depth_mm = 1.0),
         ("outside", |p| p.limits.workspace_max_mm[0] = 12.0),
         ("beyond the robot", |p| {
-            p.limits.workspace_max_mm[0] = 900.0;
-            if let Some(Step::Travel { to, .. }) = p.steps.get_mut(1) {
-                to.x_mm = 500.0;
+            p.limits.max_speed_mm_s = 500.0;
+            if let Some(Step::Travel { speed_mm_s, .. }) = p.steps.get_mut(1) {
+                *speed_mm_s = 201.0;
             }
         }),
         ("low travel", |p| {

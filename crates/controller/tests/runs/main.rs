@@ -4,3 +4,4 @@ mod course;
 mod guard;
 mod mock;
 mod progress;
+mod simulated;
