@@ -539,6 +539,7 @@ pub fn trigger_box(
             "trigger box: a mark during a train must be a State error"
         );
         let free = sent.t + train;
-        pass(clock.as_mut(), free - clock.now() + TICK, || {});
+        let wait = free - clock.now() + TICK;
+        pass(clock.as_mut(), wait, || {});
     }
 }
