@@ -1,1 +1,37 @@
-//! (being written)
+//! One SQLite file per session: the one writer, the read-only reader, the check of every byte, the catalogue.
+//!
+//! A session is written by a [`SessionWriter`] on a thread of its own: records go in, an [`Intent`] or
+//! [`Outcome`] comes back only when it and everything before it is on the disk. [`SessionReader`] reads it
+//! while it grows and after it is sealed; [`verify()`] recomputes all of it; [`list`] describes a folder.
+//! The layout is in `docs/session-file.md` and, column by column, in `migrations/`.
+//!
+//! This crate knows bytes, checksums and SQL. It knows no device and no event encoding.
+//!
+//! [`Intent`]: skinrig_model::Record::Intent
+//! [`Outcome`]: skinrig_model::Record::Outcome
+
+pub mod catalogue;
+pub mod codec;
+pub mod error;
+pub mod reader;
+pub mod rows;
+pub mod verify;
+pub mod writer;
+
+mod insert;
+mod pose;
+mod query;
+mod schema;
+mod seal;
+
+pub use catalogue::{SESSION_SUFFIX, SessionState, SessionSummary, list};
+pub use codec::Codec;
+pub use error::RecorderError;
+pub use reader::SessionReader;
+pub use rows::{
+    AttemptRow, ChunkMeta, CommandRow, DeviceRow, InterruptionRow, NoteRow, PressTally, Seal,
+    SessionTotals,
+};
+pub use schema::SCHEMA_VERSION;
+pub use verify::{ChunkScanner, VerifyReport, verify};
+pub use writer::{Sealed, SessionWriter};

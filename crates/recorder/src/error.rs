@@ -1,0 +1,102 @@
+//! What can go wrong with a session file.
+
+use std::path::PathBuf;
+
+/// A session could not be written or read.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum RecorderError {
+    /// The operating system refused.
+    #[error("{}: {doing}: {source}", path.display())]
+    Io {
+        /// The file or folder.
+        path: PathBuf,
+        /// What was being done.
+        doing: &'static str,
+        /// Its answer.
+        source: std::io::Error,
+    },
+    /// SQLite refused.
+    #[error("{}: {doing}: {source}", path.display())]
+    Sql {
+        /// The session file.
+        path: PathBuf,
+        /// What was being done.
+        doing: &'static str,
+        /// Its answer.
+        source: Box<sqlx::Error>,
+    },
+    /// A new session was to be written over a file.
+    #[error("{}: expected no file there, found one; sessions are never overwritten: choose another name", path.display())]
+    Exists {
+        /// The file.
+        path: PathBuf,
+    },
+    /// No such file.
+    #[error("{}: expected a session file, found nothing; `skinrig sessions` lists what there is", path.display())]
+    Missing {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The file is something else.
+    #[error("{}: expected a skinrig session, found {found}", path.display())]
+    NotASession {
+        /// The file.
+        path: PathBuf,
+        /// What it is.
+        found: String,
+    },
+    /// Written by a newer skinrig.
+    #[error("{}: expected schema version up to {supported}, found {found}; read it with a newer skinrig", path.display())]
+    NewerSchema {
+        /// The file.
+        path: PathBuf,
+        /// Its schema version.
+        found: u32,
+        /// The newest version that this build knows.
+        supported: u32,
+    },
+    /// Records came in an impossible order, or one cannot be kept as it is. Nothing of it was written.
+    #[error("{record}: expected {expected}, found {found}")]
+    Record {
+        /// Which record.
+        record: String,
+        /// What would have been accepted.
+        expected: String,
+        /// What came.
+        found: String,
+    },
+    /// An earlier write failed; the session takes nothing more.
+    #[error("the session is no longer written: {0}")]
+    Failed(String),
+    /// The session cannot be sealed in its present state.
+    #[error("{}: cannot seal: expected {expected}, found {found}; the session stays readable", path.display())]
+    Unsealable {
+        /// The session file.
+        path: PathBuf,
+        /// What sealing needs.
+        expected: String,
+        /// What there is.
+        found: String,
+    },
+    /// The file contradicts itself.
+    #[error("{}: damaged: {place}: expected {expected}, found {found}; `skinrig verify` checks everything", path.display())]
+    Damaged {
+        /// The session file.
+        path: PathBuf,
+        /// Table and row.
+        place: String,
+        /// What should be there.
+        expected: String,
+        /// What is there.
+        found: String,
+    },
+    /// Something was asked for that the session does not hold.
+    #[error("{}: expected {wanted}, found none", path.display())]
+    NotThere {
+        /// The session file.
+        path: PathBuf,
+        /// What was asked for.
+        wanted: String,
+    },
+}

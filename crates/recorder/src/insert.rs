@@ -1,0 +1,500 @@
+//! Records become rows: the statements of the one writer, and when they are committed.
+
+use std::path::PathBuf;
+
+use sha2::{Digest, Sha256};
+use skinrig_model::{
+    HostTime, PlannedPress, PoseSample, PressOutcome, PressVerdict, RawChunk, Record, RunEnd,
+    RunHeader, StreamFormat,
+};
+use sqlx::sqlite::SqliteConnection;
+
+use crate::codec::{self, Codec};
+use crate::pose;
+use crate::query::Fault;
+use crate::rows::SessionTotals;
+
+/// Uncommitted bytes that make a commit due.
+const COMMIT_BYTES: usize = 8 << 20;
+/// Uncommitted records that make a commit due.
+const COMMIT_RECORDS: usize = 4096;
+/// Samples of one pose block at most.
+const BLOCK_SAMPLES: usize = 4096;
+
+/// The writing end of a session file.
+pub struct Journal {
+    pub path: PathBuf,
+    pub conn: SqliteConnection,
+    formats: [StreamFormat; 2],
+    next_seq: [u64; 2],
+    poses: Vec<u8>,
+    pose_span: Option<(HostTime, HostTime)>,
+    open: bool,
+    pending_bytes: usize,
+    pending_records: usize,
+}
+
+impl Journal {
+    pub fn new(path: PathBuf, conn: SqliteConnection) -> Self {
+        Self {
+            path,
+            conn,
+            formats: [StreamFormat::Evt2; 2],
+            next_seq: [0; 2],
+            poses: Vec::new(),
+            pose_span: None,
+            open: false,
+            pending_bytes: 0,
+            pending_records: 0,
+        }
+    }
+
+    /// True when something was written since the last commit.
+    pub const fn pending(&self) -> bool {
+        self.open
+    }
+
+    /// True when so much was written since the last commit that one is due.
+    pub const fn commit_due(&self) -> bool {
+        self.pending_bytes >= COMMIT_BYTES || self.pending_records >= COMMIT_RECORDS
+    }
+
+    /// Makes everything written so far durable.
+    pub async fn commit(&mut self) -> Result<(), Fault> {
+        self.flush_poses().await?;
+        if self.open {
+            sqlx::query("COMMIT").execute(&mut self.conn).await?;
+            self.open = false;
+        }
+        self.pending_bytes = 0;
+        self.pending_records = 0;
+        Ok(())
+    }
+
+    /// Writes one record into the transaction under way.
+    pub async fn write(&mut self, record: Record, bytes: usize) -> Result<(), Fault> {
+        if !self.open {
+            sqlx::query("BEGIN IMMEDIATE")
+                .execute(&mut self.conn)
+                .await?;
+            self.open = true;
+        }
+        self.pending_bytes += bytes;
+        self.pending_records += 1;
+        match record {
+            Record::Started(header) => self.started(&header).await,
+            Record::Device {
+                role,
+                identity,
+                settings,
+            } => {
+                let id = sqlx::query(
+                    "INSERT INTO device (role, model, serial, firmware) VALUES (?, ?, ?, ?)",
+                )
+                .bind(role.name())
+                .bind(identity.model)
+                .bind(identity.serial)
+                .bind(identity.firmware)
+                .execute(&mut self.conn)
+                .await?
+                .last_insert_rowid();
+                for (position, setting) in (0i64..).zip(settings) {
+                    sqlx::query(
+                        "INSERT INTO setting (device, position, name, requested, read_back)
+                         VALUES (?, ?, ?, ?, ?)",
+                    )
+                    .bind(id)
+                    .bind(position)
+                    .bind(setting.name)
+                    .bind(setting.requested)
+                    .bind(setting.read_back)
+                    .execute(&mut self.conn)
+                    .await?;
+                }
+                Ok(())
+            }
+            Record::Intent { attempt, t } => {
+                sqlx::query(
+                    "INSERT INTO attempt (press, number, previous, intent_ns) VALUES (?, ?, ?, ?)",
+                )
+                .bind(attempt.press.0)
+                .bind(attempt.number)
+                .bind(previous(attempt.number))
+                .bind(t.0)
+                .execute(&mut self.conn)
+                .await?;
+                Ok(())
+            }
+            Record::Command { t, command } => {
+                let [x, y, z] = command.target.to_array();
+                for value in [x, y, z, command.speed_mm_s] {
+                    finite("a motion command", value)?;
+                }
+                sqlx::query(
+                    "INSERT INTO command (t_ns, x_mm, y_mm, z_mm, speed_mm_s) VALUES (?, ?, ?, ?, ?)",
+                )
+                .bind(t.0)
+                .bind(x)
+                .bind(y)
+                .bind(z)
+                .bind(command.speed_mm_s)
+                .execute(&mut self.conn)
+                .await?;
+                Ok(())
+            }
+            Record::Poses(samples) => self.poses(&samples).await,
+            Record::MarkSent(mark) => {
+                sqlx::query(
+                    "INSERT INTO mark (t_ns, kind, press, uncertainty_ns) VALUES (?, ?, ?, ?)",
+                )
+                .bind(mark.t.0)
+                .bind(mark.mark.kind.name())
+                .bind(mark.mark.press.0)
+                .bind(mark.uncertainty_ns)
+                .execute(&mut self.conn)
+                .await?;
+                Ok(())
+            }
+            Record::Chunk(chunk) => self.chunk(chunk).await,
+            Record::Outcome(outcome) => self.outcome(&outcome).await,
+            Record::Missed(attempt, reason) => {
+                sqlx::query(
+                    "INSERT INTO attempt (press, number, previous, verdict, reason, scheduled)
+                     VALUES (?, ?, ?, 'missed', ?, 0)",
+                )
+                .bind(attempt.press.0)
+                .bind(attempt.number)
+                .bind(previous(attempt.number))
+                .bind(reason)
+                .execute(&mut self.conn)
+                .await?;
+                Ok(())
+            }
+            Record::Interruption { kind, t, reason } => {
+                sqlx::query("INSERT INTO interruption (t_ns, kind, reason) VALUES (?, ?, ?)")
+                    .bind(t.0)
+                    .bind(kind.name())
+                    .bind(reason)
+                    .execute(&mut self.conn)
+                    .await?;
+                Ok(())
+            }
+            Record::Note { t, text } => {
+                sqlx::query("INSERT INTO note (t_ns, text) VALUES (?, ?)")
+                    .bind(t.0)
+                    .bind(text)
+                    .execute(&mut self.conn)
+                    .await?;
+                Ok(())
+            }
+            Record::Ended { t, end } => {
+                let reason = match &end {
+                    RunEnd::Completed => None,
+                    RunEnd::Stopped(reason) | RunEnd::Faulted(reason) => Some(reason),
+                };
+                sqlx::query("INSERT INTO run_end (id, t_ns, status, reason) VALUES (1, ?, ?, ?)")
+                    .bind(t.0)
+                    .bind(end.name())
+                    .bind(reason)
+                    .execute(&mut self.conn)
+                    .await?;
+                Ok(())
+            }
+        }
+    }
+
+    async fn started(&mut self, header: &RunHeader) -> Result<(), Fault> {
+        self.formats = header.stream_formats;
+        let overrides = serde_json::to_string(&header.overrides)
+            .map_err(|e| Fault::bad("overrides", "text", e))?;
+        sqlx::query(
+            "INSERT INTO session (id, session_id, protocol_text, protocol_name, protocol_sha256,
+               overrides_json, plan_json, plan_sha256, seed, rig_kind, rig_name, rig_json, stream_format_1,
+               stream_format_2, prototype, operator, started_at, host, software, command_line)
+             VALUES (1, lower(hex(randomblob(16))), ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+        )
+        .bind(&header.protocol_text)
+        .bind(&header.protocol_name)
+        .bind(&header.protocol_sha256)
+        .bind(overrides)
+        .bind(&header.plan_json)
+        .bind(&header.plan_sha256)
+        .bind(header.seed.to_string())
+        .bind(&header.rig_kind)
+        .bind(&header.rig_name)
+        .bind(&header.rig_json)
+        .bind(header.stream_formats[0].name())
+        .bind(header.stream_formats[1].name())
+        .bind(&header.prototype)
+        .bind(&header.operator)
+        .bind(&header.started_at)
+        .bind(&header.host)
+        .bind(&header.software)
+        .bind(&header.command_line)
+        .execute(&mut self.conn)
+        .await?;
+        let transform = &header.robot_from_skin;
+        for (axis, (r, t)) in (0i64..).zip(transform.rotation.iter().zip(&transform.translation_mm))
+        {
+            for value in r.iter().chain([t]) {
+                finite("robot_from_skin", *value)?;
+            }
+            sqlx::query(
+                "INSERT INTO robot_from_skin (axis, r_x, r_y, r_z, t_mm) VALUES (?, ?, ?, ?, ?)",
+            )
+            .bind(axis)
+            .bind(r[0])
+            .bind(r[1])
+            .bind(r[2])
+            .bind(t)
+            .execute(&mut self.conn)
+            .await?;
+        }
+        for press in &header.presses {
+            self.press(press).await?;
+        }
+        Ok(())
+    }
+
+    async fn press(&mut self, press: &PlannedPress) -> Result<(), Fault> {
+        for value in [press.at.x_mm, press.at.y_mm, press.depth_mm] {
+            finite(press.id, value)?;
+        }
+        sqlx::query(
+            "INSERT INTO press (id, role, repetition, location, x_mm, y_mm, depth_mm)
+             VALUES (?, ?, ?, ?, ?, ?, ?)",
+        )
+        .bind(press.id.0)
+        .bind(crate::reader::role_name(press.role))
+        .bind(press.repetition)
+        .bind(press.location)
+        .bind(press.at.x_mm)
+        .bind(press.at.y_mm)
+        .bind(press.depth_mm)
+        .execute(&mut self.conn)
+        .await?;
+        Ok(())
+    }
+
+    async fn outcome(&mut self, outcome: &PressOutcome) -> Result<(), Fault> {
+        let id = outcome.attempt;
+        if matches!(outcome.verdict, PressVerdict::Missed(_)) {
+            return Err(Fault::bad(
+                id,
+                "valid, invalid or excluded for a press that was attempted",
+                "missed",
+            ));
+        }
+        let at = outcome.measured_at;
+        let numbers = [
+            at.map(|p| p.x_mm),
+            at.map(|p| p.y_mm),
+            outcome.measured_depth_mm,
+            outcome.peak_force_n,
+        ];
+        for value in numbers.into_iter().flatten() {
+            finite(id, value)?;
+        }
+        let mut update = sqlx::query(
+            "UPDATE attempt SET verdict = ?, reason = ?, scheduled = ?, approach_ns = ?, contact_ns = ?,
+               at_depth_ns = ?, retract_ns = ?, release_ns = ?, clear_ns = ?, measured_x_mm = ?,
+               measured_y_mm = ?, measured_depth_mm = ?, peak_force_n = ?
+             WHERE press = ? AND number = ? AND verdict IS NULL",
+        )
+        .bind(outcome.verdict.name())
+        .bind(outcome.verdict.reason())
+        .bind(outcome.scheduled);
+        let t = outcome.timing;
+        for moment in [
+            t.map(|t| t.approach.0),
+            t.map(|t| t.contact.0),
+            t.map(|t| t.at_depth.0),
+            t.map(|t| t.retract.0),
+            t.map(|t| t.release.0),
+            t.map(|t| t.clear.0),
+        ] {
+            update = update.bind(moment);
+        }
+        for number in numbers {
+            update = update.bind(number);
+        }
+        let rows = update
+            .bind(id.press.0)
+            .bind(id.number)
+            .execute(&mut self.conn)
+            .await?
+            .rows_affected();
+        if rows != 1 {
+            return Err(Fault::bad(
+                id,
+                "one intent without a verdict before the outcome",
+                "none",
+            ));
+        }
+        Ok(())
+    }
+
+    async fn poses(&mut self, samples: &[PoseSample]) -> Result<(), Fault> {
+        for sample in samples {
+            match &mut self.pose_span {
+                Some((_, last)) if sample.t < *last => {
+                    return Err(Fault::bad(
+                        "pose stream",
+                        format!("times from {last}"),
+                        sample.t,
+                    ));
+                }
+                Some((_, last)) => *last = sample.t,
+                none => *none = Some((sample.t, sample.t)),
+            }
+            if self.poses.is_empty()
+                && let Some((first, _)) = &mut self.pose_span
+            {
+                *first = sample.t;
+            }
+            pose::encode(sample, &mut self.poses);
+            if self.poses.len() >= BLOCK_SAMPLES * pose::SAMPLE_BYTES {
+                self.flush_poses().await?;
+            }
+        }
+        Ok(())
+    }
+
+    async fn flush_poses(&mut self) -> Result<(), Fault> {
+        let Some((first, last)) = self.pose_span else {
+            return Ok(());
+        };
+        if self.poses.is_empty() {
+            return Ok(());
+        }
+        let data = std::mem::take(&mut self.poses);
+        sqlx::query(
+            "INSERT INTO pose_block (first_ns, last_ns, samples, sha256, data) VALUES (?, ?, ?, ?, ?)",
+        )
+        .bind(first.0)
+        .bind(last.0)
+        .bind((data.len() / pose::SAMPLE_BYTES) as i64)
+        .bind(Sha256::digest(&data).as_slice())
+        .bind(data.as_slice())
+        .execute(&mut self.conn)
+        .await?;
+        self.poses = data;
+        self.poses.clear();
+        Ok(())
+    }
+
+    async fn chunk(&mut self, chunk: RawChunk) -> Result<(), Fault> {
+        let camera = chunk.camera.index();
+        let place = format!("{} chunk {}", chunk.camera, chunk.seq);
+        if chunk.seq != self.next_seq[camera] {
+            return Err(Fault::bad(
+                place,
+                format!("chunk {}", self.next_seq[camera]),
+                chunk.seq,
+            ));
+        }
+        if chunk.bytes.len() > codec::MAX_CHUNK_BYTES {
+            let most = format!("at most {} bytes", codec::MAX_CHUNK_BYTES);
+            return Err(Fault::bad(place, most, chunk.bytes.len()));
+        }
+        if chunk.facts.trigger_edges != chunk.triggers.len() as u64 {
+            let counted = format!("{} trigger edges as counted", chunk.facts.trigger_edges);
+            return Err(Fault::bad(place, counted, chunk.triggers.len()));
+        }
+        self.next_seq[camera] += 1;
+        let raw_bytes = chunk.bytes.len();
+        let crc = crc32fast::hash(&chunk.bytes);
+        let folded = match self.formats[camera] {
+            StreamFormat::Evt2 => codec::fold(&chunk.bytes),
+            _ => None,
+        };
+        let (codec, stored) = match folded {
+            Some(folded) => (Codec::TimeHighRuns, folded),
+            None => (Codec::None, chunk.bytes),
+        };
+        let signed = |value: u64| {
+            i64::try_from(value).map_err(|_| Fault::bad(&place, "a number below 2^63", value))
+        };
+        let facts = chunk.facts;
+        sqlx::query(
+            "INSERT INTO chunk (camera, seq, host_ns, lost_before, codec, raw_bytes, raw_crc32,
+               stored_sha256, first_us, last_us, cd_events, on_events, trigger_edges, stored)
+             VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+        )
+        .bind(chunk.camera.number())
+        .bind(signed(chunk.seq)?)
+        .bind(chunk.host_time.0)
+        .bind(signed(chunk.lost_before)?)
+        .bind(codec.name())
+        .bind(raw_bytes as i64)
+        .bind(crc)
+        .bind(Sha256::digest(&stored).as_slice())
+        .bind(facts.first_us.map(signed).transpose()?)
+        .bind(facts.last_us.map(signed).transpose()?)
+        .bind(signed(facts.cd_events)?)
+        .bind(signed(facts.on_events)?)
+        .bind(signed(facts.trigger_edges)?)
+        .bind(stored)
+        .execute(&mut self.conn)
+        .await?;
+        if chunk.triggers.is_empty() {
+            return Ok(());
+        }
+        // One statement for all edges: a statement per edge would cost more than all the rest.
+        let edges: Vec<_> = chunk
+            .triggers
+            .iter()
+            .map(|e| (e.t_us, e.channel, u8::from(e.rising)))
+            .collect();
+        let edges = serde_json::to_string(&edges).map_err(|e| Fault::bad(&place, "edges", e))?;
+        sqlx::query(
+            "INSERT INTO trigger_edge (camera, seq, position, t_us, channel, rising)
+             SELECT ?, ?, key, value ->> 0, value ->> 1, value ->> 2 FROM json_each(?)",
+        )
+        .bind(chunk.camera.number())
+        .bind(signed(chunk.seq)?)
+        .bind(edges)
+        .execute(&mut self.conn)
+        .await?;
+        Ok(())
+    }
+
+    /// Final counts, when the session is complete enough to be sealed: (what is needed, what there is) otherwise.
+    pub async fn sealable(&mut self) -> Result<Result<SessionTotals, (String, String)>, Fault> {
+        let ends: i64 = sqlx::query_scalar("SELECT count(*) FROM run_end")
+            .fetch_one(&mut self.conn)
+            .await?;
+        if ends != 1 {
+            return Ok(Err(("the run's end as last record".into(), "none".into())));
+        }
+        let totals = crate::query::totals(&mut self.conn).await?;
+        let open = totals.presses.open() + totals.sync.open();
+        if open > 0 {
+            let first: i64 = sqlx::query_scalar(
+                "SELECT min(id) FROM press WHERE NOT EXISTS (SELECT 1 FROM attempt a WHERE a.press = press.id
+                   AND a.verdict IS NOT NULL
+                   AND a.number = (SELECT max(number) FROM attempt WHERE press = press.id))",
+            )
+            .fetch_one(&mut self.conn)
+            .await?;
+            return Ok(Err((
+                "a verdict for every planned press".into(),
+                format!("{open} without, the first is press {first}"),
+            )));
+        }
+        Ok(Ok(totals))
+    }
+}
+
+fn previous(number: u32) -> Option<u32> {
+    number.checked_sub(1).filter(|n| *n > 0)
+}
+
+/// SQLite stores NaN as null and would forget it in silence.
+fn finite(place: impl ToString, value: f64) -> Result<(), Fault> {
+    if value.is_finite() {
+        Ok(())
+    } else {
+        Err(Fault::bad(place, "a finite number", value))
+    }
+}

@@ -1,0 +1,346 @@
+//! Recomputes everything that a session claims about itself.
+
+use std::path::Path;
+
+use sha2::{Digest, Sha256};
+use skinrig_model::{CameraId, ChunkFacts, HostTime, RunEnd, StreamFormat, TriggerEdge};
+
+use crate::error::RecorderError;
+use crate::query::{each_row, int, num, sha, text};
+use crate::reader::SessionReader;
+use crate::rows::SessionTotals;
+use crate::seal::{self, TableDigest};
+use crate::writer::hex;
+
+/// Problems that are told in full; more are only counted.
+const TOLD: usize = 100;
+
+/// Decodes camera bytes for the check. This crate knows no event encoding, so the caller brings one.
+pub trait ChunkScanner {
+    /// What the next bytes of `camera` hold. Called for every chunk, per camera in stream order; state carries
+    /// over from chunk to chunk (a word may be split).
+    fn scan(
+        &mut self,
+        camera: CameraId,
+        format: StreamFormat,
+        bytes: &[u8],
+    ) -> (ChunkFacts, Vec<TriggerEdge>);
+
+    /// Bytes were lost between the previous chunk of `camera` and the next one. Called before its `scan`.
+    fn lost(&mut self, _camera: CameraId, _bytes: u64) {}
+}
+
+/// What [`verify()`] found.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct VerifyReport {
+    /// Whether the file has a seal. Without one, hashes over the whole were not checked.
+    pub sealed: bool,
+    /// What is wrong, in words: nothing for a sound session.
+    pub problems: Vec<String>,
+    /// Problems found beyond those told in `problems`.
+    pub more_problems: u64,
+    /// Counts and sizes, from the rows; `None` when they cannot be read.
+    pub totals: Option<SessionTotals>,
+}
+
+impl VerifyReport {
+    /// True when nothing is wrong.
+    #[must_use]
+    pub fn is_sound(&self) -> bool {
+        self.problems.is_empty()
+    }
+
+    fn add(&mut self, problem: impl ToString) {
+        if self.problems.len() < TOLD {
+            self.problems.push(problem.to_string());
+        } else {
+            self.more_problems += 1;
+        }
+    }
+
+    /// Keeps the value, or tells the error.
+    fn take<T>(&mut self, result: Result<T, RecorderError>) -> Option<T> {
+        result.map_err(|e| self.add(e)).ok()
+    }
+
+    fn equal<T: PartialEq + std::fmt::Debug>(&mut self, what: &str, expected: &T, found: &T) {
+        if expected != found {
+            self.add(format!("{what}: expected {expected:?}, found {found:?}"));
+        }
+    }
+}
+
+/// Checks a session: SQLite's own integrity, foreign keys, protocol and plan digests, every chunk's checksum
+/// and facts, every pose block, the order of everything, the journal, the counts, and of a sealed session the
+/// tree hash and the hash of the whole file.
+///
+/// # Errors
+/// [`RecorderError::Missing`] and [`RecorderError::Io`] when there is no file to read. Everything that is wrong
+/// inside the file is a problem in the report.
+pub fn verify(
+    path: impl AsRef<Path>,
+    scanner: &mut dyn ChunkScanner,
+) -> Result<VerifyReport, RecorderError> {
+    let path = path.as_ref();
+    let mut report = VerifyReport::default();
+    let reader = match SessionReader::open(path) {
+        Ok(reader) => reader,
+        Err(e @ (RecorderError::Missing { .. } | RecorderError::Io { .. })) => return Err(e),
+        Err(e) => {
+            report.add(e);
+            return Ok(report);
+        }
+    };
+    check_sqlite(&reader, &mut report);
+    let formats = check_header(&reader, &mut report);
+    for camera in CameraId::ALL {
+        let format = formats.map(|f| f[camera.index()]);
+        if let Err(e) = check_chunks(&reader, camera, format, scanner, &mut report) {
+            report.add(e);
+        }
+    }
+    if let Err(e) = check_poses(&reader, &mut report) {
+        report.add(e);
+    }
+    check_journal(&reader, &mut report);
+    report.totals = report.take_totals(&reader);
+    check_seal(&reader, &mut report);
+    Ok(report)
+}
+
+impl VerifyReport {
+    fn take_totals(&mut self, reader: &SessionReader) -> Option<SessionTotals> {
+        self.take(reader.totals())
+    }
+}
+
+fn check_sqlite(reader: &SessionReader, report: &mut VerifyReport) {
+    let messages = reader.ask("checking its integrity", async |conn| {
+        let messages: Vec<String> = sqlx::query_scalar("PRAGMA integrity_check")
+            .fetch_all(&mut *conn)
+            .await?;
+        let mut problems: Vec<String> = messages.into_iter().filter(|m| m != "ok").collect();
+        let orphans = sqlx::query("SELECT \"table\", parent FROM pragma_foreign_key_check");
+        each_row(orphans, conn, |row| {
+            let (child, parent) = (text(row, "table")?, text(row, "parent")?);
+            problems.push(format!(
+                "a row of {child} names a row of {parent} that is not there"
+            ));
+            Ok(())
+        })
+        .await?;
+        Ok(problems)
+    });
+    for message in report.take(messages).unwrap_or_default() {
+        report.add(format!("sqlite: {message}"));
+    }
+}
+
+fn check_header(reader: &SessionReader, report: &mut VerifyReport) -> Option<[StreamFormat; 2]> {
+    let header = report.take(reader.header())?;
+    let digest = |text: &str| hex(&Sha256::digest(text.as_bytes()));
+    report.equal(
+        "protocol_sha256",
+        &digest(&header.protocol_text),
+        &header.protocol_sha256,
+    );
+    report.equal(
+        "plan_sha256",
+        &digest(&header.plan_json),
+        &header.plan_sha256,
+    );
+    for (expected, press) in (0u32..).zip(&header.presses) {
+        if press.id.0 != expected {
+            report.add(format!(
+                "press: expected id {expected}, found {}",
+                press.id.0
+            ));
+            break;
+        }
+    }
+    if let Some(devices) = report.take(reader.devices())
+        && devices.is_empty()
+        && header.rig_kind != "imported"
+        && matches!(reader.end(), Ok(Some((_, RunEnd::Completed))))
+    {
+        report.add("device: expected the devices of a completed run, found none");
+    }
+    Some(header.stream_formats)
+}
+
+fn check_chunks(
+    reader: &SessionReader,
+    camera: CameraId,
+    format: Option<StreamFormat>,
+    scanner: &mut dyn ChunkScanner,
+    report: &mut VerifyReport,
+) -> Result<(), RecorderError> {
+    let (mut previous, mut host) = (None, HostTime(i64::MIN));
+    for meta in reader.chunk_index(camera)? {
+        let place = format!("{camera} chunk {}", meta.seq);
+        let expected = previous.map_or(0, |p| p + 1);
+        if meta.seq != expected {
+            report.add(format!(
+                "{camera}: expected chunk {expected}, found chunk {}",
+                meta.seq
+            ));
+        }
+        if meta.host_time < host {
+            report.add(format!(
+                "{place}: expected host time from {host}, found {}",
+                meta.host_time
+            ));
+        }
+        (previous, host) = (Some(meta.seq), meta.host_time);
+        let sound = reader.ask("checking a chunk", async |conn| {
+            let row =
+                sqlx::query("SELECT stored, stored_sha256 FROM chunk WHERE camera = ? AND seq = ?")
+                    .bind(camera.number())
+                    .bind(meta.seq as i64)
+                    .fetch_one(conn)
+                    .await?;
+            let stored = crate::query::blob(&row, "stored")?;
+            Ok(Sha256::digest(&stored).as_slice() == sha(&row, "stored_sha256")?)
+        })?;
+        if !sound {
+            report.add(format!(
+                "{place}: stored bytes are not those of stored_sha256"
+            ));
+        }
+        let Some(bytes) = report.take(reader.chunk_bytes(camera, meta.seq)) else {
+            continue;
+        };
+        let Some(format) = format else { continue };
+        if meta.lost_before > 0 {
+            scanner.lost(camera, meta.lost_before);
+        }
+        let (facts, edges) = scanner.scan(camera, format, &bytes);
+        report.equal(&format!("{place}: facts"), &facts, &meta.facts);
+        let recorded = reader.edges(camera, meta.seq as i64, meta.seq as i64)?;
+        if edges != recorded {
+            report.add(format!(
+                "{place}: expected the {} trigger edges in its bytes, found {} others in trigger_edge",
+                edges.len(),
+                recorded.len()
+            ));
+        }
+    }
+    Ok(())
+}
+
+fn check_poses(reader: &SessionReader, report: &mut VerifyReport) -> Result<(), RecorderError> {
+    let (mut after, mut last) = (0, HostTime(i64::MIN));
+    let all = (HostTime(i64::MIN), HostTime(i64::MAX));
+    while let Some((id, samples)) = reader.pose_block_after(after, all.0, all.1)? {
+        if let (Some(first), Some(end)) = (samples.first(), samples.last()) {
+            if first.t < last {
+                report.add(format!(
+                    "pose block {id}: expected times from {last}, found {}",
+                    first.t
+                ));
+            }
+            last = end.t;
+        }
+        after = id;
+    }
+    Ok(())
+}
+
+/// The journal: moments in order, lineage without holes, no open attempt once the run has ended.
+fn check_journal(reader: &SessionReader, report: &mut VerifyReport) {
+    let ended = report.take(reader.end()).flatten().is_some();
+    for (planned, attempts) in report.take(reader.presses()).unwrap_or_default() {
+        for (number, attempt) in (1u32..).zip(&attempts) {
+            if attempt.id.number != number {
+                report.add(format!("{}: expected attempt {number}", attempt.id));
+            }
+            if let Some(t) = attempt.outcome.as_ref().and_then(|o| o.timing) {
+                let moments = [
+                    t.approach, t.contact, t.at_depth, t.retract, t.release, t.clear,
+                ];
+                if !moments.is_sorted() {
+                    report.add(format!(
+                        "{}: expected its moments in order, found others",
+                        attempt.id
+                    ));
+                }
+            }
+        }
+        if ended && attempts.last().is_none_or(|a| a.outcome.is_none()) {
+            report.add(format!(
+                "{}: expected a verdict in an ended run, found none",
+                planned.id
+            ));
+        }
+    }
+    report.take(reader.commands());
+    report.take(reader.marks_sent());
+    report.take(reader.notes());
+    report.take(reader.interruptions());
+}
+
+fn check_seal(reader: &SessionReader, report: &mut VerifyReport) {
+    let Some(Some(seal)) = report.take(reader.seal()) else {
+        return;
+    };
+    report.sealed = true;
+    if let Some(totals) = report.totals {
+        report.equal("seal: counts", &totals, &seal.totals);
+    }
+    let read = reader.ask("checking the seal", async |conn| {
+        let mut recorded = Vec::new();
+        let query = sqlx::query("SELECT name, rows, sha256 FROM table_digest");
+        each_row(query, conn, |row| {
+            recorded.push(TableDigest {
+                name: text(row, "name")?,
+                rows: int(row, "rows")?,
+                sha256: sha(row, "sha256")?,
+            });
+            Ok(())
+        })
+        .await?;
+        Ok((
+            recorded,
+            seal::digest_tables(conn).await?,
+            seal::seal_page(conn).await?,
+        ))
+    });
+    let Some((recorded, computed, page)) = report.take(read) else {
+        return;
+    };
+    for table in &computed {
+        if !recorded.contains(table) {
+            report.add(format!(
+                "{}: rows are not those that were sealed",
+                table.name
+            ));
+        }
+    }
+    report.equal("seal: tables", &computed.len(), &recorded.len());
+    report.equal(
+        "seal: tree hash",
+        &hex(&seal::tree_of(&computed)),
+        &hex(&seal.tree_sha256),
+    );
+    match seal::file_hash(reader.path(), page, &seal.file_sha256) {
+        Err(e) => report.add(format!("seal: file hash: {e}")),
+        Ok(Some(found)) => {
+            report.equal("seal: file hash", &hex(&seal.file_sha256), &hex(&found));
+        }
+        Ok(None) => {
+            report.add("seal: file hash: expected once on the seal's page, found otherwise")
+        }
+    }
+    if seal.file_sha256 == seal::placeholder_of(&seal.tree_sha256) {
+        report.add("seal: sealing was broken off before the file hash was written");
+    }
+    let ends = reader.ask("counting ends", async |conn| {
+        let row = sqlx::query("SELECT count(*) AS n FROM run_end")
+            .fetch_one(conn)
+            .await?;
+        num::<u64>(&row, "n")
+    });
+    if report.take(ends) == Some(0) {
+        report.add("seal: expected the run's end in a sealed session, found none");
+    }
+}
