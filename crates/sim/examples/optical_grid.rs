@@ -104,7 +104,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             camera_id: id,
             camera: geometry.cameras[id.index()],
             skin_rows: CROP[id.index()],
-            tip_side_mm: 5.0,
+            tip_side_mm: 10.0,
             skin_thickness_mm: 4.0,
         })
     });

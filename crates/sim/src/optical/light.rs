@@ -7,7 +7,7 @@ use skinrig_model::{CameraModel, Point2, SENSOR_WIDTH, SkinOutline};
 
 use super::config::OpticalConfig;
 
-/// Spacing of the points at which a ray is followed, mm.
+/// Spacing of the points at which a ray is followed, mm, or a little less.
 const RAY_STEP_MM: f64 = 4.0;
 /// Pieces into which each rounded corner is cut for placing emitters.
 const ARC_PIECES: u32 = 16;
@@ -121,8 +121,9 @@ pub(super) struct Column {
     pub(super) exit_mm: f64,
     /// Light from the wall at the end of the ray, as it arrives.
     wall: f64,
-    /// Light scattered into the ray before `enter + k * RAY_STEP_MM`, as it arrives.
+    /// Light scattered into the ray before `enter + k * step`, as it arrives.
     scattered: Vec<f64>,
+    step_mm: f64,
     /// All light, stray light included; above 0.
     pub(super) total: f64,
 }
@@ -144,15 +145,14 @@ impl Column {
             distance(origin, [outline.centre.x_mm, outline.centre.y_mm]),
         );
         let fade = |s: f64| libm::exp(-config.attenuation_per_mm * (s - enter_mm));
+        let steps = ((exit_mm - enter_mm) / RAY_STEP_MM).ceil().max(1.0);
+        let step_mm = (exit_mm - enter_mm) / steps;
         let mut scattered = vec![0.0];
         let mut sum = 0.0;
-        let mut s = enter_mm;
-        while s < exit_mm {
-            let ds = RAY_STEP_MM.min(exit_mm - s);
-            let middle = s + 0.5 * ds;
-            sum += config.scatter_per_mm * ds * light.fluence(at(middle)) * fade(middle);
+        for k in 0..steps as u32 {
+            let middle = enter_mm + (f64::from(k) + 0.5) * step_mm;
+            sum += config.scatter_per_mm * step_mm * light.fluence(at(middle)) * fade(middle);
             scattered.push(sum);
-            s += RAY_STEP_MM;
         }
         let towards_camera = [-direction[0], -direction[1]];
         let wall = if exit_mm > enter_mm {
@@ -166,13 +166,14 @@ impl Column {
             exit_mm,
             wall,
             scattered,
+            step_mm,
             total: wall + sum + config.stray,
         }
     }
 
     /// The part of the light that comes from farther than `s` mm from the camera: 0..1.
     pub(super) fn beyond(&self, s: f64) -> f64 {
-        let k = (s - self.enter_mm).max(0.0) / RAY_STEP_MM;
+        let k = (s - self.enter_mm).max(0.0) / self.step_mm.max(f64::MIN_POSITIVE);
         let last = self.scattered.len() - 1;
         let low = (k as usize).min(last);
         let high = (low + 1).min(last);

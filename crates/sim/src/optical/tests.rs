@@ -15,7 +15,7 @@ fn scene(id: CameraId) -> SceneConfig {
         camera_id: id,
         camera: StereoGeometry::PAPER.cameras[id.index()],
         skin_rows: [(185, 360), (200, 355)][id.index()],
-        tip_side_mm: 5.0,
+        tip_side_mm: 10.0,
         skin_thickness_mm: 4.0,
     }
 }
@@ -90,7 +90,10 @@ fn equal_seeds_give_the_golden_bytes() {
     );
 }
 
-const GOLDEN: [(usize, u64); 2] = [(0, 0), (0, 0)];
+const GOLDEN: [(usize, u64); 2] = [
+    (5765, 979_743_607_887_740_700),
+    (6574, 3_672_510_485_632_699_515),
+];
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(6))]
@@ -143,10 +146,15 @@ fn samples_far_apart_mean_straight_motion() {
 fn without_motion_there_is_only_noise_at_its_rate() {
     let rest: Vec<_> = (0..=4000).map(|t| tip(t, P.x_mm, P.y_mm, 1.0)).collect();
     assert!(run(&mut quiet(CameraId::One), &rest).is_empty());
-    // A tip that stays at a depth makes events only while the skin creeps (5 time constants).
+    // A tip that stays at a depth makes events only while the skin creeps: of the order of its time constant, 700 ms.
     let held: Vec<_> = (0..=5500).map(|t| tip(t, P.x_mm, P.y_mm, -1.0)).collect();
     let events = run(&mut quiet(CameraId::One), &held);
-    assert!(!events.is_empty() && events.iter().all(|e| ms(e) < 3500));
+    let late = events.iter().filter(|e| ms(e) > 3500).count();
+    assert!(
+        events.len() > 500 && late * 100 < events.len(),
+        "{late} of {}",
+        events.len()
+    );
 
     let mut model = OpticalModel::new(&scene(CameraId::One));
     let expected = model.noise_hz() * 4.0;
