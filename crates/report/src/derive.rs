@@ -109,3 +109,13 @@ pub fn rejections(analysis: &Analysis) -> Vec<(String, String, u32)> {
     rows.sort_by(|a, b| b.2.cmp(&a.2).then_with(|| a.cmp(b)));
     rows
 }
+
+/// Says so when the figures stand on another number of presses than the headline: they must not.
+#[must_use]
+pub fn disagreement(analysis: &Analysis) -> Option<String> {
+    let drawn = analysis.presses.iter().filter(|p| counts(p)).count() as u64;
+    let headline = u64::from(analysis.scored.rmse_mm.n);
+    (drawn != headline).then(|| {
+        format!("figures show {drawn} scored presses, the headline stands on {headline}: do not trust this report")
+    })
+}

@@ -2,7 +2,7 @@
 //!
 //! The report computes nothing beyond layout. Every number comes from
 //! [`skinrig_analysis::result::Analysis`]; the few summaries that only a drawing needs (bars of a histogram,
-//! means per location) are in one place, [`derive`], with their formulas.
+//! means per location) are in one place, [`mod@derive`], with their formulas.
 //!
 //! User strings (prototype, operator, notes, file names) are escaped wherever they land: by minijinja's
 //! auto-escape in HTML, by the [`svg`] builder in figures, and by [`page::script_json`] in script data.

@@ -86,6 +86,7 @@ pub(crate) fn render(input: &ReportInput<'_>) -> Result<String, ReportError> {
         planned => c.planned,
         sync => c.sync,
         add_up => c.add_up(),
+        disagreement => derive::disagreement(a),
         empty => a.presses.is_empty(),
         warnings => a.warnings.clone(),
         interruptions => p.interruptions.iter()

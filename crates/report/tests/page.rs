@@ -129,6 +129,9 @@ fn simulated_is_said_in_page_and_in_every_figure() {
 fn a_session_without_presses_says_so() {
     let analysis = support::empty();
     let page = html(&input(&analysis)).unwrap();
+    if let Some(folder) = std::env::var_os("SKINRIG_REPORT_OUT") {
+        std::fs::write(std::path::Path::new(&folder).join("empty.html"), &page).unwrap();
+    }
     assert!(page.contains("This session has no presses"));
     assert!(page.contains("no scored press was located"));
     assert!(page.contains("no events in this camera"));
@@ -228,4 +231,33 @@ fn ids_are_unique_and_references_lead_somewhere() {
     for target in values("href").iter().filter_map(|v| v.strip_prefix('#')) {
         assert!(ids.iter().any(|i| i == target), "{target}");
     }
+}
+
+#[test]
+fn figures_that_disagree_with_the_headline_are_called_out() {
+    let mut analysis = support::analysis(4, 3);
+    assert!(!html(&input(&analysis)).unwrap().contains("Disagreement"));
+    analysis.scored.rmse_mm.n += 1;
+    assert!(html(&input(&analysis)).unwrap().contains("Disagreement"));
+}
+
+/// The mean of the map's spreads is the headline's: same definition (here computed by hand).
+#[test]
+fn spread_at_a_location_is_the_sample_standard_deviation() {
+    let mut analysis = support::analysis(2, 3);
+    let mut estimates = [(1.0, 2.0), (3.0, 2.0)].into_iter();
+    for p in analysis.presses.iter_mut().filter(|p| p.location == 1) {
+        if p.role == skinrig_model::PressRole::Score {
+            let (x, y) = estimates.next().unwrap();
+            p.truth = Some(skinrig_model::Point2::new(0.0, 0.0));
+            let at = skinrig_model::Point2::new(x, y);
+            p.location_outcome =
+                skinrig_analysis::result::LocationOutcome::Located { at, sine: 0.5 };
+        }
+    }
+    let summaries = skinrig_report::derive::locations(&analysis);
+    let here = summaries.iter().find(|l| l.location == 1).unwrap();
+    assert!((here.std_mm.unwrap() - 2f64.sqrt()).abs() < 1e-12);
+    assert!((here.mean_error_mm - (5f64.sqrt() + 13f64.sqrt()) / 2.0).abs() < 1e-12);
+    assert_eq!(here.n, 2);
 }

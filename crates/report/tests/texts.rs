@@ -26,9 +26,11 @@ fn terminal_table_reads_like_this() {
 #[test]
 fn terminal_table_of_an_empty_session() {
     let analysis = support::empty();
-    let mut provenance = skinrig_report::Provenance::default();
-    provenance.run_end = "faulted".into();
-    provenance.run_end_reason = Some("camera 2 stopped answering".into());
+    let provenance = skinrig_report::Provenance {
+        run_end: "faulted".into(),
+        run_end_reason: Some("camera 2 stopped answering".into()),
+        ..Default::default()
+    };
     let input = ReportInput {
         analysis: &analysis,
         provenance,
@@ -92,9 +94,10 @@ fn json_document_has_this_layout() {
 fn blunt(value: serde_json::Value) -> serde_json::Value {
     use serde_json::Value;
     match value {
-        Value::Number(n) if n.is_f64() => {
-            serde_json::json!((n.as_f64().unwrap() * 1e6).round() / 1e6)
-        }
+        Value::Number(n) => match n.as_f64().filter(|_| n.is_f64()) {
+            Some(f) => serde_json::json!((f * 1e6).round() / 1e6),
+            None => Value::Number(n),
+        },
         Value::Array(a) => a.into_iter().map(blunt).collect(),
         Value::Object(o) => o.into_iter().map(|(k, v)| (k, blunt(v))).collect(),
         other => other,

@@ -226,7 +226,7 @@ pub fn press_rates(input: &ReportInput<'_>) -> Option<Figure> {
                 } else {
                     String::new()
                 },
-                tick_count: (4, if i == 0 { 4 } else { 0 }),
+                tick_count: (6, if i == 0 { 4 } else { 0 }),
             };
             let svg = &mut canvas.svg;
             axes.draw(svg);
