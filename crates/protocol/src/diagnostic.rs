@@ -72,6 +72,7 @@ impl Diagnostic {
             column,
             length,
             text,
+            text_column,
         } = &self.location;
         let number = line.to_string();
         let margin = " ".repeat(number.len());
@@ -83,11 +84,12 @@ impl Diagnostic {
             format!("  {}", paint.strong(&self.path))
         };
         out.push_str(&format!(
-            "{margin}{} {file}:{line}:{column}{path}\n",
-            paint.frame("-->")
+            "{margin}{} {file}:{line}:{}{path}\n",
+            paint.frame("-->"),
+            self.location.column
         ));
         out.push_str(&format!("{margin} {bar}\n"));
-        let (text, column) = excerpt(text, *column);
+        let column = (column + 1).saturating_sub(*text_column).max(1);
         out.push_str(&format!("{} {bar} {text}\n", paint.frame(&number)));
         let room = (text.chars().count() + 1).saturating_sub(column - 1).max(1);
         out.push_str(&format!(
@@ -104,22 +106,6 @@ impl Diagnostic {
             out.push_str(&format!("{margin} = {}: {help}\n", paint.help("help")));
         }
     }
-}
-
-/// A line that fits a terminal: at most [`WIDEST`] characters around the column, and the column in it.
-fn excerpt(text: &str, column: usize) -> (String, usize) {
-    const WIDEST: usize = 120;
-    let clean = |s: &str| -> String {
-        s.chars()
-            .map(|c| if c.is_control() { ' ' } else { c })
-            .collect()
-    };
-    if text.chars().count() <= WIDEST {
-        return (clean(text), column);
-    }
-    let first = column.saturating_sub(WIDEST / 2);
-    let part: String = text.chars().skip(first).take(WIDEST).collect();
-    (clean(&part), column - first)
 }
 
 /// ANSI escapes, or none.
@@ -246,13 +232,18 @@ pub(crate) fn closest<'a>(
     word: &str,
     candidates: impl IntoIterator<Item = &'a str>,
 ) -> Option<&'a str> {
+    const LONGEST: usize = 64;
+    if word.len() > LONGEST {
+        return None;
+    }
     let flat = |s: &str| s.to_lowercase().replace(['-', ' '], "_");
     let wanted = flat(word);
     candidates
         .into_iter()
         .map(|c| (strsim::damerau_levenshtein(&wanted, &flat(c)), c))
         .filter(|(distance, c)| {
-            *distance <= 1.max(c.chars().count().min(wanted.chars().count()) / 3)
+            let shorter = c.chars().count().min(wanted.chars().count());
+            *distance < shorter && *distance <= 1.max(shorter / 3)
         })
         .min_by_key(|(distance, _)| *distance)
         .map(|(_, c)| c)

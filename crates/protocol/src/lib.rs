@@ -11,7 +11,6 @@
 
 pub mod area;
 mod build;
-mod build_path;
 pub mod check;
 mod compile;
 pub mod diagnostic;
@@ -22,9 +21,7 @@ pub mod protocol;
 pub mod quantity;
 mod read;
 pub mod schedule;
-mod schedule_keys;
 mod schema;
-mod settings;
 mod shape;
 mod source;
 pub mod summary;

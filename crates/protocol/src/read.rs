@@ -167,6 +167,11 @@ pub(crate) fn read(
         }
         (Shape::Flag, Kind::Scalar { text, plain: true }) if text == "true" => Value::Flag(true),
         (Shape::Flag, Kind::Scalar { text, plain: true }) if text == "false" => Value::Flag(false),
+        (Shape::Text, Kind::Scalar { .. }) => {
+            out.error(node.span, path, "the text is blank")
+                .expected("a text");
+            return None;
+        }
         (Shape::Flag, Kind::Scalar { text, .. }) => {
             let help = match text.to_lowercase().as_str() {
                 "yes" | "on" | "true" | "y" => Some("write `true`".to_owned()),

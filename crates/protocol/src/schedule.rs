@@ -9,8 +9,8 @@ use skinrig_model::{
 
 use crate::build::{calibration_possible, open, outline, roles, seconds};
 use crate::diagnostic::{Collector, Diagnostics};
+use crate::keys::schedule::SCHEDULE;
 use crate::protocol::Prototype;
-use crate::schedule_keys::SCHEDULE;
 use crate::shape::Field;
 
 /// A recording that was made without skinrig: what `skinrig import` needs to know about it.
@@ -267,7 +267,7 @@ fn assemble(root: &Field, out: &mut Collector) -> Option<Schedule> {
     let rig = root.get("rig").and_then(|f| rig(f, out));
     let analysis = root
         .get("analysis")
-        .and_then(|f| crate::settings::analysis(f, out));
+        .and_then(|f| crate::build::analysis(f, out));
     if let (Some(ScheduledRoles::Repetitions(roles)), Some(analysis)) = (&roles, &analysis)
         && let Some(by) = evaluation.and_then(|e| e.get("repetitions"))
     {

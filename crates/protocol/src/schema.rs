@@ -17,7 +17,7 @@ pub fn schema_json() -> String {
 /// The JSON Schema of a schedule for `skinrig import`.
 #[must_use]
 pub fn schedule_schema_json() -> String {
-    render(&crate::schedule_keys::SCHEDULE, "skinrig schedule")
+    render(&crate::keys::schedule::SCHEDULE, "skinrig schedule")
 }
 
 fn render(table: &'static Table, title: &str) -> String {

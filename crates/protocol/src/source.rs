@@ -44,8 +44,11 @@ pub struct Location {
     pub column: usize,
     /// How many characters are meant, at least 1; never past the end of the line.
     pub length: usize,
-    /// The whole line without its line break; tabs shown as one space each.
+    /// The line without its line break; tabs shown as one space each. Of a very long line only the part around the
+    /// column.
     pub text: String,
+    /// Column of the first character of `text`; 1 but for very long lines.
+    pub text_column: usize,
 }
 
 impl Sources {
@@ -77,6 +80,7 @@ impl Sources {
                 column: 1,
                 length: 1,
                 text: String::new(),
+                text_column: 1,
             };
         };
         let start = floor_boundary(&source.text, span.start);
@@ -93,15 +97,28 @@ impl Sources {
         let count = |a: usize, b: usize| source.text.get(a..b).map_or(0, |s| s.chars().count());
         // A byte order mark at the very start of a file has no width.
         let mark = usize::from(text.starts_with('\u{feff}') && start > line_start);
+        let column = count(line_start, start) + 1 - mark;
+        let shown = text.trim_start_matches('\u{feff}');
+        let skipped = column.saturating_sub(WIDEST / 2 + 1);
+        let skipped = if text.len() <= WIDEST { 0 } else { skipped };
         Location {
             file: source.name.clone(),
             line,
-            column: count(line_start, start) + 1 - mark,
+            column,
             length: count(start, shown_end.max(start)).max(1),
-            text: text.trim_start_matches('\u{feff}').replace('\t', " "),
+            text: shown
+                .chars()
+                .skip(skipped)
+                .take(WIDEST)
+                .map(|c| if c.is_control() { ' ' } else { c })
+                .collect(),
+            text_column: skipped + 1,
         }
     }
 }
+
+/// Longest part of a line that is kept for people, characters.
+const WIDEST: usize = 120;
 
 /// The nearest character boundary at or below `at`.
 fn floor_boundary(text: &str, at: usize) -> usize {

@@ -65,11 +65,11 @@ pub fn path_svg(plan: &Plan, around: &Surroundings) -> String {
     ));
     put(STYLE.to_owned());
     put(r#"<rect class="paper" width="100%" height="100%"/>"#.to_owned());
-    grid(&mut put, low, high, &at);
     put(format!(
         r#"<polygon class="skin" points="{}"/>"#,
         points(&corners, &at)
     ));
+    grid(&mut put, low, high, &at);
     for keep_out in &around.keep_outs {
         let title = escape(&keep_out.name);
         match &keep_out.area {
@@ -168,7 +168,7 @@ pub fn path_svg(plan: &Plan, around: &Surroundings) -> String {
             x - 1.2,
             x + 1.6
         ),
-        "first and last press; numbers count the presses of the first repetition, in their order",
+        "first and last press; numbers: order of the first repetition",
     );
     if sync.clone().next().is_some() {
         line(
@@ -191,12 +191,12 @@ pub fn path_svg(plan: &Plan, around: &Surroundings) -> String {
 
 /// Colours by role; the dark set follows the viewer's preference.
 const STYLE: &str = "<style>\n\
-.paper{fill:#ffffff}.skin{fill:#f3efe6;stroke:#5d5648;stroke-width:.5}.grid{stroke:#cfd4da;stroke-width:.15}\n\
+.paper{fill:#ffffff}.skin{fill:#f3efe6;stroke:#5d5648;stroke-width:.5}.grid{stroke:#8894a0;stroke-opacity:.35;stroke-width:.15}\n\
 .axis,.legend{font:2.6px sans-serif;fill:#3c434b}.number{font-family:sans-serif;fill:#1f2933}\n\
 .path{fill:none;stroke:#2b6cb0;stroke-width:.3;stroke-linejoin:round}.press{fill:#2b6cb0}.first{fill:#1c7c54}.last{fill:#b83227}\n\
 .sync{stroke:#8a3ffc;stroke-width:.6;fill:none}.keepout{fill:#b8322733;stroke:#b83227;stroke-width:.3}\n\
 .margin{fill:#b832271a;stroke:#b832271a;stroke-linejoin:round}\n\
-@media (prefers-color-scheme: dark){.paper{fill:#15181c}.skin{fill:#262b31;stroke:#a79f8d}.grid{stroke:#3a424b}\n\
+@media (prefers-color-scheme: dark){.paper{fill:#15181c}.skin{fill:#262b31;stroke:#a79f8d}\n\
 .axis,.legend{fill:#c3cad2}.number{fill:#e6ebf0}.path{stroke:#6fb1f0}.press{fill:#6fb1f0}.first{fill:#58c896}.last{fill:#ff8577}\n\
 .sync{stroke:#b794ff}.keepout{stroke:#ff8577}}\n\
 </style>";
@@ -304,7 +304,7 @@ fn closest_pair_mm(visits: &[Point2]) -> f64 {
 fn legend_text(plan: &Plan, locations: usize) -> String {
     let s = plan.summary();
     format!(
-        "{locations} locations, {} repetitions, {} presses in all; skin seen from above",
+        "{locations} locations, {} repetitions, {} presses; seen from above",
         s.repetitions,
         plan.presses.len()
     )

@@ -12,6 +12,8 @@ use crate::source::Span;
 pub(crate) const LARGEST_TEXT: usize = 4 << 20;
 /// Deepest accepted nesting. Protocols need six levels.
 const DEEPEST: usize = 32;
+/// Most keys of one mapping; the largest of a protocol has about twenty.
+const MOST_KEYS: usize = 200;
 
 /// A value and where it stands.
 #[derive(Debug, Clone)]
@@ -263,6 +265,12 @@ impl<'a> Reader<'a, '_> {
             let value = self.node(event, at)?;
             let path = self.here();
             self.path.pop();
+            if entries.len() >= MOST_KEYS {
+                self.collector
+                    .error(key.span, path, "too many keys")
+                    .expected(format!("at most {MOST_KEYS} keys in one mapping"));
+                return None;
+            }
             if let Some(first) = entries.iter().find(|e| e.key == text) {
                 let line = self.collector.sources.locate(first.key_span).line;
                 self.collector

@@ -1,0 +1,295 @@
+//! From fields to a protocol: what single keys cannot say, checked across keys.
+
+mod parts;
+mod path;
+mod settings;
+
+use std::path::Path;
+
+use sha2::{Digest, Sha256};
+use skinrig_model::HostDuration;
+use skinrig_model::pulse::{MAX_MARKED_PRESS, PULSE_PERIOD_US, PULSES_PER_TRAIN};
+
+use crate::diagnostic::{Collector, Diagnostics};
+use crate::keys::PROTOCOL;
+use crate::protocol::{Loader, Protocol, Prototype, Sync};
+use crate::read::read_table;
+use crate::shape::{Field, Table};
+use crate::source::{Sources, Span};
+use crate::timing;
+use crate::yaml;
+pub(crate) use parts::{calibration_possible, outline, roles};
+use parts::{camera, depths, marks, read_limits, read_motion, read_sync, scene, surroundings};
+pub(crate) use settings::analysis;
+
+/// Decodes a file, applies overrides and reads it by its table. `Err` only when there is nothing to go on with.
+pub(crate) fn open(
+    name: &str,
+    bytes: &[u8],
+    overrides: &[String],
+    table: &'static Table,
+) -> Result<(Collector, Option<Field>), Diagnostics> {
+    let mut sources = Sources::default();
+    let text = match yaml::decode(bytes) {
+        Ok(text) => text,
+        Err((at, found)) => {
+            let start = at.saturating_sub(200);
+            let valid = bytes.get(..at).unwrap_or(&[]);
+            let text = String::from_utf8_lossy(valid);
+            let source = sources.add(name, text.clone());
+            let mut out = Collector::new(sources);
+            let span = Span::new(source, text.len().max(start), text.len());
+            let limit = yaml::LARGEST_TEXT;
+            if bytes.len() > limit {
+                out.error(span, "", "the file is too large")
+                    .expected(format!("at most {limit} bytes"))
+                    .found(found);
+            } else {
+                let utf16 = bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]);
+                let help = if utf16 {
+                    "the file seems to be UTF-16; save it as UTF-8"
+                } else {
+                    "save the file as UTF-8"
+                };
+                out.error(span, "", "not UTF-8 text")
+                    .expected("UTF-8 text")
+                    .found(found)
+                    .help(help);
+            }
+            return Err(out.finish());
+        }
+    };
+    let source = sources.add(name, text);
+    let mut out = Collector::new(sources);
+    let Some(mut root) = yaml::parse(&mut out, source) else {
+        return Err(out.finish());
+    };
+    if matches!(root.kind, yaml::Kind::Null) && out.is_clean() {
+        out.error(root.span, "", "the file is empty")
+            .expected(format!("a {}", table.name))
+            .help("begin with `skinrig: 1`, or copy one of the shipped files");
+        return Err(out.finish());
+    }
+    crate::overrides::apply(&mut root, table, overrides, &mut out);
+    let field = read_table(&root, table, "", &mut out);
+    Ok((out, field))
+}
+
+/// Reads a protocol; see [`Protocol::parse`].
+pub(crate) fn protocol(
+    name: &str,
+    bytes: &[u8],
+    overrides: &[String],
+    loader: Loader<'_>,
+) -> Result<Protocol, Diagnostics> {
+    let (mut out, root) = open(name, bytes, overrides, &PROTOCOL)?;
+    let folder = Path::new(name).parent().unwrap_or(Path::new(""));
+    let mut protocol = root.and_then(|root| {
+        let protocol = assemble(&root, folder, loader, &mut out)?;
+        if out.is_clean() {
+            check_timing(&protocol, &root, &mut out);
+        }
+        Some(protocol)
+    });
+    match (&mut protocol, out.is_clean()) {
+        (Some(protocol), true) => {
+            protocol.file_name = name.to_owned();
+            protocol.text = String::from_utf8_lossy(bytes).into_owned();
+            protocol.sha256 = hex(&Sha256::digest(bytes));
+            protocol.overrides = overrides.to_vec();
+        }
+        (None, true) => {
+            let span = Span::default();
+            out.error(span, "", "the file could not be understood")
+                .help("this is a defect of skinrig; please report it with the file");
+        }
+        _ => {}
+    }
+    match protocol {
+        Some(protocol) if out.is_clean() => Ok(protocol),
+        _ => Err(out.finish()),
+    }
+}
+
+/// Lower-case hex.
+pub(crate) fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|b| format!("{b:02x}")).collect()
+}
+
+/// Every part is read even when another one failed, so that all findings appear at once.
+fn assemble(
+    root: &Field,
+    folder: &Path,
+    loader: Loader<'_>,
+    out: &mut Collector,
+) -> Option<Protocol> {
+    let seed = root.whole("seed").map(i64::unsigned_abs);
+    let scene = root.get("scene").and_then(|f| scene(f, out));
+    let surroundings = root.get("frame").and_then(|f| surroundings(f, out));
+    let limits = root.get("limits");
+    let max_depth = limits.and_then(|l| l.quantity("max_depth"));
+    let depths = depths(root, max_depth, out);
+    let motion = root.get("motion");
+    let clearance = motion.and_then(|m| m.quantity("clearance"));
+    let motion_read = motion.and_then(|m| {
+        read_motion(
+            m,
+            limits,
+            clearance,
+            depths.as_deref(),
+            surroundings.as_ref(),
+            out,
+        )
+    });
+    let limits_read = limits.and_then(|l| read_limits(l, motion, out));
+    let path = root.get("path").and_then(|f| {
+        path::locations(
+            f,
+            surroundings.as_ref(),
+            seed.unwrap_or(1),
+            folder,
+            loader,
+            out,
+        )
+    });
+    let sync = root
+        .get("sync")
+        .map(|f| read_sync(f, surroundings.as_ref(), depths.as_deref(), max_depth, out));
+    let repetitions = root.get("repetitions");
+    let count = repetitions.and_then(|r| r.count("count"));
+    let roles = root
+        .get("evaluation")
+        .zip(count)
+        .and_then(|(e, count)| roles(e, count, out));
+    let analysis = root.get("analysis").and_then(|f| analysis(f, out));
+    if let (Some(roles), Some(analysis), Some(field)) = (&roles, &analysis, root.get("evaluation"))
+    {
+        calibration_possible(roles, analysis, field, out);
+    }
+    let marks = root.get("triggers").and_then(|f| marks(f, out));
+    let between = repetitions.and_then(|r| r.get("between"));
+    let cameras = root.get("cameras").map(|f| {
+        ["camera1", "camera2"].map(|key| f.get(key).map(|c| camera(c, out)).unwrap_or_default())
+    });
+    let prototype = root.get("prototype").and_then(|p| {
+        Some(Prototype {
+            id: p.text("id")?,
+            description: p.text("description"),
+            tip: p.text("tip"),
+        })
+    });
+    let order = root.get("order")?;
+    let shuffle_seed = order
+        .get("shuffled")
+        .map(|s| s.whole("seed").map(i64::unsigned_abs).or(seed).unwrap_or(1));
+    let (path_kind, locations) = path?;
+    let (depths, roles, sync) = (depths?, roles?, sync.map_or(Some(None), |s| s.map(Some))?);
+    let presses = locations.len() as u64 * depths.len() as u64 * roles.len() as u64
+        + sync.as_ref().map_or(0, |s: &Sync| u64::from(s.count));
+    if presses > u64::from(MAX_MARKED_PRESS) + 1 {
+        let span = root.get("path").map_or(root.span, |f| f.span);
+        out.error(span, "path", "too many presses")
+            .expected(format!(
+                "at most {} presses in all",
+                u64::from(MAX_MARKED_PRESS) + 1
+            ))
+            .found(format!("{presses}"))
+            .help("split the campaign into several protocols");
+        return None;
+    }
+    Some(Protocol {
+        file_name: String::new(),
+        text: String::new(),
+        sha256: String::new(),
+        overrides: Vec::new(),
+        name: root.text("name")?,
+        description: root.text("description"),
+        operator: root.text("operator")?,
+        prototype: prototype?,
+        seed: seed?,
+        scene: scene?,
+        surroundings: surroundings?,
+        sync,
+        locations,
+        path_kind,
+        roles,
+        return_to_start: between?.flag("return_to_start")?,
+        pause_between: seconds(between?.quantity("pause")?),
+        shuffle_seed,
+        depths_mm: depths,
+        motion: motion_read?,
+        limits: limits_read?,
+        marks: marks?,
+        analysis: analysis?,
+        cameras: cameras?,
+    })
+}
+
+pub(crate) fn seconds(s: f64) -> HostDuration {
+    HostDuration::from_secs_f64(s)
+}
+
+/// Whether everything fits into its period, and marks do not overlap. Needs the plan.
+fn check_timing(protocol: &Protocol, root: &Field, out: &mut Collector) {
+    let at = |path: &[&str]| {
+        path.iter()
+            .try_fold(root, |f, key| f.get(key))
+            .map_or(root.span, |f| f.span)
+    };
+    let plan = protocol.compile();
+    if let Some(late) = timing::first_misfit(&plan) {
+        let (path, span, key) = if late.sync {
+            (
+                "sync.interval",
+                at(&["sync", "interval"]),
+                "sync presses begin",
+            )
+        } else {
+            ("motion.period", at(&["motion", "period"]), "presses begin")
+        };
+        out.error(span, path, "the presses do not fit into their time")
+            .expected(format!(
+                "at least {:.3} s: what {} takes with {:.0} % in reserve (motion {:.3} s, hold and settling {:.3} s, travel to the next {:.3} s)",
+                late.needed_s,
+                late.press,
+                (timing::FIT_RESERVE - 1.0) * 100.0,
+                late.motion_s,
+                late.still_s,
+                late.travel_s
+            ))
+            .found(format!("{key} every {:.3} s", late.period_s))
+            .help("lengthen it, move faster, or lower `motion.clearance` or `motion.hold`");
+    }
+    let train_s = (PULSES_PER_TRAIN * PULSE_PERIOD_US) as f64 * 1e-6;
+    for press in timing::distinct_presses(&plan) {
+        let moments = timing::moments_s(&plan.limits, press);
+        let chosen: Vec<_> = press
+            .marks
+            .iter()
+            .filter_map(|m| moments.iter().find(|(k, _)| k == m))
+            .collect();
+        for pair in chosen.windows(2) {
+            if let [(a, from), (b, to)] = pair
+                && to - from < train_s
+            {
+                out.error(
+                    at(&["triggers", "marks"]),
+                    "triggers.marks",
+                    "two marks overlap",
+                )
+                .expected(format!(
+                    "at least {:.1} ms between marks, the length of a coded pulse",
+                    train_s * 1e3
+                ))
+                .found(format!(
+                    "{:.1} ms from `{}` to `{}`",
+                    (to - from) * 1e3,
+                    a.name(),
+                    b.name()
+                ))
+                .help("remove one of the two marks, or move more slowly between them");
+                return;
+            }
+        }
+    }
+}
