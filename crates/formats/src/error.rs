@@ -81,6 +81,45 @@ pub enum FormatsError {
         /// What is there.
         found: String,
     },
+    /// A line of a RAW header.
+    #[error(
+        "{}: header, byte {offset}, key `{key}`: expected {expected}, found {found}",
+        path.display()
+    )]
+    Header {
+        /// The file.
+        path: PathBuf,
+        /// Where the line begins, bytes; the header's end for what is missing.
+        offset: u64,
+        /// The key; empty when the line has none.
+        key: String,
+        /// What was needed.
+        expected: String,
+        /// What is there.
+        found: String,
+    },
+    /// A key or value that a RAW header cannot hold.
+    #[error(
+        "header key `{key}`: expected a key of its own without spaces, and text in one line, found {value:?}"
+    )]
+    HeaderValue {
+        /// The key.
+        key: String,
+        /// The value.
+        value: String,
+    },
+    /// A line of a table.
+    #[error("{}:{line}: expected {expected}, found {found}", path.display())]
+    Table {
+        /// The file.
+        path: PathBuf,
+        /// The line, 1 for the first.
+        line: u64,
+        /// What was needed.
+        expected: String,
+        /// What is there.
+        found: String,
+    },
 }
 
 impl FormatsError {

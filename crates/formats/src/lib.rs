@@ -6,6 +6,8 @@
 
 pub mod error;
 pub mod hdf5;
+pub mod positions;
+pub mod raw;
 pub mod stream;
 
 pub use error::FormatsError;

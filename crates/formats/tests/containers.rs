@@ -1,4 +1,5 @@
 //! bimvee containers: fixtures of three hickle versions, what the writer makes, and bad files.
+#![expect(clippy::unwrap_used, reason = "tests")]
 
 use std::path::{Path, PathBuf};
 
@@ -102,9 +103,14 @@ fn several_dictionaries_need_a_choice() {
 fn a_shared_array_is_followed() {
     // y is the same object as x in that file, so rows reach 640.
     let path = fixture("hickle5-shared.hdf5");
-    let shared: Vec<_> = expected(0).into_iter().map(|e| CdEvent { y: e.x, ..e }).collect();
+    let shared: Vec<_> = expected(0)
+        .into_iter()
+        .map(|e| CdEvent { y: e.x, ..e })
+        .collect();
     assert_eq!(read_within(&path, None, Geometry::ANY).unwrap(), shared);
-    assert!(failure(&path, None).contains("dataset data/\"y\", row 13: expected 0..=479, found 481"));
+    assert!(
+        failure(&path, None).contains("dataset data/\"y\", row 13: expected 0..=479, found 481")
+    );
 }
 
 #[test]

@@ -1,0 +1,249 @@
+//! The text header of a RAW file, and what its keys mean.
+
+use std::path::Path;
+
+use skinrig_model::StreamFormat;
+
+use crate::error::FormatsError;
+use crate::stream::Geometry;
+
+/// No header line is longer, bytes; a longer one is not a header.
+const MAX_LINE: usize = 1024;
+/// No header has more lines.
+const MAX_LINES: usize = 255;
+/// No header is longer, bytes.
+pub(super) const MAX_HEADER: usize = (MAX_LINES + 1) * (MAX_LINE + 2);
+
+/// A parsed header.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct RawHeader {
+    /// All keys and values in file order, unknown ones included. Runs of spaces in values are single spaces.
+    pub entries: Vec<(String, String)>,
+    /// True when the header ends with `% end`.
+    pub has_end: bool,
+    /// Bytes of the header: where the words begin.
+    pub length: u64,
+    /// How the words encode events.
+    pub format: StreamFormat,
+    /// The sensor's size: as stated, or known from the camera's system ID; `None` when neither is there.
+    pub geometry: Option<Geometry>,
+}
+
+/// What a header says besides its entries, while it is being read.
+#[derive(Default)]
+struct Meaning {
+    format: Option<String>,
+    evt: Option<String>,
+    legacy_order: Option<bool>,
+    width: Option<u16>,
+    height: Option<u16>,
+    system_id: Option<u32>,
+    prophesee: bool,
+}
+
+impl RawHeader {
+    /// Parses the header at the beginning of `bytes`, which must hold all of it, or the whole file.
+    ///
+    /// # Errors
+    /// [`FormatsError::Header`] with byte offset and key: no header, text that is not UTF-8, numbers that are
+    /// none, keys that contradict each other, or no statement of the format.
+    pub fn parse(bytes: &[u8], path: &Path) -> Result<Self, FormatsError> {
+        let mut entries = Vec::new();
+        let mut meaning = Meaning::default();
+        let (mut at, mut has_end) = (0, false);
+        while !has_end && bytes[at..].starts_with(b"% ") {
+            let error = |key: &str, expected: &str, found: &str| FormatsError::Header {
+                path: path.into(),
+                offset: at as u64,
+                key: key.into(),
+                expected: expected.into(),
+                found: found.into(),
+            };
+            let line = &bytes[at + 2..];
+            let line = &line[..line.len().min(MAX_LINE)];
+            let Some(length) = line.iter().position(|b| *b == b'\n') else {
+                let expected = format!("a line of at most {MAX_LINE} bytes");
+                return Err(error("", &expected, "no end of line"));
+            };
+            let Ok(text) = std::str::from_utf8(&line[..length]) else {
+                let found = String::from_utf8_lossy(&line[..length.min(40)]);
+                return Err(error("", "text in UTF-8", &format!("{found:?}")));
+            };
+            let mut tokens = text.split_whitespace();
+            let Some(key) = tokens.next() else {
+                return Err(error("", "a key", "an empty line"));
+            };
+            let value = tokens.collect::<Vec<_>>().join(" ");
+            has_end = key == "end";
+            if !has_end {
+                if entries.len() == MAX_LINES {
+                    let expected = format!("at most {MAX_LINES} header lines");
+                    return Err(error(key, &expected, "more"));
+                }
+                meaning
+                    .take(key, &value)
+                    .map_err(|expected| error(key, &expected, &value))?;
+                entries.push((key.to_owned(), value));
+            }
+            at += 2 + length + 1;
+        }
+        let error = |key: &str, expected: &str, found: String| FormatsError::Header {
+            path: path.into(),
+            offset: at as u64,
+            key: key.into(),
+            expected: expected.into(),
+            found,
+        };
+        if at == 0 {
+            let start = String::from_utf8_lossy(&bytes[..bytes.len().min(8)]).into_owned();
+            return Err(error(
+                "",
+                "a header that begins with `% `",
+                format!("{start:?}"),
+            ));
+        }
+        let format = meaning.stream_format().map_err(|found| {
+            error(
+                "format",
+                "one of EVT2, EVT21, EVT3 in `format` or `evt`",
+                found,
+            )
+        })?;
+        Ok(Self {
+            geometry: meaning.geometry(),
+            entries,
+            has_end,
+            length: at as u64,
+            format,
+        })
+    }
+
+    /// The value of `key`, the last one when it occurs twice.
+    #[must_use]
+    pub fn get(&self, key: &str) -> Option<&str> {
+        let found = self.entries.iter().rev().find(|(k, _)| k == key);
+        found.map(|(_, value)| value.as_str())
+    }
+
+    /// The camera's serial number.
+    #[must_use]
+    pub fn serial_number(&self) -> Option<&str> {
+        self.get("serial_number")
+    }
+}
+
+impl Meaning {
+    /// Takes one entry; the error says what was expected.
+    fn take(&mut self, key: &str, value: &str) -> Result<(), String> {
+        match key {
+            "format" => {
+                let mut parts = value.split(';').map(str::trim);
+                self.format = parts.next().map(ToOwned::to_owned);
+                for option in parts.filter(|o| !o.is_empty()) {
+                    match option.split_once('=') {
+                        Some(("width", n)) => set_size(&mut self.width, n, "width")?,
+                        Some(("height", n)) => set_size(&mut self.height, n, "height")?,
+                        Some(("endianness", order)) => self.set_order(order)?,
+                        Some(_) => {}
+                        None => return Err("options of the form name=value".into()),
+                    }
+                }
+            }
+            "evt" => self.evt = Some(value.to_owned()),
+            "endianness" => self.set_order(value)?,
+            "geometry" => {
+                let Some((width, height)) = value.split_once('x') else {
+                    return Err("WIDTHxHEIGHT".into());
+                };
+                set_size(&mut self.width, width, "width")?;
+                set_size(&mut self.height, height, "height")?;
+            }
+            "system_ID" => {
+                let id = value.parse().map_err(|_| "a decimal number")?;
+                self.system_id = Some(id);
+            }
+            "integrator_name" | "camera_integrator_name" => {
+                self.prophesee |= value.eq_ignore_ascii_case("prophesee");
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn set_order(&mut self, order: &str) -> Result<(), String> {
+        let legacy = match order {
+            "legacy" => true,
+            "little" => false,
+            _ => return Err("endianness little or legacy".into()),
+        };
+        if self.legacy_order.is_some_and(|stated| stated != legacy) {
+            return Err("the endianness that the header states elsewhere".into());
+        }
+        self.legacy_order = Some(legacy);
+        Ok(())
+    }
+
+    fn stream_format(&self) -> Result<StreamFormat, String> {
+        // System IDs (EVK1 reference, sections 1.1 and 4.4): 28 EVK1 Gen3.1, 35 and 40 EVK3 Gen3.1.
+        let by_camera = match self.system_id {
+            Some(28 | 35) => Some("2.0"),
+            Some(40) => Some("3.0"),
+            _ => None,
+        };
+        let by_format = match self.format.as_deref() {
+            None => None,
+            Some("EVT2") => Some("2.0"),
+            Some("EVT21") => Some("2.1"),
+            Some("EVT3") => Some("3.0"),
+            Some(other) => return Err(format!("format `{other}`")),
+        };
+        let version = match (by_format, self.evt.as_deref()) {
+            (Some(format), Some(evt)) if format != evt => {
+                let name = self.format.as_deref().unwrap_or_default();
+                return Err(format!("format `{name}` and evt `{evt}`"));
+            }
+            (Some(version), _) | (None, Some(version)) => Some(version),
+            (None, None) => by_camera,
+        };
+        match version {
+            Some("2.0") => Ok(StreamFormat::Evt2),
+            Some("3.0") => Ok(StreamFormat::Evt3),
+            Some("2.1") => {
+                // Without a statement, the vendor's cameras below this system ID used the older order.
+                let old_camera = self.prophesee && self.system_id.is_some_and(|id| id < 0x37);
+                Ok(if self.legacy_order.unwrap_or(old_camera) {
+                    StreamFormat::Evt21Legacy
+                } else {
+                    StreamFormat::Evt21
+                })
+            }
+            Some(other) => Err(format!("evt `{other}`")),
+            None => Err("neither key, and no system_ID that implies it".into()),
+        }
+    }
+
+    fn geometry(&self) -> Option<Geometry> {
+        match (self.width, self.height, self.system_id) {
+            (Some(width), Some(height), _) => Some(Geometry { width, height }),
+            // Cameras with a Gen3.0 or Gen3.1 VGA sensor (EVK1 reference, section 1.1).
+            (None, None, Some(21 | 28 | 35 | 40 | 41)) => Some(Geometry::EVK1),
+            _ => None,
+        }
+    }
+}
+
+/// Takes a stated size, which must not contradict an earlier one.
+fn set_size(size: &mut Option<u16>, text: &str, what: &str) -> Result<(), String> {
+    let value = text
+        .trim()
+        .parse()
+        .ok()
+        .filter(|v| (1..=2048).contains(v))
+        .ok_or_else(|| format!("a {what} in 1..=2048"))?;
+    match size.replace(value) {
+        Some(stated) if stated != value => {
+            Err(format!("{what} {stated} as stated elsewhere in the header"))
+        }
+        _ => Ok(()),
+    }
+}
