@@ -9,6 +9,7 @@
 //!
 //! Hooks for browser tests: every section, figure, button and the press table carries a `data-testid`.
 
+pub mod axes;
 pub mod colour;
 pub mod derive;
 pub mod figures;

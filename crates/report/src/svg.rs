@@ -1,10 +1,10 @@
-//! Owns the writing of SVG: elements with escaped attributes and text, linear axes with readable ticks.
+//! Owns the writing of SVG: elements with escaped attributes and text.
 //!
 //! Why not a plotting crate: figures must follow the page's light and dark theme, so every colour that
 //! means "ink", "grid" or "camera 1" is a CSS class (`assets/figure.css`), not a baked-in value; each figure
 //! needs a title, a description and one element per press that a script can find; and a page of 2,500
 //! presses must stay small. Plotting crates bake colours in, and write neither. What is left is little:
-//! elements, two scales, ticks.
+//! elements here, scales and ticks in [`crate::axes`].
 
 use std::fmt::{self, Display, Write};
 
@@ -196,147 +196,6 @@ pub fn dots(points: impl IntoIterator<Item = (f64, f64)>) -> String {
     d
 }
 
-/// Tick positions at 1, 2 or 5 times a power of ten inside `low..=high`, about `wanted` of them; none for 0.
-#[must_use]
-pub fn ticks(low: f64, high: f64, wanted: u32) -> Vec<f64> {
-    let span = high - low;
-    if wanted == 0 || !(span.is_finite() && span > 0.0) {
-        return vec![];
-    }
-    let raw = span / f64::from(wanted);
-    let power = 10f64.powf(raw.log10().floor());
-    let step = [1.0, 2.0, 5.0, 10.0]
-        .into_iter()
-        .map(|m| m * power)
-        .find(|s| *s >= raw * 0.999)
-        .unwrap_or(10.0 * power);
-    let first = (low / step - 1e-9).ceil() as i64;
-    let last = (high / step + 1e-9).floor() as i64;
-    (first..=last).map(|k| k as f64 * step).collect()
-}
-
-/// Writes a tick with as many decimals as the distance `step` between ticks needs.
-#[must_use]
-pub fn tick_label(value: f64, step: f64) -> String {
-    let digits = if step > 0.0 {
-        (-step.log10().floor()).max(0.0) as usize
-    } else {
-        0
-    };
-    crate::format::number(Some(value), digits.min(9))
-}
-
-/// A linear map from data to pixels along one axis.
-#[derive(Debug, Clone, Copy)]
-pub struct Scale {
-    /// Data range; never empty.
-    pub data: (f64, f64),
-    /// Pixel range; may run backwards.
-    pub px: (f64, f64),
-}
-
-impl Scale {
-    /// The map of `data` onto `px`. An empty or non-finite data range is widened to one unit.
-    #[must_use]
-    pub fn new(data: (f64, f64), px: (f64, f64)) -> Self {
-        let (mut low, mut high) = data;
-        if !(low.is_finite() && high.is_finite()) {
-            (low, high) = (0.0, 1.0);
-        }
-        if high <= low {
-            high = low + 1.0;
-        }
-        Self {
-            data: (low, high),
-            px,
-        }
-    }
-
-    /// Pixel position of `value`.
-    #[must_use]
-    pub fn at(&self, value: f64) -> f64 {
-        let share = (value - self.data.0) / (self.data.1 - self.data.0);
-        self.px.0 + share * (self.px.1 - self.px.0)
-    }
-
-    /// Pixels per data unit, positive.
-    #[must_use]
-    pub fn per_unit(&self) -> f64 {
-        ((self.px.1 - self.px.0) / (self.data.1 - self.data.0)).abs()
-    }
-}
-
-/// Two scales with labels.
-#[derive(Debug, Clone)]
-pub struct Axes {
-    /// Horizontal.
-    pub x: Scale,
-    /// Vertical (pixels run downwards).
-    pub y: Scale,
-    /// Label below, with unit.
-    pub x_label: String,
-    /// Label at the left, with unit.
-    pub y_label: String,
-    /// About how many ticks (x, y).
-    pub tick_count: (u32, u32),
-}
-
-impl Axes {
-    /// Draws grid, ticks and labels.
-    pub fn draw(&self, svg: &mut Svg) {
-        let (left, right) = (self.x.px.0.min(self.x.px.1), self.x.px.0.max(self.x.px.1));
-        let (top, bottom) = (self.y.px.0.min(self.y.px.1), self.y.px.0.max(self.y.px.1));
-        svg.open("g", &[("class", &"axes")]);
-        let xs = ticks(self.x.data.0, self.x.data.1, self.tick_count.0);
-        let ys = ticks(self.y.data.0, self.y.data.1, self.tick_count.1);
-        let step = |v: &[f64]| if v.len() > 1 { v[1] - v[0] } else { 1.0 };
-        svg.open("g", &[("class", &"x-ticks")]);
-        for &t in &xs {
-            let x = self.x.at(t);
-            svg.line("grid", (x, top), (x, bottom));
-            svg.text(
-                (x, bottom + 16.0),
-                "tick",
-                "middle",
-                &tick_label(t, step(&xs)),
-            );
-        }
-        svg.close();
-        for &t in &ys {
-            let y = self.y.at(t);
-            svg.line("grid", (left, y), (right, y));
-            svg.text(
-                (left - 7.0, y + 4.0),
-                "tick",
-                "end",
-                &tick_label(t, step(&ys)),
-            );
-        }
-        svg.line("axis", (left, bottom), (right, bottom));
-        svg.line("axis", (left, top), (left, bottom));
-        svg.text(
-            ((left + right) / 2.0, bottom + 36.0),
-            "label",
-            "middle",
-            &self.x_label,
-        );
-        let (x, y) = (left - 46.0, (top + bottom) / 2.0);
-        svg.holding(
-            "text",
-            &[
-                ("class", &"label"),
-                ("text-anchor", &"middle"),
-                (
-                    "transform",
-                    &format_args!("translate({} {}) rotate(-90)", Px(x), Px(y)),
-                ),
-            ],
-            &self.y_label,
-        );
-        svg.close();
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -354,25 +213,8 @@ mod tests {
     }
 
     #[test]
-    fn ticks_are_round_and_inside() {
-        assert_eq!(ticks(0.0, 10.0, 5), [0.0, 2.0, 4.0, 6.0, 8.0, 10.0]);
-        assert_eq!(ticks(-0.3, 0.3, 4), [-0.2, 0.0, 0.2]);
-        assert!(ticks(1.0, 1.0, 4).is_empty());
-        assert!(ticks(f64::NAN, 1.0, 4).is_empty());
-        assert_eq!(tick_label(0.2, 0.2), "0.2");
-        assert_eq!(tick_label(20.0, 20.0), "20");
-        assert_eq!(tick_label(0.25, 0.05), "0.25");
-    }
-
-    #[test]
     fn plain_css_needs_no_variables() {
         assert!(FIGURE_CSS.contains("var(--ink)"));
         assert!(!plain_css().contains("var("), "{}", plain_css());
-    }
-
-    #[test]
-    fn an_empty_range_still_maps() {
-        assert!(Scale::new((2.0, 2.0), (0.0, 10.0)).at(2.0).is_finite());
-        assert!(Scale::new((f64::NAN, 2.0), (0.0, 10.0)).at(2.0).is_finite());
     }
 }

@@ -2,7 +2,8 @@
 
 use super::{Canvas, Figure};
 use crate::ReportInput;
-use crate::svg::{Axes, Scale, dots};
+use crate::axes::{Axes, Scale};
+use crate::svg::dots;
 use skinrig_model::SENSOR_WIDTH;
 
 /// Centroid column of every press against its number, one panel per camera (as the paper's figure

@@ -2,9 +2,10 @@
 
 use super::{Canvas, Figure, nice_above};
 use crate::ReportInput;
+use crate::axes::{Axes, Scale, tick_label};
 use crate::derive;
 use crate::format::number;
-use crate::svg::{Axes, Px, Scale, Svg, dots, tick_label};
+use crate::svg::{Px, Svg, dots};
 
 /// Histogram and cumulative distribution of the Euclidean error, with median, RMSE and 95th percentile.
 #[must_use]

@@ -5,6 +5,7 @@ mod errors;
 mod map;
 mod pictures;
 mod rates;
+mod skin;
 
 pub use centroids::centroid_tracks;
 pub use errors::{error_distribution, error_scatter};

@@ -7,7 +7,8 @@ use skinrig_model::SENSOR_WIDTH;
 
 use super::{Canvas, Figure};
 use crate::ReportInput;
-use crate::svg::{Px, tick_label};
+use crate::axes::tick_label;
+use crate::svg::Px;
 
 /// Pixels that saw mostly ON or mostly OFF events, one strip per press and camera; pixels outside the
 /// cluster are pale. `None` without any picture.

@@ -6,8 +6,9 @@ use skinrig_analysis::result::{RateSeries, RateZoom};
 
 use super::{Canvas, Figure, nice_above};
 use crate::ReportInput;
+use crate::axes::{Axes, Scale};
 use crate::format::number;
-use crate::svg::{Axes, Px, Scale, polyline};
+use crate::svg::{Px, polyline};
 
 /// A readable unit for rates up to `most` events per second: divisor and name.
 fn unit(most: f64) -> (f64, &'static str) {
