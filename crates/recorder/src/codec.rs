@@ -264,7 +264,7 @@ mod tests {
             0x8000_0009,
             0x8000_000A,
         ]);
-        let folded = bytes([0x8000_0007, 0xB000_0002, 0x0000_0001, 0xB500_0002]);
+        let folded = bytes([0x8000_0007, 0xB000_0002, 0x0000_0001, 0xB100_0002]);
         assert_eq!(
             unfold(&bytes([0x8000_0007, 0xB000_0002]), 12).unwrap(),
             raw[..12]

@@ -1,0 +1,261 @@
+//! A small session of every kind of record, and a scanner that knows just enough EVT2.
+
+use std::path::Path;
+
+use sha2::{Digest, Sha256};
+use skinrig_model::press::PressRole;
+use skinrig_model::*;
+use skinrig_recorder::{ChunkScanner, Sealed, SessionWriter};
+
+/// EVT2 without wraps: enough to recompute facts.
+#[derive(Default)]
+pub struct Evt2 {
+    base: [Option<u64>; 2],
+}
+
+impl ChunkScanner for Evt2 {
+    fn scan(
+        &mut self,
+        camera: CameraId,
+        _format: StreamFormat,
+        bytes: &[u8],
+    ) -> (ChunkFacts, Vec<TriggerEdge>) {
+        let base = &mut self.base[camera.index()];
+        let (mut facts, mut edges) = (ChunkFacts::default(), Vec::new());
+        for word in bytes.as_chunks::<4>().0 {
+            let w = u32::from_le_bytes(*word);
+            if w >> 28 == 8 {
+                *base = Some(u64::from(w & 0x0FFF_FFFF) << 6);
+            }
+            let Some(base) = *base else { continue };
+            let t = if w >> 28 == 8 {
+                base
+            } else {
+                base | u64::from(w >> 22 & 63)
+            };
+            match w >> 28 {
+                8 => {}
+                kind @ (0 | 1) => {
+                    facts.cd_events += 1;
+                    facts.on_events += u64::from(kind);
+                }
+                0xA => {
+                    facts.trigger_edges += 1;
+                    let (channel, rising) = ((w >> 8 & 31) as u8, w & 1 == 1);
+                    edges.push(TriggerEdge {
+                        t_us: t,
+                        channel,
+                        rising,
+                    });
+                }
+                _ => continue,
+            }
+            facts.first_us.get_or_insert(t);
+            facts.last_us = Some(t);
+        }
+        (facts, edges)
+    }
+}
+
+pub const ALIGNMENT_US: u64 = 5_000_000;
+
+/// 20 ms of one camera from `t0_us` on: a time word every 16 µs, an event now and then, a trigger pulse.
+pub fn stream(t0_us: u64, events: u64) -> Vec<u8> {
+    let mut words = Vec::new();
+    for k in 0..1250u64 {
+        let t = t0_us + 16 * k;
+        words.push(0x8000_0000 | (t >> 6) as u32);
+        if events > 0 && k % (1250 / events).max(1) == 0 {
+            let (x, y) = ((k % 640) as u32, (k % 480) as u32);
+            words.push(((k % 2) as u32) << 28 | ((t & 63) as u32) << 22 | x << 11 | y);
+        }
+        if k == 100 || k == 110 {
+            words.push(0xA << 28 | ((t & 63) as u32) << 22 | u32::from(k == 100));
+        }
+    }
+    words.into_iter().flat_map(u32::to_le_bytes).collect()
+}
+
+pub fn sha(text: &str) -> String {
+    Sha256::digest(text.as_bytes())
+        .iter()
+        .map(|b| format!("{b:02x}"))
+        .collect()
+}
+
+pub fn header(presses: u32) -> RunHeader {
+    let (protocol, plan) = ("name: test # äöü\n", "{\"version\":1}");
+    RunHeader {
+        protocol_text: protocol.into(),
+        protocol_name: "test.yaml".into(),
+        protocol_sha256: sha(protocol),
+        overrides: vec!["path.pitch=6 mm".into(), "a=\"b\"".into()],
+        plan_json: plan.into(),
+        plan_sha256: sha(plan),
+        seed: u64::MAX,
+        rig_kind: "simulated".into(),
+        rig_name: "simulated (test)".into(),
+        rig_json: "{}".into(),
+        robot_from_skin: RigidTransform::new(
+            [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]],
+            [0.1, 1.0 / 3.0, -7.0],
+        ),
+        stream_formats: [StreamFormat::Evt2; 2],
+        prototype: "P1".into(),
+        operator: "tester".into(),
+        started_at: "2026-01-02T03:04:05Z".into(),
+        host: "bench".into(),
+        software: "0.1.0".into(),
+        command_line: "skinrig run".into(),
+        presses: (0..presses)
+            .map(|i| PlannedPress {
+                id: PressId(i),
+                role: if i == 0 {
+                    PressRole::Sync
+                } else {
+                    PressRole::Score
+                },
+                repetition: 0,
+                location: i.saturating_sub(1),
+                at: Point2::new(f64::from(i) * 0.1, -4.0),
+                depth_mm: 2.0,
+            })
+            .collect(),
+    }
+}
+
+pub fn outcome(attempt: AttemptId, t: i64, verdict: PressVerdict) -> PressOutcome {
+    let at = |ms: i64| HostTime(t + ms * 1_000_000);
+    PressOutcome {
+        attempt,
+        verdict,
+        timing: Some(PressTiming {
+            approach: at(1),
+            contact: at(4),
+            at_depth: at(8),
+            retract: at(12),
+            release: at(15),
+            clear: at(19),
+        }),
+        measured_at: Some(Point2::new(1.0 / 3.0, -4.0)),
+        measured_depth_mm: Some(1.99),
+        peak_force_n: None,
+        scheduled: false,
+    }
+}
+
+/// All records of a run of `presses` presses of 20 ms each; the last but one needs two attempts, the last is missed.
+pub fn records(presses: u32) -> Vec<Record> {
+    let mut out = vec![Record::Started(Box::new(header(presses)))];
+    let mut scanner = Evt2::default();
+    for (role, setting) in [
+        (DeviceRole::Indenter, "speed"),
+        (DeviceRole::Camera1, "bias_fo"),
+    ] {
+        out.push(Record::Device {
+            role,
+            identity: DeviceIdentity {
+                model: "simulated".into(),
+                serial: "1".into(),
+                firmware: "2".into(),
+            },
+            settings: vec![Setting {
+                name: setting.into(),
+                requested: "5".into(),
+                read_back: "5".into(),
+            }],
+        });
+    }
+    let mut ids: Vec<AttemptId> = (0..presses - 1)
+        .map(|i| AttemptId {
+            press: PressId(i),
+            number: 1,
+        })
+        .collect();
+    ids.push(AttemptId {
+        press: PressId(presses - 2),
+        number: 2,
+    });
+    for (k, id) in (0u64..).zip(&ids) {
+        let t = HostTime(k as i64 * 20_000_000);
+        out.push(Record::Intent { attempt: *id, t });
+        let target = Point3::new(0.1, 0.2, 5.0);
+        out.push(Record::Command {
+            t,
+            command: MotionCommand {
+                target,
+                speed_mm_s: 20.0,
+            },
+        });
+        let mark = Mark {
+            kind: MarkKind::Contact,
+            press: id.press,
+        };
+        out.push(Record::MarkSent(SentMark {
+            mark,
+            t,
+            uncertainty_ns: 50,
+        }));
+        for camera in CameraId::ALL {
+            let bytes = stream(ALIGNMENT_US + k * 20_000, 5 + 300 * (k % 2));
+            let (facts, triggers) = scanner.scan(camera, StreamFormat::Evt2, &bytes);
+            out.push(Record::Chunk(RawChunk {
+                camera,
+                seq: k,
+                host_time: t + HostDuration::from_millis(20),
+                lost_before: if k == 2 && camera == CameraId::Two {
+                    12
+                } else {
+                    0
+                },
+                bytes,
+                facts,
+                triggers,
+            }));
+        }
+        out.push(Record::Poses(
+            (0..20)
+                .map(|ms| PoseSample {
+                    t: t + HostDuration::from_millis(ms),
+                    commanded: target,
+                    measured: Point3::new(0.1, 1.0 / 3.0, 5.0),
+                    force_n: f64::NAN,
+                })
+                .collect(),
+        ));
+        let verdict = match ids.get(k as usize + 1) {
+            Some(next) if next.press == id.press => PressVerdict::Invalid("not settled".into()),
+            _ => PressVerdict::Valid,
+        };
+        out.push(Record::Outcome(outcome(*id, t.0, verdict)));
+    }
+    let t = HostTime(ids.len() as i64 * 20_000_000);
+    out.push(Record::Interruption {
+        kind: InterruptionKind::Stop,
+        t,
+        reason: "operator".into(),
+    });
+    out.push(Record::Note {
+        t,
+        text: "tip cleaned".into(),
+    });
+    let last = AttemptId {
+        press: PressId(presses - 1),
+        number: 1,
+    };
+    out.push(Record::Missed(last, "stopped before it".into()));
+    out.push(Record::Ended {
+        t,
+        end: RunEnd::Stopped("operator".into()),
+    });
+    out
+}
+
+/// Records `presses` presses and seals the session.
+pub fn sealed(path: &Path, presses: u32) -> Sealed {
+    let mut writer = SessionWriter::create(path).unwrap();
+    for record in records(presses) {
+        writer.accept(record).unwrap();
+    }
+    writer.finish().unwrap()
+}

@@ -1,0 +1,100 @@
+//! Any changed byte of a sealed session is found, and nothing panics on damaged files.
+
+use std::path::Path;
+
+use crate::common::{Evt2, sealed};
+use skinrig_model::{CameraId, HostTime};
+use skinrig_recorder::{SessionReader, list, verify};
+
+/// Reads all that a reader can read; errors are fine.
+fn read_all(path: &Path) {
+    let Ok(reader) = SessionReader::open(path) else {
+        return;
+    };
+    let _ = (
+        reader.header(),
+        reader.devices(),
+        reader.presses(),
+        reader.marks_sent(),
+    );
+    let _ = (
+        reader.commands(),
+        reader.notes(),
+        reader.interruptions(),
+        reader.end(),
+        reader.totals(),
+    );
+    let _ = reader.poses(HostTime(i64::MIN), HostTime(i64::MAX));
+    for camera in CameraId::ALL {
+        let _ = (reader.trigger_edges(camera), reader.gaps(camera));
+        let _ = reader.for_each_chunk(camera, 0, |_, _| {});
+    }
+}
+
+fn check(original: &[u8], offsets: impl Iterator<Item = usize>, bit: impl Fn(usize) -> u8) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("x.session.sqlite");
+    let mut bytes = original.to_vec();
+    for offset in offsets {
+        bytes[offset] ^= bit(offset);
+        std::fs::write(&path, &bytes).unwrap();
+        let report = verify(&path, &mut Evt2::default()).unwrap();
+        assert!(!report.is_sound(), "byte {offset} was changed unnoticed");
+        if offset % 7 == 0 {
+            read_all(&path);
+            list(folder.path()).unwrap();
+        }
+        bytes[offset] = original[offset];
+    }
+}
+
+#[test]
+fn any_flipped_byte_is_found() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("good");
+    sealed(&path, 3);
+    let original = std::fs::read(&path).unwrap();
+    let n = original.len();
+    // Offsets of a fixed multiplicative walk over the file, then the whole file header and the ends of pages.
+    let walk = (0..250u64).map(|k| (k.wrapping_mul(0x9E37_79B9_7F4A_7C15) % n as u64) as usize);
+    check(&original, walk, |offset| 1 << (offset % 8));
+    check(&original, 0..112, |_| 0x01);
+    check(&original, (0..n / 16384).map(|page| page * 16384), |_| 0x40);
+    check(
+        &original,
+        (0..n / 16384).map(|page| page * 16384 + 16383),
+        |_| 0x80,
+    );
+}
+
+#[test]
+fn the_seals_own_page_is_covered() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("good");
+    let seal = sealed(&path, 3);
+    let original = std::fs::read(&path).unwrap();
+    let at = original
+        .windows(32)
+        .position(|w| w == seal.file_sha256)
+        .unwrap();
+    check(&original, at - 100..at + 32, |_| 0xFF);
+}
+
+#[test]
+fn cut_and_extended_files_are_found() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("good");
+    sealed(&path, 3);
+    let original = std::fs::read(&path).unwrap();
+    let changed = folder.path().join("x.session.sqlite");
+    for keep in [0, 50, 100, 16384, original.len() / 2, original.len() - 1] {
+        std::fs::write(&changed, &original[..keep]).unwrap();
+        assert!(
+            !verify(&changed, &mut Evt2::default()).unwrap().is_sound(),
+            "{keep} bytes"
+        );
+        read_all(&changed);
+    }
+    std::fs::write(&changed, [original.as_slice(), &[0]].concat()).unwrap();
+    assert!(!verify(&changed, &mut Evt2::default()).unwrap().is_sound());
+}

@@ -1,0 +1,7 @@
+//! The session file as a whole: what goes in comes out, damage is found, other programs can read it.
+#![expect(clippy::unwrap_used, reason = "tests")]
+
+mod common;
+mod damage;
+mod python;
+mod round_trip;
