@@ -27,7 +27,7 @@ impl RateHistogram {
             bin_us: if bin_us == 0 { 1 } else { bin_us },
             first_bin: 0,
             counts: Vec::new(),
-            last_us: u64::MAX,
+            last_us: 0,
             last: 0,
             beyond: 0,
         }
@@ -35,7 +35,8 @@ impl RateHistogram {
 
     /// Counts an event at camera time `t_us`. Times may be out of order.
     pub fn add(&mut self, t_us: u64) {
-        if t_us.wrapping_sub(self.last_us) >= self.bin_us && !self.seek(t_us / self.bin_us) {
+        let elsewhere = t_us.wrapping_sub(self.last_us) >= self.bin_us || self.counts.is_empty();
+        if elsewhere && !self.seek(t_us / self.bin_us) {
             self.beyond += 1;
             return;
         }
@@ -127,7 +128,7 @@ mod tests {
         let base = 1u64 << 44;
         let mut h = RateHistogram::new(10_000);
         let times: Vec<u64> = (0..50_000u64)
-            .map(|i| base + (i * 7919) % 90_000_000)
+            .map(|i| base + (i * 7919) % 89_990_000)
             .collect();
         times.iter().for_each(|t| h.add(*t));
         assert_eq!(

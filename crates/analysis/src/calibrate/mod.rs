@@ -4,7 +4,7 @@
 //! of length e counts as `e / sqrt(1 + (e / c)²)`, which is e for small errors and never more than c. So every
 //! press with two centroids takes part to the end: one far outside the skin pulls no more than c, one whose rays
 //! meet behind a camera or not at all counts c. c is 25 mm (a quarter of the skin) while the starts compete, then
-//! six robust standard deviations of the best solution's errors, so that the last fit is ordinary least squares
+//! ten robust standard deviations of the best solution's errors, so that the last fit is ordinary least squares
 //! for all but outliers.
 
 mod covariance;
@@ -22,7 +22,7 @@ use problem::{PARAMETERS, Problem, parameters_of};
 /// Bound on an error vector while the starts compete, mm: a quarter of the skin's side.
 const COARSE_BOUND_MM: f64 = 25.0;
 /// Bound of the last fit in robust standard deviations of one coordinate.
-const FINE_BOUND_SIGMAS: f64 = 6.0;
+const FINE_BOUND_SIGMAS: f64 = 10.0;
 /// Smallest bound of the last fit, mm.
 const LEAST_BOUND_MM: f64 = 1.0;
 /// Median of the length of a standard normal 2-vector, `sqrt(2 ln 2)`.

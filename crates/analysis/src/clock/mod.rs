@@ -1,5 +1,6 @@
 //! Camera clocks: where host time lies on a camera's clock, and how surely.
 
+mod correlate;
 mod line;
 mod marks;
 mod presses;

@@ -2,15 +2,16 @@
 //!
 //! No start time is typed in. The search has four steps:
 //! 1. The rate (10 ms bins) becomes an *activity* between 0 (idle) and 1 (as busy as presses are).
-//! 2. Every offset at which at least half of the first few hundred presses lie in the recording is scored:
-//!    activity inside the expected press spans minus activity outside them, in units of a press. What happens
-//!    where nothing should, such as sync presses left unexplained, counts against an offset as much as a planned
-//!    press that is not there.
-//! 3. Offset and drift are refined by each press's own lag against the session's mean press, robustly, over
-//!    more and more presses. The onset of the mean press is put at the measured contacts.
-//! 4. The result is compared with its neighbours one, two, ... whole press periods away over the whole session.
-//!    Their distance in presses is the margin; a better neighbour is taken instead.
+//! 2. A matched filter over every offset: the expected press spans against the mean activity around them, for a
+//!    few drifts up to 200 ppm, so that hours of presses line up.
+//! 3. Offset and drift are refined by each press's own lag against the session's mean press, robustly. The onset
+//!    of the mean press is put at the measured contacts.
+//! 4. The result is compared with its neighbours one, two, ... whole press periods away over the whole session:
+//!    those expect presses where the recording is quiet, or leave presses unexplained. A press that is where it is
+//!    expected counts +1, one that is not -1, one outside the recording 0. Half the distance to the next best is
+//!    the margin, in presses; a better neighbour is taken instead.
 
+use super::correlate::Correlator;
 use super::line::{self, Pair, median};
 use crate::rates::RateHistogram;
 use crate::result::{ClockFit, ClockMethod};
@@ -35,17 +36,22 @@ pub struct RatesFit {
     pub warnings: Vec<String>,
 }
 
-/// Presses of the first search: enough for certainty, few enough that a drift of 200 ppm does not smear them
-/// (15 minutes of the published rhythm: ±0.09 s).
-const BLOCK: usize = 300;
-/// Step of the first search, µs.
-const COARSE_STEP_US: f64 = 50_000.0;
+/// Bins that are merged for the first search.
+const MERGE: usize = 5;
+/// Largest drift of the first search.
+const MOST_DRIFT: f64 = 200e-6;
+/// Two drifts of the first search differ by this at the ends of the session, µs.
+const DRIFT_STEP_US: f64 = 150_000.0;
 /// Largest lag of one press against the prediction, µs, in the first and the later rounds of refinement.
 const LAGS_US: [f64; 4] = [400_000.0, 250_000.0, 120_000.0, 120_000.0];
-/// Whole press periods by which the result is compared with its neighbours.
-const SHIFTS: i32 = 4;
+/// Bins by which the instant within a period may differ from the onset when shifts are compared.
+const NUDGES: i32 = 5;
+/// The rise of a press is measured against this long before its contact, at most, µs.
+const RISE_US: f64 = 300_000.0;
 /// A margin below this many presses is reported as doubtful.
 const SAFE_MARGIN: f64 = 1.0;
+/// A drift with a larger standard error than this is worse than none: crystals are within tens of ppm.
+const UNKNOWN_DRIFT: f64 = 50e-6;
 /// Lags are never judged finer than this, µs (a fifth of a bin).
 const FLOOR_US: f64 = 2_000.0;
 /// Lags that scatter more than this are suspicious, µs.
@@ -78,25 +84,23 @@ pub fn fit_rates(rates: &RateHistogram, presses: &[PressSpan]) -> Result<RatesFi
         ));
     }
     let activity = Activity::new(rates, presses)?;
-    let block = &presses[..presses.len().min(BLOCK)];
-    let mut map = Map {
-        offset_us: coarse_offset(&activity, block),
-        drift: 0.0,
-    };
+    let mut map = first_map(&activity, presses);
     let period = period_us(presses);
-    let mut margin = 0.0;
-    let mut line = None;
-    for _ in 0..=SHIFTS {
-        (map, line) = refine(&activity, presses, map)?;
-        let (shift, best_margin) = best_shift(&activity, presses, map, period);
-        margin = best_margin;
-        if shift == 0 {
-            break;
-        }
+    let mut line;
+    (map, line) = refine(&activity, presses, map)?;
+    let (shift, margin) = best_shift(&activity, presses, map, period);
+    if shift != 0 {
         map.offset_us += f64::from(shift) * period;
+        (map, line) = refine(&activity, presses, map)?;
     }
-    let line = line.ok_or("the presses found in the event rates do not lie on a line")?;
     let mut warnings = Vec::new();
+    if line.drift_se > UNKNOWN_DRIFT {
+        warnings.push(format!(
+            "the session is too short to find the clock's drift by event rates ({:.0} ± {:.0} ppm): it is taken as 0",
+            line.drift * 1e6,
+            line.drift_se * 1e6
+        ));
+    }
     if margin < SAFE_MARGIN {
         warnings.push(format!(
             "the alignment by event rates is doubtful: one shifted by whole press periods explains only {margin:.1} presses less"
@@ -200,111 +204,155 @@ impl Activity {
     }
 }
 
-/// Activity inside the expected spans, and in all of the time that the presses and their surroundings take.
-fn inside_and_total(
-    activity: &Activity,
-    presses: &[PressSpan],
-    map: Map,
-    margin_us: f64,
-) -> (f64, f64) {
-    let inside = presses
-        .iter()
-        .map(|p| activity.between(map.camera(p.contact_us), map.camera(p.release_us)))
-        .sum();
-    let from = presses.first().map_or(0.0, |p| map.camera(p.contact_us)) - margin_us;
-    let to = presses.last().map_or(0.0, |p| map.camera(p.release_us)) + margin_us;
-    (inside, activity.between(from, to))
-}
-
-fn coarse_offset(activity: &Activity, block: &[PressSpan]) -> f64 {
-    let period = period_us(block);
-    // Half of the block's presses must lie in the recording.
-    let middle = block[block.len() / 2];
-    let (first, last) = (block[0].contact_us, block[block.len() - 1].release_us);
-    let half = (middle.contact_us - first).max(last - middle.contact_us);
-    let low = -(first + half);
-    let high = activity.length_us() - last + half;
-    let steps = ((high - low) / COARSE_STEP_US).ceil().max(0.0) as u64;
-    let mut best = (f64::NEG_INFINITY, low);
-    for step in 0..=steps {
-        let offset_us = low + step as f64 * COARSE_STEP_US;
-        let map = Map {
-            offset_us,
-            drift: 0.0,
+/// The clock at which the press spans best match the activity.
+fn first_map(activity: &Activity, presses: &[PressSpan]) -> Map {
+    let bin_us = activity.bin_us * MERGE as f64;
+    let mean = activity.values.iter().sum::<f64>() / activity.values.len() as f64;
+    let merged: Vec<f64> = activity
+        .values
+        .chunks(MERGE)
+        .map(|bins| bins.iter().map(|v| v - mean).sum())
+        .collect();
+    let side_us = period_us(presses);
+    let from_us = presses[0].contact_us - side_us;
+    let middle_us = presses[presses.len() / 2].contact_us;
+    let half_us = (middle_us - from_us)
+        .max(presses[presses.len() - 1].release_us - middle_us)
+        .max(1.0);
+    let length = ((presses[presses.len() - 1].release_us + side_us - from_us) / bin_us
+        * (1.0 + MOST_DRIFT))
+        .ceil() as usize
+        + 1;
+    let correlator = Correlator::new(&merged, length);
+    let steps = (MOST_DRIFT * half_us / DRIFT_STEP_US).ceil() as i32;
+    let mut best: Option<(f64, Map)> = None;
+    for step in -steps..=steps {
+        let drift = if steps == 0 {
+            0.0
+        } else {
+            MOST_DRIFT * f64::from(step) / f64::from(steps)
         };
-        let (inside, total) = inside_and_total(activity, block, map, period);
-        let score = 2.0 * inside - total;
-        if score > best.0 {
-            best = (score, offset_us);
+        // Time within the template of a host time: the middle of the session stays where it is.
+        let place = |host_us: f64| {
+            let stretched = host_us + drift * (host_us - middle_us) - from_us;
+            ((stretched / bin_us).max(0.0) as usize).min(length)
+        };
+        let mut template = vec![0.0; length];
+        for press in presses {
+            let (a, b) = (place(press.contact_us), place(press.release_us));
+            template[a..b.max(a + 1).min(length)].fill(1.0);
+        }
+        let share = template.iter().sum::<f64>() / length as f64;
+        template.iter_mut().for_each(|v| *v -= share);
+        let (lag, score) = correlator.best_lag(&template);
+        let offset_us = lag as f64 * bin_us - from_us - drift * middle_us;
+        if best.is_none_or(|(s, _)| score > s) {
+            best = Some((score, Map { offset_us, drift }));
         }
     }
-    best.1
+    best.map_or(
+        Map {
+            offset_us: 0.0,
+            drift: 0.0,
+        },
+        |(_, map)| map,
+    )
+}
+
+/// For each press within the recording, how much the activity rises from just before the contact to the press
+/// itself, in bins.
+fn rises(activity: &Activity, presses: &[PressSpan], map: Map) -> Vec<f64> {
+    let mut earlier_release = f64::NEG_INFINITY;
+    let mut out = Vec::new();
+    for press in presses {
+        let span = press.release_us - press.contact_us;
+        let before = RISE_US.min(0.5 * (press.contact_us - earlier_release));
+        earlier_release = press.release_us;
+        let (contact, release) = (map.camera(press.contact_us), map.camera(press.release_us));
+        let recorded = contact - before >= 0.0 && release <= activity.length_us();
+        if before <= 0.0 || span <= 0.0 || !recorded {
+            continue;
+        }
+        let idle = activity.between(contact - before, contact) / before;
+        out.push(activity.between(contact, release) - idle * span);
+    }
+    out
 }
 
 /// The shift by whole periods that explains most, and by how many presses it beats the next best.
 fn best_shift(activity: &Activity, presses: &[PressSpan], map: Map, period: f64) -> (i32, f64) {
-    let (inside, _) = inside_and_total(activity, presses, map, 0.0);
-    let unit = (inside / presses.len() as f64).max(f64::MIN_POSITIVE);
-    // The same stretch of recording for all shifts, so that what one explains the other must leave over.
-    let score = |shift: i32| {
-        let trial = |nudge: i32| {
-            let moved = Map {
-                offset_us: map.offset_us
-                    + f64::from(shift) * period
-                    + f64::from(nudge) * activity.bin_us,
-                ..map
-            };
-            inside_and_total(activity, presses, moved, 0.0).0
+    let unit = median(&mut rises(activity, presses, map))
+        .unwrap_or(0.0)
+        .max(f64::MIN_POSITIVE);
+    let score = |shift: i32, nudge: i32| -> f64 {
+        let nudge_us = f64::from(nudge) * activity.bin_us;
+        let moved = Map {
+            offset_us: map.offset_us + f64::from(shift) * period + nudge_us,
+            ..map
         };
-        let nudges = if shift == 0 { 0..=0 } else { -10..=10 };
-        nudges.map(trial).fold(f64::NEG_INFINITY, f64::max) / unit
+        let found = rises(activity, presses, moved);
+        found
+            .iter()
+            .map(|r| (2.0 * r / unit - 1.0).clamp(-1.0, 1.0))
+            .sum()
     };
-    let scores: Vec<(i32, f64)> = (-SHIFTS..=SHIFTS).map(|s| (s, score(s))).collect();
+    // Within a period the score may prefer another instant than the onset: the same for all shifts.
+    let nudge = (-NUDGES..=NUDGES)
+        .map(|n| (n, score(0, n)))
+        .fold((0, f64::NEG_INFINITY), |b, n| if n.1 > b.1 { n } else { b })
+        .0;
+    // At least half of the presses stay within the recording.
+    let most = (presses.len() / 2) as i32;
+    let scores: Vec<(i32, f64)> = (-most..=most).map(|s| (s, score(s, nudge))).collect();
     let best = scores
         .iter()
         .copied()
-        .fold((0, score(0)), |b, s| if s.1 > b.1 { s } else { b });
+        .fold((0, score(0, nudge)), |b, s| if s.1 > b.1 { s } else { b });
     let next = scores
         .iter()
         .filter(|s| s.0 != best.0)
         .map(|s| s.1)
         .fold(f64::NEG_INFINITY, f64::max);
-    (best.0, best.1 - next)
+    (best.0, 0.5 * (best.1 - next))
 }
 
-/// Refines offset and drift over blocks of presses that double until they are all in.
+/// Refines offset and drift by the lags of all presses.
 fn refine(
     activity: &Activity,
     presses: &[PressSpan],
     mut map: Map,
-) -> Result<(Map, Option<line::Line>), String> {
-    let mut count = presses.len().min(BLOCK);
-    let mut round = 0;
-    loop {
-        let block = &presses[..count];
-        let onset = onset_us(activity, block, map);
-        map.offset_us += onset;
-        let profile = Profile::new(activity, block, map);
-        let lag_us = LAGS_US[round.min(LAGS_US.len() - 1)];
-        let pairs = lags(activity, block, map, &profile, lag_us);
+) -> Result<(Map, line::Line), String> {
+    let mut last = None;
+    for lag_us in LAGS_US {
+        map.offset_us += onset_us(activity, presses, map);
+        let profile = Profile::new(activity, presses, map);
+        let pairs = lags(activity, presses, map, &profile, lag_us);
         let line = line::fit(&pairs, FLOOR_US).ok_or_else(|| {
             format!(
                 "expected at least 3 presses to be visible in the event rates, found {}",
                 pairs.len()
             )
         })?;
-        map = Map {
-            offset_us: line.offset_us,
-            drift: line.drift,
-        };
-        round += 1;
-        if count == presses.len() && round >= LAGS_US.len() {
-            // Last: the onset once more, now that the presses are well aligned.
-            map.offset_us += onset_us(activity, presses, map);
-            return Ok((map, Some(line)));
+        map.offset_us = line.offset_us;
+        map.drift = line.drift;
+        if line.drift_se > UNKNOWN_DRIFT {
+            // Turn the line about its middle until it has no drift.
+            let used: Vec<f64> = pairs
+                .iter()
+                .zip(&line.used)
+                .filter(|(_, u)| **u)
+                .map(|(p, _)| p.host_us)
+                .collect();
+            let middle = used.iter().sum::<f64>() / used.len() as f64;
+            map.offset_us += line.drift * middle;
+            map.drift = 0.0;
         }
-        count = (2 * count).min(presses.len());
+        last = Some(line);
     }
+    // The onset once more, now that the presses are well aligned.
+    map.offset_us += onset_us(activity, presses, map);
+    last.map(|line| (map, line))
+        .ok_or_else(|| "no round of refinement".to_owned())
 }
 
 /// Mean activity about the predicted contacts.

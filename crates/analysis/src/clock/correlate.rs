@@ -1,0 +1,121 @@
+//! Cross-correlation of long series by the fast Fourier transform.
+
+use std::f64::consts::TAU;
+
+type Complex = (f64, f64);
+
+/// In-place radix-2 transform (Cooley and Tukey 1965) of a power-of-two length; unscaled. `inverse` flips the
+/// sign of the exponent.
+fn transform(data: &mut [Complex], inverse: bool) {
+    let n = data.len();
+    let bits = n.trailing_zeros();
+    for i in 0..n {
+        let j = i.reverse_bits() >> (usize::BITS - bits);
+        if i < j {
+            data.swap(i, j);
+        }
+    }
+    let sign = if inverse { 1.0 } else { -1.0 };
+    let roots: Vec<Complex> = (0..n / 2)
+        .map(|k| {
+            let (sin, cos) = libm::sincos(sign * TAU * k as f64 / n as f64);
+            (cos, sin)
+        })
+        .collect();
+    let mut half = 1;
+    while half < n {
+        let stride = n / (2 * half);
+        for block in data.chunks_exact_mut(2 * half) {
+            let (low, high) = block.split_at_mut(half);
+            for (k, (a, b)) in low.iter_mut().zip(high).enumerate() {
+                let t = product(*b, roots[k * stride]);
+                *b = (a.0 - t.0, a.1 - t.1);
+                *a = (a.0 + t.0, a.1 + t.1);
+            }
+        }
+        half *= 2;
+    }
+}
+
+fn product(a: Complex, b: Complex) -> Complex {
+    (a.0 * b.0 - a.1 * b.1, a.0 * b.1 + a.1 * b.0)
+}
+
+/// One series, transformed once, to be correlated with several templates.
+pub struct Correlator {
+    transformed: Vec<Complex>,
+    length: usize,
+    longest_template: usize,
+}
+
+impl Correlator {
+    /// For templates of up to `longest_template` values.
+    pub fn new(series: &[f64], longest_template: usize) -> Self {
+        let size = (series.len() + longest_template).next_power_of_two().max(2);
+        let mut transformed = vec![(0.0, 0.0); size];
+        for (to, from) in transformed.iter_mut().zip(series) {
+            to.0 = *from;
+        }
+        transform(&mut transformed, false);
+        Self {
+            transformed,
+            length: series.len(),
+            longest_template,
+        }
+    }
+
+    /// The lag (in `1 - template.len()..series.len()`) at which `sum series[i + lag] * template[i]` is largest,
+    /// and that sum. Values outside the series count 0. Templates beyond the longest are cut.
+    pub fn best_lag(&self, template: &[f64]) -> (i64, f64) {
+        let size = self.transformed.len();
+        let template = &template[..template.len().min(self.longest_template)];
+        let mut work = vec![(0.0, 0.0); size];
+        for (to, from) in work.iter_mut().zip(template) {
+            to.0 = *from;
+        }
+        transform(&mut work, false);
+        for (w, s) in work.iter_mut().zip(&self.transformed) {
+            *w = product(*s, (w.0, -w.1));
+        }
+        transform(&mut work, true);
+        let behind = template.len().saturating_sub(1) as i64;
+        let mut best = (0, f64::NEG_INFINITY);
+        for lag in -behind..self.length as i64 {
+            let sum = work[lag.rem_euclid(size as i64) as usize].0 / size as f64;
+            if sum > best.1 {
+                best = (lag, sum);
+            }
+        }
+        best
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_best_lag_is_that_of_the_definition() {
+        let value = |i: i64| ((i * i * 31 + i * 17) % 23) as f64 - 11.0;
+        let series: Vec<f64> = (0..37).map(value).collect();
+        for length in [1, 5, 21] {
+            for offset in [-3i64, 0, 9, 30] {
+                let template: Vec<f64> = (0..length).map(|i| value(i + offset)).collect();
+                let sum = |lag: i64| -> f64 {
+                    let at = |i: usize| {
+                        usize::try_from(i as i64 + lag)
+                            .ok()
+                            .and_then(|k| series.get(k))
+                    };
+                    (0..template.len())
+                        .filter_map(|i| Some(at(i)? * template[i]))
+                        .sum()
+                };
+                let (lag, found) = Correlator::new(&series, 21).best_lag(&template);
+                let wanted = (1 - length..37).map(sum).fold(f64::NEG_INFINITY, f64::max);
+                assert!((found - wanted).abs() < 1e-9);
+                assert!((sum(lag) - wanted).abs() < 1e-9);
+            }
+        }
+    }
+}

@@ -1,0 +1,562 @@
+//! Whole analyses of planted sessions: what was planted comes out, and everything that goes wrong has its row.
+
+use proptest::prelude::*;
+use skinrig_analysis::result::LocationOutcome;
+use skinrig_analysis::{AnalysisError, EventSource, SessionInput, analyze, results_hash};
+use skinrig_model::{
+    AnalysisSettings, AttemptId, CalibrationModel, CameraId, CdEvent, HostTime, Mark, MarkKind,
+    PlannedPress, Point2, Polarity, PressId, PressOutcome, PressRole, PressTiming, PressVerdict,
+    PulseTrain, RigGeometry, SentMark, SkinOutline, StereoGeometry, TriggerEdge,
+};
+
+const PLANTED: [f64; 8] = [43.0, -33.0, 47.5, 38.0, -1.2, 0.4, -0.11, 0.03];
+/// Camera clocks: offset (µs) and drift (ppm).
+const CLOCKS: [(f64, f64); 2] = [(4.2e6, 28.0), (17_592_186_044_416.0, -35.0)];
+
+struct Memory {
+    events: [Vec<CdEvent>; 2],
+    slice: usize,
+}
+
+impl EventSource for Memory {
+    fn for_each_slice(
+        &self,
+        camera: CameraId,
+        each: &mut dyn FnMut(&[CdEvent]),
+    ) -> Result<(), String> {
+        self.events[camera.index()]
+            .chunks(self.slice)
+            .for_each(each);
+        Ok(())
+    }
+}
+
+struct Random(u64);
+
+impl Random {
+    fn unit(&mut self) -> f64 {
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 11) as f64 / (1u64 << 53) as f64
+    }
+    /// Roughly normal, unit variance.
+    fn normal(&mut self) -> f64 {
+        (0..12).map(|_| self.unit()).sum::<f64>() - 6.0
+    }
+}
+
+fn camera_us(camera: usize, host_s: f64) -> f64 {
+    let (offset, ppm) = CLOCKS[camera];
+    offset + host_s * 1e6 * (1.0 + ppm * 1e-6)
+}
+
+/// Three sync presses, then 25 places in two repetitions: the first calibrates, the second scores.
+fn plan() -> Vec<(PressRole, u32, u32, Point2, f64)> {
+    let centre = Point2::new(10.0, 2.0);
+    let mut out: Vec<_> = (0..3)
+        .map(|i| (PressRole::Sync, 0, 0, centre, 2.0 + f64::from(i)))
+        .collect();
+    for i in 0..50u32 {
+        let place = i % 25;
+        let at = Point2::new(
+            -14.0 + 11.0 * f64::from(place / 5),
+            -20.0 + 11.0 * f64::from(place % 5),
+        );
+        let role = if i < 25 {
+            PressRole::Calibrate
+        } else {
+            PressRole::Score
+        };
+        out.push((role, i / 25, place, at, 7.0 + 1.75 * f64::from(i)));
+    }
+    out
+}
+
+fn session() -> (SessionInput, Memory) {
+    let h = HostTime::from_secs_f64;
+    let mut random = Random(7);
+    let planted = StereoGeometry::paper_like(PLANTED);
+    let mut input = SessionInput {
+        planned: Vec::new(),
+        outcomes: Vec::new(),
+        edges: [Vec::new(), Vec::new()],
+        marks: Vec::new(),
+        gaps: [Vec::new(), Vec::new()],
+        rig: RigGeometry {
+            outline: SkinOutline::PAPER,
+            nominal: StereoGeometry::PAPER,
+            trigger_channel: Some(0),
+        },
+        settings: AnalysisSettings {
+            bootstrap_resamples: 200,
+            ..AnalysisSettings::default()
+        },
+    };
+    let mut events = [Vec::new(), Vec::new()];
+    for (i, (role, repetition, location, at, contact)) in plan().into_iter().enumerate() {
+        let id = PressId(i as u32);
+        input.planned.push(PlannedPress {
+            id,
+            role,
+            repetition,
+            location,
+            at,
+            depth_mm: 2.0,
+        });
+        let timing = PressTiming {
+            approach: h(contact - 0.1),
+            contact: h(contact),
+            at_depth: h(contact + 0.1),
+            retract: h(contact + 0.3),
+            release: h(contact + 0.45),
+            clear: h(contact + 0.6),
+        };
+        input.outcomes.push(Some(PressOutcome {
+            attempt: AttemptId {
+                press: id,
+                number: 1,
+            },
+            verdict: PressVerdict::Valid,
+            timing: Some(timing),
+            measured_at: Some(at),
+            measured_depth_mm: Some(2.0),
+            peak_force_n: None,
+            scheduled: false,
+        }));
+        for (kind, t) in [
+            (MarkKind::Contact, contact),
+            (MarkKind::Release, contact + 0.45),
+        ] {
+            let mark = Mark { kind, press: id };
+            input.marks.push(SentMark {
+                mark,
+                t: h(t),
+                uncertainty_ns: 500,
+            });
+            for (k, edges) in input.edges.iter_mut().enumerate() {
+                for (rise, width) in PulseTrain::new(mark).unwrap().pulses() {
+                    for (after, rising) in [(rise, true), (rise + width, false)] {
+                        let t_us = camera_us(k, t).round() as u64 + after;
+                        edges.push(TriggerEdge {
+                            t_us,
+                            channel: 0,
+                            rising,
+                        });
+                    }
+                }
+            }
+        }
+        for (k, events) in events.iter_mut().enumerate() {
+            let u = planted.cameras[k].column_of_point(at).unwrap();
+            for n in 0..600 {
+                let after = if n < 400 {
+                    0.1 * random.unit()
+                } else {
+                    0.3 + 0.15 * random.unit()
+                };
+                let x = (u + 8.0 * random.normal()).round().clamp(0.0, 639.0);
+                let y = (270.0 + 6.0 * random.normal()).round();
+                events.push(CdEvent {
+                    t_us: camera_us(k, contact + after) as u64,
+                    x: x as u16,
+                    y: y as u16,
+                    polarity: Polarity::from_bit(n % 3 == 0),
+                });
+            }
+        }
+    }
+    for (k, events) in events.iter_mut().enumerate() {
+        for _ in 0..10_000 {
+            let t = camera_us(k, 97.0 * random.unit());
+            let (x, y) = (640.0 * random.unit(), 480.0 * random.unit());
+            let polarity = Polarity::from_bit(random.unit() < 0.5);
+            events.push(CdEvent {
+                t_us: t as u64,
+                x: x as u16,
+                y: y as u16,
+                polarity,
+            });
+        }
+        events.sort_by_key(|e| e.t_us);
+        // Out of order by a few µs, as a row-wise readout is.
+        for i in (0..events.len() - 1).step_by(5) {
+            if events[i + 1].t_us - events[i].t_us < 20 {
+                events.swap(i, i + 1);
+            }
+        }
+    }
+    (
+        input,
+        Memory {
+            events,
+            slice: 1000,
+        },
+    )
+}
+
+#[test]
+fn a_planted_session_comes_out_with_its_clocks_geometry_and_places() {
+    let (input, source) = session();
+    let a = analyze(&input, &source).unwrap();
+    assert!(a.warnings.is_empty(), "{:?}", a.warnings);
+    assert!(a.counts.add_up());
+    assert_eq!(
+        (a.counts.planned, a.counts.valid, a.counts.sync),
+        (50, 50, 3)
+    );
+    for (k, clock) in a.clocks.iter().enumerate() {
+        let clock = clock.unwrap();
+        assert!((clock.drift_ppm - CLOCKS[k].1).abs() < 0.05, "{clock:?}");
+        assert!(
+            (clock.camera_us(50e6) - camera_us(k, 50.0)).abs() < 0.5,
+            "{clock:?}"
+        );
+    }
+    // 600 events of 8 px spread: the centroid is known to 0.3 px, about 0.06 mm on the skin.
+    assert!(
+        a.scored.rmse_mm.value.unwrap() < 0.5,
+        "{:?}",
+        a.scored.rmse_mm
+    );
+    assert!(
+        a.scored.rmse_mm.low < a.scored.rmse_mm.value
+            && a.scored.rmse_mm.value < a.scored.rmse_mm.high
+    );
+    assert_eq!(a.scored.rmse_mm.n, 25);
+    assert_eq!(a.scored.located_rate.value, Some(1.0));
+    let calibration = a.calibration.as_ref().unwrap();
+    assert_eq!(calibration.n, 25);
+    assert!(calibration.rmse_before_mm > 2.0 && calibration.rmse_after_mm < 0.5);
+    for press in &a.presses[3..] {
+        let view = press.views[0].unwrap();
+        assert!((560..700).contains(&view.events), "{view:?}");
+        assert!(view.on_events > 150 && view.cluster_events <= view.events);
+        assert!((view.centroid_v.unwrap() - 270.0).abs() < 2.0);
+        assert!(view.rate_per_s > 1000.0 && view.idle_rate_per_s < 100.0 && view.idle_s == 0.5);
+    }
+    assert_eq!((a.pictures.len(), a.zooms.len()), (12, 6));
+    for picture in &a.pictures {
+        let view = a.presses[picture.press.0 as usize].views[picture.camera.index()].unwrap();
+        let sum = |f: fn(&skinrig_analysis::result::PicturePixel) -> u32| {
+            picture.pixels.iter().map(f).sum::<u32>()
+        };
+        assert_eq!(sum(|p| p.on + p.off), view.events);
+        assert_eq!(sum(|p| p.on), view.on_events);
+        assert_eq!(
+            sum(|p| if p.clustered { p.on + p.off } else { 0 }),
+            view.cluster_events
+        );
+    }
+    for zoom in &a.zooms {
+        let events: f64 = zoom
+            .on_per_s
+            .iter()
+            .chain(&zoom.off_per_s)
+            .map(|r| f64::from(*r) * zoom.bin_s)
+            .sum();
+        assert!((590.0..700.0).contains(&events), "{events}");
+        let first = zoom.off_per_s.iter().position(|r| *r > 1000.0).unwrap();
+        let at = zoom.start_s + first as f64 * zoom.bin_s;
+        assert!(
+            at.abs() < 0.03,
+            "the burst begins at the contact, not {at} s after it"
+        );
+    }
+    // 600 events per press, the background in the crop, on the host clock.
+    let series = &a.rates[1];
+    assert!((series.start_s - 0.0).abs() < 0.1, "{}", series.start_s);
+    let events: f64 = series
+        .mean_per_s
+        .iter()
+        .map(|r| f64::from(*r) * series.bin_s)
+        .sum();
+    assert!((events - 53.0 * 600.0 - 3250.0).abs() < 400.0, "{events}");
+    let json = serde_json::to_string(&a).unwrap();
+    let back: skinrig_analysis::Analysis = serde_json::from_str(&json).unwrap();
+    assert_eq!(results_hash(&back), results_hash(&a));
+}
+
+#[test]
+fn the_same_input_gives_the_same_bits_however_it_is_sliced() {
+    let (input, mut source) = session();
+    let first = analyze(&input, &source).unwrap();
+    source.slice = 37;
+    let second = analyze(&input, &source).unwrap();
+    assert_eq!(first, second);
+    assert_eq!(results_hash(&first), results_hash(&second));
+    let mut other = first.clone();
+    other.presses[30].views[1].as_mut().unwrap().cluster_events += 1;
+    assert_ne!(results_hash(&first), results_hash(&other));
+}
+
+#[test]
+fn without_marks_the_rates_align_the_clocks() {
+    let (mut input, source) = session();
+    let with_marks = analyze(&input, &source).unwrap();
+    input.rig.trigger_channel = None;
+    input.marks.clear();
+    let a = analyze(&input, &source).unwrap();
+    for k in 0..2 {
+        let (clock, wanted) = (a.clocks[k].unwrap(), camera_us(k, 50.0));
+        assert!(
+            (clock.camera_us(50e6) - wanted).abs() < 15_000.0,
+            "{clock:?}"
+        );
+    }
+    assert_eq!(a.counts.valid, 50, "{:?}", a.warnings);
+    let (x, y) = (
+        a.scored.rmse_mm.value.unwrap(),
+        with_marks.scored.rmse_mm.value.unwrap(),
+    );
+    assert!((x - y).abs() < 0.1, "{x} {y}");
+}
+
+#[test]
+fn whatever_goes_wrong_has_its_own_row_and_reason() {
+    let (mut input, mut source) = session();
+    let verdict = |input: &mut SessionInput, row: usize, v: PressVerdict| {
+        input.outcomes[row].as_mut().unwrap().verdict = v;
+    };
+    input.outcomes[52] = None;
+    verdict(
+        &mut input,
+        51,
+        PressVerdict::Missed("run stopped".to_owned()),
+    );
+    verdict(
+        &mut input,
+        50,
+        PressVerdict::Invalid("force limit".to_owned()),
+    );
+    verdict(
+        &mut input,
+        49,
+        PressVerdict::Excluded("operator".to_owned()),
+    );
+    input.outcomes[48].as_mut().unwrap().measured_at = None;
+    input.outcomes[47].as_mut().unwrap().timing = None;
+    let contact = |row: usize| plan()[row].4;
+    let lost = camera_us(1, contact(46)) as u64;
+    input.gaps[1].push((lost, lost + 10));
+    // Camera 2 sees nothing of press 45 and little of 44; camera 1 sees press 43 elsewhere.
+    let inside = |row: usize, k: usize, e: &CdEvent| {
+        let from = camera_us(k, contact(row) - 0.1) as u64;
+        (from..from + 700_000).contains(&e.t_us)
+    };
+    source.events[1].retain(|e| !inside(45, 1, e));
+    let mut kept = 0;
+    source.events[1].retain(|e| {
+        let keep = !inside(44, 1, e) || ((265..275).contains(&e.y) && kept < 15);
+        kept += u32::from(inside(44, 1, e) && keep);
+        keep
+    });
+    for e in &mut source.events[0] {
+        if inside(43, 0, e) {
+            e.x = (e.x / 4) + 2;
+        }
+    }
+    let a = analyze(&input, &source).unwrap();
+    let reason = |row: usize| {
+        (
+            a.presses[row].verdict.clone(),
+            a.presses[row].reason.clone().unwrap(),
+        )
+    };
+    let said = |v: &str, r: &str| (v.to_owned(), r.to_owned());
+    assert_eq!(reason(52), said("missed", "never attempted"));
+    assert_eq!(reason(51), said("missed", "run stopped"));
+    assert_eq!(reason(50), said("invalid", "force limit"));
+    assert_eq!(reason(49), said("excluded", "operator"));
+    assert_eq!(reason(48), said("invalid", "no measured position"));
+    assert_eq!(reason(47), said("invalid", "no measured times"));
+    assert_eq!(
+        reason(46),
+        said("invalid", "data lost in window (camera 2)")
+    );
+    assert_eq!(reason(45), said("excluded", "no cluster (camera 2)"));
+    let (v, r) = reason(44);
+    assert!(
+        v == "excluded"
+            && r.starts_with("too few cluster events: 1")
+            && r.ends_with(" < 20 (camera 2)"),
+        "{r}"
+    );
+    let (v, r) = reason(43);
+    assert!(
+        v == "excluded" && r == "outside the skin outline",
+        "{v}: {r}"
+    );
+    assert!(a.counts.add_up());
+    assert_eq!(
+        (
+            a.counts.valid,
+            a.counts.missed,
+            a.counts.invalid,
+            a.counts.excluded
+        ),
+        (40, 2, 4, 4)
+    );
+    // Attempted: 25 scored presses but the two missed. Ten of them fail here.
+    assert_eq!(a.scored.located_rate.n, 23);
+    assert_eq!(a.scored.located_rate.value, Some(15.0 / 23.0));
+    assert!(a.scored.rmse_mm.n < a.scored_without_exclusions.rmse_mm.n);
+    assert!(a.scored.rmse_mm.value < a.scored_without_exclusions.rmse_mm.value);
+}
+
+#[test]
+fn a_session_without_anything_is_still_an_analysis() {
+    let (mut input, mut source) = session();
+    source.events = [Vec::new(), Vec::new()];
+    let a = analyze(&input, &source).unwrap();
+    assert_eq!((a.counts.planned, a.counts.excluded), (50, 50));
+    assert_eq!(
+        a.presses[10].reason.as_deref(),
+        Some("no cluster (camera 1)")
+    );
+    assert!(
+        a.presses
+            .iter()
+            .all(|p| p.location_outcome == LocationOutcome::Missing)
+    );
+    assert_eq!(
+        (a.scored.rmse_mm.value, a.scored.located_rate.value),
+        (None, Some(0.0))
+    );
+    assert!(serde_json::to_string(&a).is_ok());
+
+    // No marks and no events: no clock either.
+    input.edges = [Vec::new(), Vec::new()];
+    let a = analyze(&input, &source).unwrap();
+    assert_eq!(a.clocks, [None, None]);
+    assert_eq!(
+        a.presses[10].reason.as_deref(),
+        Some("no clock alignment (camera 1)")
+    );
+    assert_eq!((a.counts.invalid, a.counts.add_up()), (50, true));
+    assert!(
+        a.warnings
+            .iter()
+            .any(|w| w.contains("camera 2: no clock alignment")),
+        "{:?}",
+        a.warnings
+    );
+
+    input.planned.clear();
+    input.outcomes.clear();
+    let a = analyze(&input, &source).unwrap();
+    assert_eq!(a.counts.planned, 0);
+}
+
+#[test]
+fn a_million_events_on_one_pixel_are_counted() {
+    let (input, mut source) = session();
+    let t = camera_us(0, plan()[30].4 + 0.2) as u64;
+    let at = source.events[0].partition_point(|e| e.t_us < t);
+    let hot = CdEvent {
+        t_us: t,
+        x: 3,
+        y: 300,
+        polarity: Polarity::On,
+    };
+    source.events[0].splice(at..at, std::iter::repeat_n(hot, 1_000_000));
+    let a = analyze(&input, &source).unwrap();
+    let view = a.presses[30].views[0].unwrap();
+    assert!(view.events > 1_000_500 && view.cluster_events >= 1_000_000);
+    assert!((view.centroid_u.unwrap() - 3.0).abs() < 0.01);
+}
+
+#[test]
+fn contradictions_are_refused_with_their_place() {
+    let refuse = |change: fn(&mut SessionInput, &mut Memory)| -> String {
+        let (mut input, mut source) = session();
+        change(&mut input, &mut source);
+        analyze(&input, &source).unwrap_err().to_string()
+    };
+    let all = [
+        refuse(|i, _| drop(i.outcomes.pop())),
+        refuse(|i, _| i.outcomes.swap(4, 5)),
+        refuse(|i, _| i.settings.eps_px = f64::NAN),
+        refuse(|i, _| i.settings.min_samples = 0),
+        refuse(|i, _| i.settings.crop_v[1] = (300, 480)),
+        refuse(|i, _| i.rig.nominal.cameras[1].position = Point2::new(10.0, 2.0)),
+        refuse(|_, s| s.events[1][500].x = 640),
+    ];
+    let wanted = [
+        "expected one outcome slot per planned press (53), found 52",
+        "expected the outcome of press 4 in row 4 of the journal, found that of press 5",
+        "`eps_px`, found NaN",
+        "`min_samples`, found 0",
+        "`crop_v`, found 300..=480",
+        "found (10, 2) mm for camera 2",
+        "expected events within 640 x 480 px, found (640, ",
+    ];
+    for (found, wanted) in all.iter().zip(wanted) {
+        assert!(found.contains(wanted), "{found}");
+    }
+
+    struct Broken;
+    impl EventSource for Broken {
+        fn for_each_slice(
+            &self,
+            camera: CameraId,
+            _: &mut dyn FnMut(&[CdEvent]),
+        ) -> Result<(), String> {
+            match camera {
+                CameraId::One => Ok(()),
+                CameraId::Two => Err("chunk 7 is damaged".to_owned()),
+            }
+        }
+    }
+    let (input, _) = session();
+    let found = analyze(&input, &Broken).unwrap_err();
+    let message = "chunk 7 is damaged".to_owned();
+    assert_eq!(
+        found,
+        AnalysisError::Events {
+            camera: CameraId::Two,
+            message
+        }
+    );
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+
+    #[test]
+    fn planned_is_always_valid_missed_invalid_and_excluded(
+        fates in prop::collection::vec(0u8..9, 53),
+        min_cluster_events in 0u32..700, exclude_outside in any::<bool>(), min_ray_sine in 0.0f64..0.99,
+    ) {
+        let (mut input, source) = session();
+        input.settings.calibration = CalibrationModel::None;
+        input.settings.bootstrap_resamples = 2;
+        input.settings.min_cluster_events = min_cluster_events;
+        input.settings.exclude_outside = exclude_outside;
+        input.settings.min_ray_sine = min_ray_sine;
+        for (outcome, fate) in input.outcomes.iter_mut().zip(&fates) {
+            let Some(o) = outcome else { continue };
+            match fate {
+                0 => *outcome = None,
+                1 => o.verdict = PressVerdict::Missed("m".to_owned()),
+                2 => o.verdict = PressVerdict::Invalid("i".to_owned()),
+                3 => o.verdict = PressVerdict::Excluded("e".to_owned()),
+                4 => o.timing = None,
+                5 => o.measured_at = Some(Point2::new(f64::NAN, 0.0)),
+                _ => {}
+            }
+        }
+        let a = analyze(&input, &source).unwrap();
+        prop_assert!(a.counts.add_up());
+        prop_assert_eq!(a.counts.planned + a.counts.sync, 53);
+        for p in &a.presses {
+            prop_assert_eq!(p.verdict == "valid", p.reason.is_none());
+            prop_assert!(p.reason.as_ref().is_none_or(|r| !r.is_empty()));
+        }
+        let valid_scored = a.presses.iter().filter(|p| p.role == PressRole::Score && p.verdict == "valid");
+        prop_assert_eq!(a.scored.rmse_mm.n as usize, valid_scored.count());
+        prop_assert!(a.scored.rmse_mm.n <= a.scored.located_rate.n);
+        prop_assert!(a.scored.rmse_mm.n <= a.scored_without_exclusions.rmse_mm.n);
+    }
+}
