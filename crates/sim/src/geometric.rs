@@ -321,9 +321,9 @@ impl GeometricModel {
     /// A pixel near the contact: a point of the footprint, plus the halo, and a row about the skin's middle.
     fn around(&mut self, site: usize, depth_mm: f64) -> Option<(f64, f64)> {
         let site = self.sites.get(site)?;
-        let point = (self.events.bits() >> 32) as usize * site.columns.len() >> 32;
+        let point = ((self.events.bits() >> 32) * site.columns.len() as u64) >> 32;
         let halo = site.halo_px * (depth_mm.max(0.0) / 2.0).sqrt();
-        let x = site.columns.get(point)? + halo * self.events.gauss();
+        let x = site.columns.get(point as usize)? + halo * self.events.gauss();
         let (low, high) = self.scene.skin_rows;
         let (low, high) = (f64::from(low), f64::from(high));
         let sigma = self.config.row_share * (high - low);

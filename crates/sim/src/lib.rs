@@ -17,6 +17,7 @@ pub mod limits;
 pub mod motion;
 pub mod optical;
 pub mod random;
+pub mod replay;
 pub mod rig;
 pub mod scene;
 pub mod trigger;

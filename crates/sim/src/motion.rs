@@ -174,8 +174,8 @@ impl Motion {
         let change: [f64; 3] = std::array::from_fn(|i| wanted[i] - self.set_velocity[i]);
         let size = norm(change);
         let share = if size > a_dt { a_dt / size } else { 1.0 };
-        for i in 0..3 {
-            self.set_velocity[i] += change[i] * share;
+        for (i, by) in change.into_iter().enumerate() {
+            self.set_velocity[i] += by * share;
             self.set_point[i] += self.set_velocity[i] * DT_S;
         }
     }

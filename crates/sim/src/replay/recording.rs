@@ -1,0 +1,44 @@
+//! What a recording must give to be replayed, in model types only.
+
+use skinrig_model::{
+    CameraId, DeviceIdentity, DeviceRole, HostTime, MotionCommand, PoseSample, RawChunk, SentMark,
+    Setting,
+};
+
+/// A recording could not be read.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("recording: {0}")]
+pub struct RecordingError(pub String);
+
+/// A stored run, streamed: every `next_*` goes on where it stopped and gives `None` at the end.
+pub trait Recording: Send {
+    /// Who the device was; `None` when the rig had no such device.
+    fn identity(&self, role: DeviceRole) -> Option<DeviceIdentity>;
+
+    /// The device's settings as read back.
+    fn settings(&self, role: DeviceRole) -> Vec<Setting>;
+
+    /// The next motion command, in time order.
+    ///
+    /// # Errors
+    /// [`RecordingError`] when it cannot be read.
+    fn next_command(&mut self) -> Result<Option<(HostTime, MotionCommand)>, RecordingError>;
+
+    /// The next block of poses, in time order, of any size above 0.
+    ///
+    /// # Errors
+    /// [`RecordingError`] when it cannot be read.
+    fn next_poses(&mut self) -> Result<Option<Vec<PoseSample>>, RecordingError>;
+
+    /// The next mark, in time order.
+    ///
+    /// # Errors
+    /// [`RecordingError`] when it cannot be read.
+    fn next_mark(&mut self) -> Result<Option<SentMark>, RecordingError>;
+
+    /// The next chunk of `camera`, in stream order.
+    ///
+    /// # Errors
+    /// [`RecordingError`] when it cannot be read.
+    fn next_chunk(&mut self, camera: CameraId) -> Result<Option<RawChunk>, RecordingError>;
+}

@@ -1,0 +1,75 @@
+//! The trigger box of a recording.
+
+use skinrig_device::{DeviceError, TriggerBox, TriggerCapabilities};
+use skinrig_model::{
+    DeviceIdentity, DeviceRole, HostDuration, HostTime, Mark, PulseTrain, SentMark,
+};
+
+use super::tape::Tape;
+
+/// Plays the part of the trigger box: takes the recorded marks in order and gives their recorded instants.
+pub struct ReplayedTriggerBox {
+    tape: Tape,
+    busy_until: Option<HostTime>,
+}
+
+impl ReplayedTriggerBox {
+    /// The box of `tape`.
+    #[must_use]
+    pub const fn new(tape: Tape) -> Self {
+        Self {
+            tape,
+            busy_until: None,
+        }
+    }
+}
+
+impl TriggerBox for ReplayedTriggerBox {
+    fn identity(&self) -> DeviceIdentity {
+        self.tape.lock().identity(DeviceRole::TriggerBox)
+    }
+
+    fn capabilities(&self) -> TriggerCapabilities {
+        TriggerCapabilities {
+            train_duration: HostDuration::from_micros(PulseTrain::DURATION_US as i64),
+        }
+    }
+
+    fn send(&mut self, mark: Mark) -> Result<SentMark, DeviceError> {
+        let mut tape = self.tape.lock();
+        tape.check(DeviceRole::TriggerBox)?;
+        let serial = tape.identity(DeviceRole::TriggerBox).serial;
+        let now = tape.now();
+        if let Some(until) = self.busy_until.filter(|&until| now < until) {
+            return Err(DeviceError::State {
+                role: DeviceRole::TriggerBox,
+                serial,
+                expected: "idle".to_owned(),
+                found: format!("busy with a train until {until}"),
+            });
+        }
+        if PulseTrain::new(mark).is_none() {
+            return Err(DeviceError::Refused {
+                role: DeviceRole::TriggerBox,
+                serial,
+                expected: format!("a press up to {}", skinrig_model::pulse::MAX_MARKED_PRESS),
+                found: mark.press.0.to_string(),
+            });
+        }
+        let show = |m: Mark| format!("{} of {}", m.kind, m.press);
+        match tape.next_mark() {
+            Some(recorded) if recorded.mark == mark => {
+                tape.pass_mark();
+                drop(tape);
+                self.busy_until = Some(now + self.capabilities().train_duration);
+                Ok(recorded)
+            }
+            other => Err(DeviceError::Diverged {
+                role: DeviceRole::TriggerBox,
+                at: format!("mark {}", tape.marks_read()),
+                expected: other.map_or_else(|| "no further mark".to_owned(), |m| show(m.mark)),
+                found: show(mark),
+            }),
+        }
+    }
+}

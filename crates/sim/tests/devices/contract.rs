@@ -1,0 +1,109 @@
+//! The contract suite over simulated devices, and over replays of what they did.
+
+use std::sync::{Arc, Mutex};
+
+use crate::common::{LIMITS, Log, noted};
+use skinrig_device::contract::{self, IndenterContract};
+use skinrig_device::{Clock, EventCamera, Indenter, Rig, TriggerBox};
+use skinrig_model::{
+    CameraId, HostDuration, Mark, MarkKind, Point3, PressId, SimLevel, StreamFormat,
+};
+use skinrig_sim::replay::{RecordedRig, replayed_rig};
+use skinrig_sim::{Paced, SimClock, SimConfig, simulated_rig};
+
+const OPTIONS: IndenterContract = IndenterContract {
+    limits: LIMITS,
+    targets: [
+        Point3::new(20.0, -10.0, 5.0),
+        Point3::new(-20.0, 10.0, 15.0),
+    ],
+    outside: Point3::new(0.0, 81.0, 0.0),
+    speed_mm_s: 80.0,
+    tolerance_mm: 0.05,
+    patience: HostDuration::from_millis(1_500),
+};
+
+fn replay_of(log: &Log) -> Rig {
+    let rig = simulated_rig(&SimConfig::new(3, SimLevel::Kinematic));
+    let known = RecordedRig {
+        name: rig.name,
+        robot_from_skin: rig.robot_from_skin,
+        geometry: rig.geometry,
+        stream_formats: [StreamFormat::Evt2; 2],
+        camera_settings: rig.camera_settings,
+        description_json: rig.description_json,
+    };
+    replayed_rig(known, Box::new(log.clone()))
+}
+
+/// Runs `suite` on noted simulated rigs, then on replays of them in the same order.
+fn both(mut suite: impl FnMut(&mut dyn FnMut() -> Rig)) {
+    for level in [SimLevel::Kinematic, SimLevel::Geometric] {
+        let logs: Arc<Mutex<Vec<Arc<Mutex<Log>>>>> = Arc::default();
+        suite(&mut || {
+            let (rig, log) = noted(simulated_rig(&SimConfig::new(3, level)));
+            logs.lock().unwrap().push(log);
+            rig
+        });
+        let mut recorded = logs.lock().unwrap().clone().into_iter();
+        suite(&mut || {
+            let log = recorded.next().expect("as many replays as recordings");
+            let rig = replay_of(&log.lock().unwrap());
+            rig
+        });
+    }
+}
+
+#[test]
+fn clocks_keep_the_contract() {
+    contract::clock(&mut SimClock::new());
+    contract::clock(&mut Paced::new(SimClock::new()));
+    contract::clock(replay_of(&Log::default()).clock.as_mut());
+}
+
+#[test]
+fn indenters_keep_the_contract() {
+    both(|make| {
+        let mut split = || -> (Box<dyn Indenter>, Box<dyn Clock>) {
+            let rig = make();
+            (rig.indenter, rig.clock)
+        };
+        contract::indenter(&mut split, &OPTIONS);
+    });
+}
+
+#[test]
+fn cameras_keep_the_contract() {
+    for id in CameraId::ALL {
+        both(|make| {
+            let settings = simulated_rig(&SimConfig::new(3, SimLevel::Kinematic)).camera_settings;
+            let mut split = || -> (Box<dyn EventCamera>, Box<dyn Clock>) {
+                let rig = make();
+                let [one, two] = rig.cameras;
+                let camera = if id == CameraId::One { one } else { two };
+                (camera, rig.clock)
+            };
+            contract::event_camera(&mut split, &settings[id.index()]);
+        });
+    }
+}
+
+#[test]
+fn trigger_boxes_keep_the_contract() {
+    let marks: Vec<Mark> = MarkKind::ALL
+        .into_iter()
+        .map(|kind| Mark {
+            kind,
+            press: PressId(17),
+        })
+        .collect();
+    let marks = &marks;
+    // A recording without any device knows no trigger box; the noted rig names it at its first mark.
+    both(|make| {
+        let mut split = || -> (Box<dyn TriggerBox>, Box<dyn Clock>) {
+            let rig = make();
+            (rig.trigger_box.expect("a trigger box"), rig.clock)
+        };
+        contract::trigger_box(&mut split, marks);
+    });
+}

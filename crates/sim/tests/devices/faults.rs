@@ -1,0 +1,251 @@
+//! Each injected fault is seen through the error or the count that stands for it.
+
+use crate::common::{LIMITS, Take, places, press_all, ready};
+use skinrig_device::DeviceError;
+use skinrig_formats::Decoder;
+use skinrig_model::{
+    CameraId, DeviceRole, HostTime, Polarity, RawChunk, SimLevel, StreamFormat, pulse::decode_marks,
+};
+use skinrig_sim::{Fault, SimConfig, When, simulated_rig};
+
+fn with(level: SimLevel, fault: Fault) -> SimConfig {
+    SimConfig {
+        faults: vec![fault],
+        ..SimConfig::new(4, level)
+    }
+}
+
+fn failed(config: &SimConfig) -> DeviceError {
+    let mut rig = simulated_rig(config);
+    ready(&mut rig);
+    match press_all(&mut rig, &places(3), &[5_000]) {
+        Ok(_) => panic!("expected a fault"),
+        Err(e) => e,
+    }
+}
+
+#[test]
+fn lost_indenter() {
+    for when in [When::At(HostTime(700_000_000)), When::Contact(1)] {
+        let config = with(SimLevel::Kinematic, Fault::IndenterLost(when));
+        let mut rig = simulated_rig(&config);
+        ready(&mut rig);
+        let error = press_all(&mut rig, &places(3), &[5_000]).err();
+        assert!(matches!(
+            error,
+            Some(DeviceError::Lost {
+                role: DeviceRole::Indenter,
+                ..
+            })
+        ));
+        // It stays lost, and says so to the one who disarms.
+        assert!(matches!(
+            rig.indenter.disarm(),
+            Err(DeviceError::Lost { .. })
+        ));
+    }
+}
+
+#[test]
+fn sluggish_indenter_is_late() {
+    let off_at_hold = |faults: Vec<Fault>| {
+        let config = SimConfig {
+            faults,
+            ..SimConfig::new(4, SimLevel::Kinematic)
+        };
+        let mut rig = simulated_rig(&config);
+        ready(&mut rig);
+        let take = press_all(&mut rig, &places(1), &[5_000]).unwrap();
+        let s = take
+            .samples
+            .iter()
+            .find(|s| s.t == HostTime(990_000_000))
+            .unwrap();
+        s.measured.distance_mm(s.commanded)
+    };
+    assert!(off_at_hold(vec![]) < 0.05);
+    let when = When::At(HostTime::ZERO);
+    assert!(off_at_hold(vec![Fault::Sluggish { when, percent: 5 }]) > 0.5);
+}
+
+#[test]
+fn unplugged_camera_delivers_what_it_had() {
+    let when = When::At(HostTime(400_000_000));
+    let camera = CameraId::Two;
+    let config = with(SimLevel::Kinematic, Fault::CameraUnplugged { camera, when });
+    let mut rig = simulated_rig(&config);
+    ready(&mut rig);
+    rig.clock.wait_until(HostTime(1_000_000_000));
+    let mut chunks: Vec<RawChunk> = Vec::new();
+    let error = rig.cameras[1].poll(&mut chunks);
+    assert!(matches!(
+        error,
+        Err(DeviceError::Lost {
+            role: DeviceRole::Camera2,
+            ..
+        })
+    ));
+    let bytes: usize = chunks.iter().map(|c| c.bytes.len()).sum();
+    assert!(
+        bytes.abs_diff(100_000) < 600,
+        "0.4 s of idle stream, found {bytes} bytes"
+    );
+    assert!(rig.cameras[1].start().is_err());
+    rig.cameras[0].poll(&mut chunks).unwrap();
+}
+
+#[test]
+fn lost_bytes_are_counted() {
+    let when = When::At(HostTime(400_000_000));
+    let camera = CameraId::One;
+    let fault = Fault::CameraBytesLost {
+        camera,
+        when,
+        words: 1_234,
+    };
+    let run = |config: &SimConfig| -> Take {
+        let mut rig = simulated_rig(config);
+        ready(&mut rig);
+        let mut take = press_all(&mut rig, &places(1), &[5_000]).unwrap();
+        take.stop(&mut rig);
+        take
+    };
+    let (whole, holed) = (
+        run(&SimConfig::new(4, SimLevel::Geometric)),
+        run(&with(SimLevel::Geometric, fault)),
+    );
+    let (a, b) = (whole.bytes(camera), holed.bytes(camera));
+    assert_eq!(a.len(), b.len() + 4 * 1_234);
+    let lost: Vec<(usize, u64)> = holed.chunks[0]
+        .iter()
+        .enumerate()
+        .filter(|(_, c)| c.lost_before > 0)
+        .map(|(n, c)| (n, c.lost_before))
+        .collect();
+    assert_eq!(lost, [(1, 4 * 1_234)]);
+    let hole = holed.chunks[0][0].bytes.len();
+    assert_eq!(a[..hole], b[..hole]);
+    assert_eq!(a[hole + 4 * 1_234..], b[hole..]);
+    assert_eq!(whole.bytes(CameraId::Two), holed.bytes(CameraId::Two));
+}
+
+#[test]
+fn a_lost_pulse_spoils_one_train_in_one_camera() {
+    let fault = Fault::PulseLost {
+        camera: CameraId::Two,
+        train: 1,
+        pulse: 7,
+    };
+    let mut rig = simulated_rig(&with(SimLevel::Kinematic, fault));
+    ready(&mut rig);
+    let mut take = press_all(&mut rig, &places(3), &[5_000]).unwrap();
+    take.stop(&mut rig);
+    let seen = CameraId::ALL.map(|camera| {
+        let (mut events, mut edges) = (Vec::new(), Vec::new());
+        Decoder::new(StreamFormat::Evt2).push_cd(&take.bytes(camera), &mut events, &mut edges);
+        let seen = decode_marks(&edges);
+        (seen.marks.len(), seen.stray_edges)
+    });
+    assert_eq!(seen, [(3, 0), (2, 42)]);
+}
+
+#[test]
+fn trigger_box_lost() {
+    let error = failed(&with(
+        SimLevel::Kinematic,
+        Fault::TriggerBoxLost(When::Contact(0)),
+    ));
+    assert!(matches!(
+        error,
+        DeviceError::Lost {
+            role: DeviceRole::TriggerBox,
+            ..
+        }
+    ));
+}
+
+#[test]
+fn settings_that_do_not_take() {
+    let mut rig = simulated_rig(&with(SimLevel::Kinematic, Fault::IndenterReadBack));
+    assert!(matches!(
+        rig.indenter.configure(&LIMITS),
+        Err(DeviceError::ReadBack {
+            role: DeviceRole::Indenter,
+            ..
+        })
+    ));
+    let mut rig = simulated_rig(&with(
+        SimLevel::Kinematic,
+        Fault::CameraReadBack(CameraId::Two),
+    ));
+    let settings = rig.camera_settings.clone();
+    rig.cameras[0].configure(&settings[0]).unwrap();
+    assert!(matches!(
+        rig.cameras[1].configure(&settings[1]),
+        Err(DeviceError::ReadBack {
+            role: DeviceRole::Camera2,
+            ..
+        })
+    ));
+}
+
+#[test]
+fn dead_press_gives_background_only() {
+    let fault = Fault::DeadPress {
+        camera: CameraId::One,
+        contact: 1,
+    };
+    let mut config = with(SimLevel::Geometric, fault);
+    config.geometric.dead_share = 0.0;
+    let mut rig = simulated_rig(&config);
+    ready(&mut rig);
+    let mut take = press_all(&mut rig, &places(3), &[5_000]).unwrap();
+    take.stop(&mut rig);
+    let presses = |camera: CameraId| -> Vec<usize> {
+        let (mut events, mut edges) = (Vec::new(), Vec::new());
+        Decoder::new(StreamFormat::Evt2).push_cd(&take.bytes(camera), &mut events, &mut edges);
+        let zero = edges[0].t_us;
+        (0..3u64)
+            .map(|n| {
+                let from = zero + n * 1_500_000 + 100_000;
+                events
+                    .iter()
+                    .filter(|e| (from..from + 250_000).contains(&e.t_us))
+                    .filter(|e| e.polarity == Polarity::Off && (185..=360).contains(&e.y))
+                    .count()
+            })
+            .collect()
+    };
+    let (one, two) = (presses(CameraId::One), presses(CameraId::Two));
+    assert!(one[1] * 3 < one[0] && one[1] * 3 < one[2], "{one:?}");
+    assert!(two.iter().all(|&n| n > 1_200), "{two:?}");
+}
+
+#[test]
+fn too_much_force_stops_the_robot() {
+    let config = SimConfig::new(4, SimLevel::Kinematic);
+    let mut rig = simulated_rig(&config);
+    let soft = skinrig_device::MotionLimits {
+        max_force_n: 0.5,
+        ..LIMITS
+    };
+    rig.indenter.configure(&soft).unwrap();
+    rig.indenter.arm().unwrap();
+    let up = rig.robot_from_skin;
+    let at = |z: f64| up.apply(skinrig_model::Point2::new(10.0, 2.0).at_height(z));
+    rig.indenter.command(at(-3.0), 20.0).unwrap();
+    rig.clock.wait_until(HostTime(3_000_000_000));
+    let mut samples = Vec::new();
+    rig.indenter.poll(&mut samples).unwrap();
+    let deepest = samples
+        .iter()
+        .map(|s| s.measured.z_mm)
+        .fold(f64::MAX, f64::min);
+    assert!(deepest > at(-1.8).z_mm, "went on pressing to {deepest}");
+    assert!(matches!(
+        rig.indenter.command(at(-3.0), 20.0),
+        Err(DeviceError::Refused { .. })
+    ));
+    rig.indenter.command(at(5.0), 20.0).unwrap();
+    rig.indenter.command(at(4.0), 20.0).unwrap();
+}
