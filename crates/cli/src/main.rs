@@ -1,2 +1,7 @@
-//! The `skinrig` command line.
-fn main() {}
+//! The `skinrig` binary: the command line in, an exit code out.
+
+use skinrig::exit::Exit;
+
+fn main() -> Exit {
+    skinrig::main_with(std::env::args_os())
+}

@@ -1,0 +1,311 @@
+//! The command line as the user types it.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+use crate::exit::Exit;
+
+/// Runs tactile-skin experiments: protocol, robot, event cameras, session, analysis, report.
+#[derive(Debug, Parser)]
+#[command(name = "skinrig", version, about, after_help = Exit::HELP, arg_required_else_help = true)]
+pub struct Cli {
+    /// Print results as JSON on standard output; progress and messages stay on standard error.
+    #[arg(long, global = true)]
+    pub json: bool,
+
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// The commands.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Check a protocol and every motion it would make; touch nothing.
+    #[command(after_help = "Example:\n  skinrig check protocols/demo.yaml")]
+    Check(ProtocolArgs),
+
+    /// Compile a protocol into steps; print them, or draw the path.
+    #[command(after_help = "Examples:\n  skinrig plan protocols/paper-meander.yaml --svg path.svg\n  \
+        skinrig plan protocols/demo.yaml --set path.meander.pitch=6mm --steps")]
+    Plan(PlanArgs),
+
+    /// Run a protocol (on the simulated rig), record, analyse, report.
+    #[command(after_help = "Examples:\n  skinrig run protocols/demo.yaml\n  \
+        skinrig run protocols/demo.yaml --level optical --seed 7\n  \
+        skinrig run --replay sessions/NAME.session.sqlite\n\n\
+        ctrl-C once stops after the current press, twice retracts and stops now. The session stays readable.")]
+    Run(RunArgs),
+
+    /// List recorded sessions.
+    #[command(after_help = "Example:\n  skinrig sessions sessions/")]
+    Sessions(SessionsArgs),
+
+    /// Describe one session: protocol, rig, devices, presses, losses.
+    #[command(after_help = "Example:\n  skinrig show sessions/NAME.session.sqlite --presses")]
+    Show(ShowArgs),
+
+    /// Analyse a session; write its results beside it and print them.
+    #[command(after_help = "Examples:\n  skinrig analyze sessions/NAME.session.sqlite\n  \
+        skinrig analyze sessions/NAME.session.sqlite --set analysis.centroid=all_clusters --out other.json")]
+    Analyze(AnalyzeArgs),
+
+    /// Write the HTML report of a session (analysing it first when needed).
+    #[command(after_help = "Example:\n  skinrig report sessions/NAME.session.sqlite --out report.html")]
+    Report(ReportArgs),
+
+    /// Recompute every checksum, count and hash of a session.
+    #[command(after_help = "Example:\n  skinrig verify sessions/NAME.session.sqlite")]
+    Verify(SessionArg),
+
+    /// Make a session from the published dataset's files.
+    #[command(after_help = "Example:\n  skinrig import --camera1 camera1.hdf5 --camera2 camera2.hdf5 \\\n    \
+        --presses press_positions.csv --schedule protocols/paper-recording.schedule.yaml")]
+    Import(ImportArgs),
+
+    /// Write a session's data in other programs' formats.
+    #[command(after_help = "Example:\n  skinrig export sessions/NAME.session.sqlite --to raw --to presses --out export/")]
+    Export(ExportArgs),
+
+    /// Print what is in a RAW, HDF5 or session file.
+    #[command(after_help = "Example:\n  skinrig inspect recording.raw")]
+    Inspect(InspectArgs),
+
+    /// Print the JSON Schema of protocols, for editors.
+    #[command(after_help = "Example:\n  skinrig schema > skinrig.schema.json")]
+    Schema(SchemaArgs),
+}
+
+/// A protocol with overrides.
+#[derive(Debug, Args)]
+pub struct ProtocolArgs {
+    /// The protocol file.
+    pub protocol: PathBuf,
+
+    /// Override one value of the protocol, for example `path.meander.pitch=6mm`. Can be given several times.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub overrides: Vec<String>,
+}
+
+/// Arguments of `plan`.
+#[derive(Debug, Args)]
+pub struct PlanArgs {
+    /// The protocol.
+    #[command(flatten)]
+    pub protocol: ProtocolArgs,
+
+    /// Print every step.
+    #[arg(long)]
+    pub steps: bool,
+
+    /// Draw the path, numbered, as SVG.
+    #[arg(long, value_name = "FILE")]
+    pub svg: Option<PathBuf>,
+}
+
+/// Arguments of `run`.
+#[derive(Debug, Args)]
+pub struct RunArgs {
+    /// The protocol file; not needed with `--replay`.
+    #[arg(required_unless_present = "replay", conflicts_with = "replay")]
+    pub protocol: Option<PathBuf>,
+
+    /// Override one value of the protocol. Can be given several times.
+    #[arg(long = "set", value_name = "KEY=VALUE", conflicts_with = "replay")]
+    pub overrides: Vec<String>,
+
+    /// Serve this recorded session through the device interfaces instead of a rig.
+    #[arg(long, value_name = "SESSION")]
+    pub replay: Option<PathBuf>,
+
+    /// Seed of the run and of the simulated rig; the protocol's seed when absent.
+    #[arg(long, conflicts_with = "replay")]
+    pub seed: Option<u64>,
+
+    /// Simulation level (kinematic, geometric, optical); the cheapest that the protocol's scene needs when absent.
+    #[arg(long, conflicts_with = "replay")]
+    pub level: Option<String>,
+
+    /// Run the simulated rig at the speed of a real one.
+    #[arg(long, conflicts_with = "replay")]
+    pub real_time: bool,
+
+    /// Folder for the session file, its results and its report.
+    #[arg(long, value_name = "DIR", default_value = "sessions")]
+    pub sessions: PathBuf,
+
+    /// Record only.
+    #[arg(long)]
+    pub no_analysis: bool,
+
+    /// Fail (exit code 4) when the scored RMSE is above this, in mm.
+    #[arg(long, value_name = "MM")]
+    pub max_rmse: Option<f64>,
+}
+
+/// Arguments of `sessions`.
+#[derive(Debug, Args)]
+pub struct SessionsArgs {
+    /// The folder.
+    #[arg(default_value = "sessions")]
+    pub folder: PathBuf,
+
+    /// Only sessions of this prototype.
+    #[arg(long)]
+    pub prototype: Option<String>,
+}
+
+/// A session file.
+#[derive(Debug, Args)]
+pub struct SessionArg {
+    /// The session file.
+    pub session: PathBuf,
+}
+
+/// Arguments of `show`.
+#[derive(Debug, Args)]
+pub struct ShowArgs {
+    /// The session file.
+    pub session: PathBuf,
+
+    /// Also list every press.
+    #[arg(long)]
+    pub presses: bool,
+
+    /// Also print the protocol text.
+    #[arg(long)]
+    pub protocol: bool,
+}
+
+/// Arguments of `analyze`.
+#[derive(Debug, Args)]
+pub struct AnalyzeArgs {
+    /// The session file.
+    pub session: PathBuf,
+
+    /// Override one analysis setting of the session's protocol, for example `analysis.min_samples=5`.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub overrides: Vec<String>,
+
+    /// Where to write the results; beside the session when absent.
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+
+    /// Fail (exit code 4) when the scored RMSE is above this, in mm.
+    #[arg(long, value_name = "MM")]
+    pub max_rmse: Option<f64>,
+}
+
+/// Arguments of `report`.
+#[derive(Debug, Args)]
+pub struct ReportArgs {
+    /// The session file.
+    pub session: PathBuf,
+
+    /// Where to write the page; beside the session when absent.
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+}
+
+/// Arguments of `import`.
+#[derive(Debug, Args)]
+pub struct ImportArgs {
+    /// Camera 1: bimvee HDF5 or Prophesee RAW.
+    #[arg(long, value_name = "FILE")]
+    pub camera1: PathBuf,
+
+    /// Camera 2: bimvee HDF5 or Prophesee RAW.
+    #[arg(long, value_name = "FILE")]
+    pub camera2: PathBuf,
+
+    /// Press positions, CSV with a header naming at least x and y.
+    #[arg(long, value_name = "CSV")]
+    pub presses: PathBuf,
+
+    /// How the recording was made.
+    #[arg(long, value_name = "YAML")]
+    pub schedule: PathBuf,
+
+    /// Override one value of the schedule. Can be given several times.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub overrides: Vec<String>,
+
+    /// Which event stream to take from a file that holds several, for example `data/left/dvs`.
+    #[arg(long, value_name = "NAME")]
+    pub stream1: Option<String>,
+
+    /// The same for camera 2.
+    #[arg(long, value_name = "NAME")]
+    pub stream2: Option<String>,
+
+    /// Folder for the session file, its results and its report.
+    #[arg(long, value_name = "DIR", default_value = "sessions")]
+    pub sessions: PathBuf,
+
+    /// Import only; analyse later.
+    #[arg(long)]
+    pub no_analysis: bool,
+}
+
+/// What `export` can write.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum ExportKind {
+    /// One Prophesee RAW file per camera, bytes as recorded.
+    Raw,
+    /// The press table as CSV.
+    Presses,
+    /// The pose stream as CSV.
+    Poses,
+    /// One bimvee HDF5 file per camera.
+    Hdf5,
+    /// All of them.
+    All,
+}
+
+/// Arguments of `export`.
+#[derive(Debug, Args)]
+pub struct ExportArgs {
+    /// The session file.
+    pub session: PathBuf,
+
+    /// What to write. Can be given several times.
+    #[arg(long = "to", value_enum, required = true)]
+    pub kinds: Vec<ExportKind>,
+
+    /// Folder to write into; the session's own when absent.
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+}
+
+/// Arguments of `inspect`.
+#[derive(Debug, Args)]
+pub struct InspectArgs {
+    /// The file.
+    pub file: PathBuf,
+
+    /// Which event stream to read from a file that holds several.
+    #[arg(long, value_name = "NAME")]
+    pub stream: Option<String>,
+
+    /// Report silences longer than this, in ms.
+    #[arg(long, value_name = "MS", default_value_t = 1000.0)]
+    pub gap: f64,
+}
+
+/// Which schema.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum SchemaKind {
+    /// Protocols (`run`, `check`, `plan`).
+    Protocol,
+    /// Schedules (`import`).
+    Schedule,
+}
+
+/// Arguments of `schema`.
+#[derive(Debug, Args)]
+pub struct SchemaArgs {
+    /// Which schema.
+    #[arg(value_enum, default_value = "protocol")]
+    pub kind: SchemaKind,
+}

@@ -1,0 +1,73 @@
+//! Exit codes and the errors behind them.
+
+use std::fmt;
+use std::process::{ExitCode, Termination};
+
+/// How the program ended. The numbers are part of the interface and do not change.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Exit {
+    /// Everything asked for was done.
+    Ok = 0,
+    /// A fault of skinrig itself, or of the machine (disk full, no permission).
+    Internal = 1,
+    /// Bad input: command line, protocol, schedule, data file or session file.
+    Input = 2,
+    /// A device, the trigger line or the recorder failed during a run; the session up to there is kept.
+    Rig = 3,
+    /// A stated limit was not met: `--max-rmse`, `verify`.
+    Limit = 4,
+    /// The operator stopped or aborted the run; the session up to there is kept.
+    Stopped = 5,
+}
+
+impl Exit {
+    /// All codes with their meaning, for `--help`.
+    pub const HELP: &'static str = "Exit codes:\n  \
+        0  done\n  \
+        1  fault of skinrig or of this machine\n  \
+        2  bad input: command line, protocol, schedule, data or session file\n  \
+        3  rig fault during a run (the session up to there is kept)\n  \
+        4  a limit was not met (--max-rmse, verify)\n  \
+        5  stopped by the operator (the session up to there is kept)";
+}
+
+impl Termination for Exit {
+    fn report(self) -> ExitCode {
+        ExitCode::from(self as u8)
+    }
+}
+
+/// What a command failed with: a message for the user and the code to end with.
+#[derive(Debug)]
+pub struct Failure {
+    /// The code to end with.
+    pub exit: Exit,
+    /// Complete message, without `error:`.
+    pub message: String,
+}
+
+impl Failure {
+    /// Bad input.
+    pub fn input(message: impl fmt::Display) -> Self {
+        Self { exit: Exit::Input, message: message.to_string() }
+    }
+
+    /// A fault of the program or the machine.
+    pub fn internal(message: impl fmt::Display) -> Self {
+        Self { exit: Exit::Internal, message: message.to_string() }
+    }
+
+    /// A rig fault.
+    pub fn rig(message: impl fmt::Display) -> Self {
+        Self { exit: Exit::Rig, message: message.to_string() }
+    }
+
+    /// A limit that was not met.
+    pub fn limit(message: impl fmt::Display) -> Self {
+        Self { exit: Exit::Limit, message: message.to_string() }
+    }
+}
+
+/// What a command returns.
+pub type Outcome = Result<Exit, Failure>;

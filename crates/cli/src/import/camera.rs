@@ -1,0 +1,249 @@
+//! A camera that plays a recorded file: events or bytes in, EVT2 chunks out, behind the device trait.
+//!
+//! A thread reads the file and hands chunks over through a short queue, so that memory stays bounded however
+//! long the recording is. The file's clock and the schedule's clock are unrelated until the analysis aligns
+//! them; a chunk therefore "arrives" when the schedule's time reaches the file's time, and the last ones at
+//! the stop.
+
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+
+use skinrig_device::{CameraCapabilities, CameraSettings, Clock, DeviceError, EventCamera};
+use skinrig_formats::{Scanner, evt2};
+use skinrig_model::{
+    CameraId, CdEvent, ChunkFacts, DeviceIdentity, DeviceRole, RawChunk, Setting, StreamFormat,
+    TriggerEdge,
+};
+use skinrig_sim::SimClock;
+
+/// A chunk is closed at this size, bytes.
+const CHUNK_BYTES: usize = 1 << 20;
+/// Or when it spans this much camera time, µs.
+const CHUNK_SPAN_US: u64 = 1_000_000;
+/// Chunks that may wait between the reading thread and the run.
+const QUEUE: usize = 4;
+/// Time words of encoded streams come this often, µs: the sparsest that EVT2 allows, because a container without
+/// time words gives no reason for more.
+const TIME_HIGH_EVERY_US: u64 = 64;
+
+type Item = Result<(Vec<u8>, ChunkFacts, Vec<TriggerEdge>), String>;
+
+/// Where the reading thread puts what it reads.
+pub struct ChunkFeed {
+    queue: SyncSender<Item>,
+    scanner: Scanner,
+    encoder: Option<evt2::Encoder>,
+    bytes: Vec<u8>,
+    chunk_from_us: u64,
+}
+
+/// The run ended before the file did; reading on is pointless.
+#[derive(Debug)]
+pub struct RunEnded;
+
+impl ChunkFeed {
+    /// Takes the next events of a container without words of its own, in time order.
+    ///
+    /// # Errors
+    /// [`RunEnded`]; [`ChunkFeed::fail`] has been called when an event cannot be encoded.
+    pub fn events(&mut self, events: &[CdEvent]) -> Result<(), RunEnded> {
+        for event in events {
+            if self.encoder.is_none() {
+                let first = event.t_us - event.t_us % TIME_HIGH_EVERY_US;
+                match evt2::Encoder::with_cadence(first, TIME_HIGH_EVERY_US) {
+                    Ok(encoder) => self.encoder = Some(encoder),
+                    Err(e) => return self.fail(e.to_string()),
+                }
+                self.chunk_from_us = first;
+            }
+            // Idle stretches are closed second by second, so that no chunk spans hours.
+            while event.t_us - self.chunk_from_us >= CHUNK_SPAN_US {
+                let end = self.chunk_from_us + CHUNK_SPAN_US;
+                if let Some(Err(e)) =
+                    self.encoder.as_mut().map(|x| x.advance_to(end, &mut self.bytes))
+                {
+                    return self.fail(e.to_string());
+                }
+                self.send()?;
+                self.chunk_from_us = end;
+            }
+            if let Some(Err(e)) = self.encoder.as_mut().map(|x| x.cd(*event, &mut self.bytes)) {
+                return self.fail(e.to_string());
+            }
+            if self.bytes.len() >= CHUNK_BYTES {
+                self.send()?;
+                self.chunk_from_us = event.t_us;
+            }
+        }
+        Ok(())
+    }
+
+    /// Takes the next bytes of a stream that is recorded as it is.
+    ///
+    /// # Errors
+    /// [`RunEnded`].
+    pub fn raw(&mut self, bytes: &[u8]) -> Result<(), RunEnded> {
+        self.bytes.extend_from_slice(bytes);
+        if self.bytes.len() >= CHUNK_BYTES { self.send() } else { Ok(()) }
+    }
+
+    /// Ends the stream with an error for the user.
+    ///
+    /// # Errors
+    /// Always [`RunEnded`].
+    pub fn fail(&mut self, message: String) -> Result<(), RunEnded> {
+        self.queue.send(Err(message)).map_err(|_| RunEnded)?;
+        Err(RunEnded)
+    }
+
+    fn send(&mut self) -> Result<(), RunEnded> {
+        if self.bytes.is_empty() {
+            return Ok(());
+        }
+        let bytes = std::mem::take(&mut self.bytes);
+        let (facts, triggers) = self.scanner.push(&bytes);
+        self.queue.send(Ok((bytes, facts, triggers))).map_err(|_| RunEnded)
+    }
+}
+
+/// The camera.
+pub struct FileCamera {
+    camera: CameraId,
+    file: String,
+    format: StreamFormat,
+    clock: SimClock,
+    queue: Receiver<Item>,
+    waiting: Option<(Vec<u8>, ChunkFacts, Vec<TriggerEdge>)>,
+    base_us: Option<u64>,
+    seq: u64,
+    streaming: bool,
+}
+
+impl FileCamera {
+    /// A camera whose stream `read` produces on a thread of its own. `read` ends with an error for the user or
+    /// when the file does.
+    ///
+    /// # Errors
+    /// A message when the thread cannot be started.
+    pub fn new(
+        camera: CameraId,
+        file: String,
+        format: StreamFormat,
+        clock: SimClock,
+        read: impl FnOnce(&mut ChunkFeed) -> Result<(), String> + Send + 'static,
+    ) -> Result<Self, String> {
+        let (sender, queue) = sync_channel(QUEUE);
+        std::thread::Builder::new()
+            .name(format!("read-camera-{}", camera.number()))
+            .spawn(move || {
+                let mut feed = ChunkFeed {
+                    queue: sender,
+                    scanner: Scanner::new(format),
+                    encoder: None,
+                    bytes: Vec::new(),
+                    chunk_from_us: 0,
+                };
+                let _ = match read(&mut feed) {
+                    Ok(()) => feed.send(),
+                    Err(message) => feed.fail(message),
+                };
+            })
+            .map_err(|e| format!("cannot start a reading thread: {e}"))?;
+        Ok(Self { camera, file, format, clock, queue, waiting: None, base_us: None, seq: 0, streaming: false })
+    }
+
+    /// Hands over chunks that end within `until_us` after the file's first word; all with `None`.
+    fn hand_over(
+        &mut self,
+        until_us: Option<u64>,
+        chunks: &mut Vec<RawChunk>,
+    ) -> Result<(), DeviceError> {
+        loop {
+            let (bytes, facts, triggers) = match self.waiting.take() {
+                Some(waiting) => waiting,
+                None => match self.queue.recv() {
+                    Ok(Ok(next)) => next,
+                    Ok(Err(detail)) => {
+                        return Err(DeviceError::Lost {
+                            role: DeviceRole::of_camera(self.camera),
+                            serial: self.file.clone(),
+                            detail,
+                        });
+                    }
+                    Err(_) => return Ok(()),
+                },
+            };
+            let base_us = *self.base_us.get_or_insert(facts.first_us.unwrap_or(0));
+            let due = match (until_us, facts.last_us) {
+                (Some(until), Some(last)) => last.saturating_sub(base_us) <= until,
+                _ => true,
+            };
+            if !due {
+                self.waiting = Some((bytes, facts, triggers));
+                return Ok(());
+            }
+            chunks.push(RawChunk {
+                camera: self.camera,
+                seq: self.seq,
+                host_time: self.clock.now(),
+                lost_before: 0,
+                bytes,
+                facts,
+                triggers,
+            });
+            self.seq += 1;
+        }
+    }
+}
+
+impl EventCamera for FileCamera {
+    fn camera(&self) -> CameraId {
+        self.camera
+    }
+
+    fn identity(&self) -> DeviceIdentity {
+        DeviceIdentity {
+            model: "recorded file".into(),
+            serial: self.file.clone(),
+            firmware: "none".into(),
+        }
+    }
+
+    fn capabilities(&self) -> CameraCapabilities {
+        CameraCapabilities {
+            width: skinrig_model::SENSOR_WIDTH,
+            height: skinrig_model::SENSOR_HEIGHT,
+            format: self.format,
+            trigger_channels: vec![0, 6, 7],
+            biases: Vec::new(),
+        }
+    }
+
+    fn configure(&mut self, _settings: &CameraSettings) -> Result<Vec<Setting>, DeviceError> {
+        Ok(Vec::new())
+    }
+
+    fn start(&mut self) -> Result<(), DeviceError> {
+        self.streaming = true;
+        Ok(())
+    }
+
+    fn poll(&mut self, chunks: &mut Vec<RawChunk>) -> Result<(), DeviceError> {
+        if !self.streaming {
+            return Ok(());
+        }
+        let now_us = u64::try_from(self.clock.now().0 / 1_000).unwrap_or(0);
+        self.hand_over(Some(now_us), chunks)
+    }
+
+    fn flush(&mut self, chunks: &mut Vec<RawChunk>) -> Result<(), DeviceError> {
+        self.poll(chunks)
+    }
+
+    fn stop(&mut self, chunks: &mut Vec<RawChunk>) -> Result<(), DeviceError> {
+        if !self.streaming {
+            return Ok(());
+        }
+        self.streaming = false;
+        self.hand_over(None, chunks)
+    }
+}

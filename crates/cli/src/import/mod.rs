@@ -1,0 +1,155 @@
+//! `skinrig import`: the published dataset's files become a session like any other.
+//!
+//! The schedule is compiled into a plan and run by the same controller, over a robot that is exactly where the
+//! schedule says and cameras that play the files. What was never measured is marked as scheduled.
+
+mod camera;
+mod indenter;
+mod plan;
+
+use std::path::Path;
+
+use skinrig_device::{CameraSettings, Rig};
+use skinrig_formats::hdf5::Container;
+use skinrig_formats::positions::{LengthUnit, PositionTable};
+use skinrig_formats::raw::RawReader;
+use skinrig_formats::Geometry;
+use skinrig_model::{CameraId, HostDuration, Point2, RigidTransform, StreamFormat};
+use skinrig_protocol::Schedule;
+use skinrig_sim::SimClock;
+
+use crate::args::ImportArgs;
+use crate::exit::{Failure, Outcome};
+use crate::run::{Intent, conclude, record};
+use camera::{ChunkFeed, FileCamera};
+use indenter::ScheduledIndenter;
+
+/// Imports a dataset.
+///
+/// # Errors
+/// [`Failure::input`] for files that are not what they should be, [`Failure::rig`] when a file breaks off inside.
+pub fn import(args: &ImportArgs, command_line: &str, json: bool) -> Outcome {
+    let name = args.schedule.to_string_lossy();
+    let bytes = std::fs::read(&args.schedule)
+        .map_err(|e| Failure::input(format!("{name}: cannot read the schedule: {e}")))?;
+    let schedule = Schedule::parse(&name, &bytes, &args.overrides)
+        .map_err(|found| Failure::input(format!("in the schedule\n{found}")))?;
+    let positions = read_positions(&args.presses, &schedule)?;
+    let (presses, times) = schedule.planned(&positions).map_err(Failure::input)?;
+    let plan = plan::compile(&schedule, presses, &times);
+
+    let clock = SimClock::new();
+    let one = open(CameraId::One, &args.camera1, args.stream1.clone(), &clock)?;
+    let two = open(CameraId::Two, &args.camera2, args.stream2.clone(), &clock)?;
+    let rig = Rig {
+        kind: "imported".into(),
+        name: "imported recording".into(),
+        indenter: Box::new(ScheduledIndenter::new(clock.clone(), plan::start())),
+        cameras: [Box::new(one), Box::new(two)],
+        camera_settings: [CameraSettings::default(), CameraSettings::default()],
+        trigger_box: None,
+        clock: Box::new(clock),
+        robot_from_skin: RigidTransform::identity(),
+        geometry: schedule.rig,
+        description_json: serde_json::json!({
+            "camera1": args.camera1, "camera2": args.camera2, "presses": args.presses,
+        })
+        .to_string(),
+    };
+    let last = times.last().map_or(0, |t| t.0);
+    if !json {
+        println!(
+            "import  {} presses by schedule, {:.0} s: {} and {}",
+            plan.presses.len(),
+            last as f64 * 1e-9,
+            args.camera1.display(),
+            args.camera2.display()
+        );
+    }
+    let intent = Intent {
+        text: &schedule.text,
+        file_name: &schedule.file_name,
+        name: &schedule.name,
+        sha256: &schedule.sha256,
+        overrides: &args.overrides,
+        seed: 0,
+        prototype: &schedule.prototype.id,
+        operator: &schedule.operator,
+        analysis: &schedule.analysis,
+        command_line,
+        expected: HostDuration(last),
+    };
+    let (session, report) = record(&intent, &plan, rig, &args.sessions)?;
+    conclude(&session, &report, args.no_analysis, None, json)
+}
+
+fn read_positions(path: &Path, schedule: &Schedule) -> Result<Vec<Point2>, Failure> {
+    // The table knows metres and millimetres; any other unit is a multiple of the latter.
+    let (unit, scale) = match schedule.csv_unit_mm {
+        1000.0 => (LengthUnit::Metre, 1.0),
+        mm => (LengthUnit::Millimetre, mm),
+    };
+    let table = PositionTable::read(path, unit).map_err(Failure::input)?;
+    if !table.blank_lines.is_empty() {
+        if !schedule.csv_skip_blank_rows {
+            return Err(Failure::input(format!(
+                "{}: line(s) {:?} are blank\n  next: remove them, or set csv.skip_blank_rows in the schedule",
+                path.display(),
+                table.blank_lines
+            )));
+        }
+        eprintln!("note: {}: blank line(s) {:?} are no presses", path.display(), table.blank_lines);
+    }
+    Ok(table.presses.iter().map(|p| Point2::new(p.x_mm * scale, p.y_mm * scale)).collect())
+}
+
+#[derive(Debug)]
+enum FileKind { Hdf5, Raw }
+impl FileKind { fn of(p:&Path)->std::io::Result<Self>{ let b=std::fs::read(p)?; Ok(if b.starts_with(b"\x89HDF"){Self::Hdf5}else{Self::Raw}) } }
+/// Opens one camera's file and starts reading it.
+fn open(
+    camera: CameraId,
+    path: &Path,
+    stream: Option<String>,
+    clock: &SimClock,
+) -> Result<FileCamera, Failure> {
+    let file = path.display().to_string();
+    let path = path.to_owned();
+    let kind = FileKind::of(&path).map_err(Failure::input)?;
+    let opened = match kind {
+        FileKind::Hdf5 => {
+            // Opened here once, so that a wrong file is refused before a session is made.
+            let container = Container::open(&path).map_err(Failure::input)?;
+            container.choose(stream.as_deref()).map_err(Failure::input)?;
+            FileCamera::new(camera, file, StreamFormat::Evt2, clock.clone(), move |feed| {
+                read_hdf5(&path, stream.as_deref(), feed)
+            })
+        }
+        FileKind::Raw => {
+            let format = RawReader::open(&path).map_err(Failure::input)?.header().format;
+            FileCamera::new(camera, file, format, clock.clone(), move |feed| read_raw(&path, feed))
+        }
+    };
+    opened.map_err(Failure::internal)
+}
+
+fn read_hdf5(path: &Path, stream: Option<&str>, feed: &mut ChunkFeed) -> Result<(), String> {
+    let container = Container::open(path).map_err(|e| e.to_string())?;
+    let mut events = container.events(stream, Geometry::EVK1).map_err(|e| e.to_string())?;
+    loop {
+        let batch = events.next_batch().map_err(|e| e.to_string())?;
+        if batch.is_empty() || feed.events(batch).is_err() {
+            return Ok(());
+        }
+    }
+}
+
+fn read_raw(path: &Path, feed: &mut ChunkFeed) -> Result<(), String> {
+    let mut reader = RawReader::open(path).map_err(|e| e.to_string())?;
+    loop {
+        let bytes = reader.next_chunk().map_err(|e| e.to_string())?;
+        if bytes.is_empty() || feed.raw(bytes).is_err() {
+            return Ok(());
+        }
+    }
+}

@@ -1,0 +1,83 @@
+//! The `skinrig` command line: arguments, wiring of the crates, terminal output, exit codes.
+//!
+//! The binary is a thin shell over [`main_with`]; whole-system tests use the same modules.
+#![expect(clippy::print_stdout, clippy::print_stderr, reason = "this crate owns the terminal")]
+
+pub mod args;
+pub mod check;
+pub mod exit;
+pub mod export;
+pub mod import;
+pub mod inspect;
+pub mod paths;
+pub mod progress;
+pub mod provenance;
+pub mod recording;
+pub mod results;
+pub mod rig;
+pub mod run;
+pub mod schema;
+pub mod sessions;
+pub mod show;
+pub mod signals;
+pub mod sink;
+pub mod source;
+pub mod verify;
+
+use std::ffi::OsString;
+
+use clap::Parser;
+
+use crate::args::{Cli, Command};
+use crate::exit::{Exit, Outcome};
+
+/// Runs the program with these arguments (the first is its own name) and says how it ended.
+pub fn main_with(arguments: impl IntoIterator<Item = OsString>) -> Exit {
+    let arguments: Vec<OsString> = arguments.into_iter().collect();
+    let cli = match Cli::try_parse_from(&arguments) {
+        Ok(cli) => cli,
+        Err(error) => {
+            // Help and version are not errors; clap prints them to standard output.
+            let exit = if error.use_stderr() { Exit::Input } else { Exit::Ok };
+            let _ = error.print();
+            return exit;
+        }
+    };
+    match dispatch(&cli, &arguments) {
+        Ok(exit) => exit,
+        Err(failure) => {
+            eprintln!("error: {}", failure.message);
+            failure.exit
+        }
+    }
+}
+
+fn dispatch(cli: &Cli, arguments: &[OsString]) -> Outcome {
+    let json = cli.json;
+    match &cli.command {
+        Command::Check(a) => check::check(a, json),
+        Command::Plan(a) => check::plan(a, json),
+        Command::Run(a) => run::run(a, &command_line(arguments), json),
+        Command::Sessions(a) => sessions::sessions(a, json),
+        Command::Show(a) => show::show(a, json),
+        Command::Analyze(a) => results::analyze(a, json),
+        Command::Report(a) => results::report(a, json),
+        Command::Verify(a) => verify::verify(a, json),
+        Command::Import(a) => import::import(a, &command_line(arguments), json),
+        Command::Export(a) => export::export(a, json),
+        Command::Inspect(a) => inspect::inspect(a, json),
+        Command::Schema(a) => schema::schema(a),
+    }
+}
+
+/// The arguments as one line, for the session's header.
+fn command_line(arguments: &[OsString]) -> String {
+    let words: Vec<_> = arguments.iter().skip(1).map(|a| a.to_string_lossy()).collect();
+    format!("skinrig {}", words.join(" "))
+}
+
+/// Prints a JSON value for programs, and its end of line.
+pub(crate) fn print_json(value: &serde_json::Value) {
+    // Pretty printing of a `Value` cannot fail.
+    println!("{}", serde_json::to_string_pretty(value).unwrap_or_default());
+}

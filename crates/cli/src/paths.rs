@@ -1,0 +1,89 @@
+//! Where a session and the files beside it live, and what they are called.
+
+use std::path::{Path, PathBuf};
+
+use chrono::{DateTime, Utc};
+
+use crate::exit::Failure;
+
+/// The ending of every session file.
+pub const SESSION_SUFFIX: &str = ".session.sqlite";
+
+/// A new session's path in `folder` (made when missing): `<UTC time>-<protocol>-<prototype>.session.sqlite`,
+/// with a number when that name is taken.
+///
+/// # Errors
+/// [`Failure::internal`] when the folder cannot be made.
+pub fn new_session(
+    folder: &Path,
+    started: DateTime<Utc>,
+    protocol: &str,
+    prototype: &str,
+) -> Result<PathBuf, Failure> {
+    std::fs::create_dir_all(folder).map_err(|e| {
+        Failure::internal(format!(
+            "cannot make the sessions folder {}: {e}\n  next: choose another one with --sessions",
+            folder.display()
+        ))
+    })?;
+    let stem =
+        format!("{}-{}-{}", started.format("%Y%m%dT%H%M%SZ"), slug(protocol), slug(prototype));
+    let mut path = folder.join(format!("{stem}{SESSION_SUFFIX}"));
+    let mut n = 2;
+    while path.exists() {
+        path = folder.join(format!("{stem}-{n}{SESSION_SUFFIX}"));
+        n += 1;
+    }
+    Ok(path)
+}
+
+/// The file beside `session` with another ending, for example `.report.html`.
+#[must_use]
+pub fn beside(session: &Path, suffix: &str) -> PathBuf {
+    let name = session.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    let stem = name.strip_suffix(SESSION_SUFFIX).unwrap_or(&name);
+    session.with_file_name(format!("{stem}{suffix}"))
+}
+
+/// Letters, digits, `_` and `-` stay; every run of anything else becomes one `-`.
+fn slug(text: &str) -> String {
+    let mut out = String::new();
+    for c in text.chars() {
+        if c.is_ascii_alphanumeric() || c == '_' {
+            out.push(c.to_ascii_lowercase());
+        } else if !out.ends_with('-') && !out.is_empty() {
+            out.push('-');
+        }
+    }
+    let out = out.trim_end_matches('-');
+    if out.is_empty() { "unnamed".into() } else { out.chars().take(40).collect() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_safe_in_any_shell() {
+        assert_eq!(slug("Skin A/3 (soft)"), "skin-a-3-soft");
+        assert_eq!(slug("../../etc"), "etc");
+        assert_eq!(slug("日本"), "unnamed");
+    }
+
+    #[test]
+    fn results_lie_beside_the_session() {
+        let session = Path::new("s/x.session.sqlite");
+        assert_eq!(beside(session, ".report.html"), Path::new("s/x.report.html"));
+        assert_eq!(beside(Path::new("y.db"), ".report.html"), Path::new("y.db.report.html"));
+    }
+
+    #[test]
+    fn a_taken_name_gets_a_number() {
+        let dir = tempfile::tempdir().unwrap();
+        let t = DateTime::from_timestamp(0, 0).unwrap();
+        let first = new_session(dir.path(), t, "demo", "A").unwrap();
+        std::fs::write(&first, b"").unwrap();
+        let second = new_session(dir.path(), t, "demo", "A").unwrap();
+        assert!(second.to_string_lossy().ends_with("demo-a-2.session.sqlite"));
+    }
+}

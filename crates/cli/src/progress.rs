@@ -1,0 +1,131 @@
+//! What a terminal shows while a run goes on: a live bar on a terminal, plain lines elsewhere.
+
+use std::io::IsTerminal;
+use std::time::{Duration, Instant};
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use skinrig_controller::{Progress, ProgressTracker};
+use skinrig_model::{CameraId, HostDuration, PressRole, Record};
+
+/// A bar is redrawn at most this often.
+const REDRAW_EVERY: Duration = Duration::from_millis(100);
+
+/// Shows a run from its records.
+pub struct ProgressView {
+    tracker: ProgressTracker,
+    display: Display,
+    drawn: Option<Instant>,
+}
+
+enum Display {
+    /// A live bar on standard error.
+    Bar(ProgressBar),
+    /// A line on standard error each time another tenth of the presses is done.
+    Lines { tenths: usize },
+}
+
+impl ProgressView {
+    /// A view for a run that should take `expected` of rig time; a bar when standard error is a terminal.
+    #[must_use]
+    pub fn new(presses: usize, expected: HostDuration) -> Self {
+        let display = if std::io::stderr().is_terminal() {
+            let bar = ProgressBar::with_draw_target(
+                Some(presses as u64),
+                ProgressDrawTarget::stderr_with_hz(10),
+            );
+            // The template is a constant; should it ever be wrong, the default style still counts presses.
+            if let Ok(style) = ProgressStyle::with_template("{bar:28.cyan/blue} {msg}") {
+                bar.set_style(style.progress_chars("━━╌"));
+            }
+            Display::Bar(bar)
+        } else {
+            Display::Lines { tenths: 0 }
+        };
+        Self { tracker: ProgressTracker::new(Some(expected)), display, drawn: None }
+    }
+
+    /// The run as of the last record.
+    #[must_use]
+    pub const fn progress(&self) -> &Progress {
+        self.tracker.progress()
+    }
+
+    /// Takes the next record.
+    pub fn update(&mut self, record: &Record) {
+        self.tracker.update(record);
+        let done = self.tracker.progress().done;
+        match &mut self.display {
+            Display::Bar(bar) => {
+                let due = self.drawn.is_none_or(|at| at.elapsed() >= REDRAW_EVERY);
+                if due {
+                    bar.set_position(done as u64);
+                    bar.set_message(line(&self.tracker));
+                    self.drawn = Some(Instant::now());
+                }
+            }
+            Display::Lines { tenths } => {
+                let planned = self.tracker.progress().planned.max(1);
+                let reached = done * 10 / planned;
+                if reached > *tenths {
+                    *tenths = reached;
+                    eprintln!("{}", line(&self.tracker));
+                }
+            }
+        }
+    }
+
+    /// Takes the bar away; what was shown as lines stays.
+    pub fn finish(&mut self) {
+        if let Display::Bar(bar) = &self.display {
+            bar.finish_and_clear();
+        }
+    }
+}
+
+/// `press 12/246  rep 2  (10.0, 2.0) mm  cam1 31.2 cam2 28.0 kev/s  trigger 24 sent 24+24 seen  eta 0:03:12`
+fn line(tracker: &ProgressTracker) -> String {
+    let p = tracker.progress();
+    let press = p.press.map_or_else(String::new, |press| {
+        let block = match press.role {
+            PressRole::Sync => "sync".to_owned(),
+            PressRole::Calibrate | PressRole::Score => format!("rep {}", press.repetition + 1),
+        };
+        format!("  {block}  ({:.1}, {:.1}) mm", press.at.x_mm, press.at.y_mm)
+    });
+    let rate = |camera| {
+        tracker.events_per_s(camera).map_or_else(|| "-".into(), |r| format!("{:.1}", r / 1e3))
+    };
+    let lost: u64 = p.cameras.iter().map(|c| c.lost_bytes).sum();
+    let lost = if lost > 0 { format!("  LOST {lost} bytes") } else { String::new() };
+    let paused = if p.paused { "  PAUSED" } else { "" };
+    let invalid = if p.invalid > 0 { format!("  {} invalid", p.invalid) } else { String::new() };
+    format!(
+        "press {}{press}  cam1 {} cam2 {} kev/s  trigger {} sent, {}+{} seen{invalid}{lost}{paused}  eta {}",
+        tracker.press_label(),
+        rate(CameraId::One),
+        rate(CameraId::Two),
+        p.marks_sent,
+        p.cameras[0].marks_seen,
+        p.cameras[1].marks_seen,
+        p.eta.map_or_else(|| "-".into(), clock_text),
+    )
+}
+
+/// `h:mm:ss`.
+#[must_use]
+pub fn clock_text(d: HostDuration) -> String {
+    let s = d.as_secs_f64().round().max(0.0) as u64;
+    format!("{}:{:02}:{:02}", s / 3600, s / 60 % 60, s % 60)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn durations_read_like_a_clock() {
+        assert_eq!(clock_text(HostDuration::from_secs_f64(0.4)), "0:00:00");
+        assert_eq!(clock_text(HostDuration::from_secs_f64(3725.0)), "1:02:05");
+        assert_eq!(clock_text(HostDuration(-5)), "0:00:00");
+    }
+}

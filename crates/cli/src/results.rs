@@ -1,0 +1,209 @@
+//! `skinrig analyze` and `skinrig report`, and the end of `run` and `import`: from a session to its results.
+
+use std::io::IsTerminal;
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+use skinrig_analysis::{Analysis, SessionInput};
+use skinrig_model::{AnalysisSettings, CameraId, RigGeometry, RunHeader};
+use skinrig_recorder::{RecorderError, SessionReader};
+use skinrig_report::{Provenance, ReportInput};
+
+use crate::args::{AnalyzeArgs, ReportArgs};
+use crate::exit::{Exit, Failure, Outcome};
+use crate::paths::beside;
+use crate::source::SessionEvents;
+
+/// What `RunHeader::rig_json` holds.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct RigDocument {
+    /// What an analysis needs to know of the rig.
+    pub geometry: RigGeometry,
+    /// The analysis settings of the protocol.
+    pub analysis: AnalysisSettings,
+    /// Everything worth keeping about the rig.
+    pub rig: serde_json::Value,
+}
+
+/// The results of one session.
+pub struct Results {
+    /// Where the session is.
+    pub session: PathBuf,
+    /// The numbers.
+    pub analysis: Analysis,
+    /// Where they come from.
+    pub provenance: Provenance,
+}
+
+impl Results {
+    /// As the report crate takes it.
+    #[must_use]
+    pub fn report_input(&self) -> ReportInput<'_> {
+        ReportInput { analysis: &self.analysis, provenance: self.provenance.clone() }
+    }
+}
+
+/// Analyses a session, with the settings it was recorded with or with others.
+///
+/// # Errors
+/// [`Failure::input`] for files that are no readable session or settings that do not parse.
+pub fn analyze_session(path: &Path, overrides: &[String]) -> Result<Results, Failure> {
+    let unreadable = |e: RecorderError| Failure::input(e);
+    let reader = SessionReader::open(path).map_err(unreadable)?;
+    let header = reader.header().map_err(unreadable)?;
+    let document: RigDocument = serde_json::from_str(&header.rig_json).map_err(|e| {
+        Failure::input(format!(
+            "{}: expected the description of the rig in the session, found: {e}\n  \
+             next: `skinrig verify` says whether the file is damaged",
+            path.display()
+        ))
+    })?;
+    let settings = if overrides.is_empty() {
+        document.analysis
+    } else {
+        overridden_settings(&header, overrides)?
+    };
+    let input = session_input(&reader, settings, document.geometry).map_err(unreadable)?;
+    let events = SessionEvents::new(path, header.stream_formats);
+    let analysis = skinrig_analysis::analyze(&input, &events).map_err(Failure::input)?;
+    let provenance =
+        crate::provenance::provenance(&reader, &header, &analysis).map_err(unreadable)?;
+    Ok(Results { session: path.to_owned(), analysis, provenance })
+}
+
+/// The analysis settings of the session's own protocol or schedule with more overrides.
+fn overridden_settings(
+    header: &RunHeader,
+    overrides: &[String],
+) -> Result<AnalysisSettings, Failure> {
+    if let Some(other) = overrides.iter().find(|o| !o.trim_start().starts_with("analysis.")) {
+        return Err(Failure::input(format!(
+            "--set {other}: expected a key below `analysis.`; a recorded session's other values cannot change"
+        )));
+    }
+    let all: Vec<String> = header.overrides.iter().chain(overrides).cloned().collect();
+    let text = header.protocol_text.as_bytes();
+    let loader = |p: &Path| std::fs::read(p);
+    if header.rig_kind == "imported" {
+        skinrig_protocol::schedule::Schedule::parse(&header.protocol_name, text, &all)
+            .map(|s| s.analysis)
+            .map_err(Failure::input)
+    } else {
+        skinrig_protocol::Protocol::parse(&header.protocol_name, text, &all, &loader)
+            .map(|p| p.analysis)
+            .map_err(Failure::input)
+    }
+}
+
+fn session_input(
+    reader: &SessionReader,
+    settings: AnalysisSettings,
+    rig: RigGeometry,
+) -> Result<SessionInput, RecorderError> {
+    let planned = reader.presses()?.into_iter().map(|(planned, _)| planned).collect();
+    let outcomes = reader.last_outcomes()?;
+    let [one, two] = CameraId::ALL;
+    Ok(SessionInput {
+        planned,
+        outcomes,
+        edges: [reader.trigger_edges(one)?, reader.trigger_edges(two)?],
+        marks: reader.marks_sent()?,
+        gaps: [reader.gaps(one)?, reader.gaps(two)?],
+        rig,
+        settings,
+    })
+}
+
+/// Writes the results beside the session (or to `json_path`) and the report; returns both paths.
+///
+/// # Errors
+/// [`Failure::internal`] when a file cannot be written.
+pub fn write_results(
+    results: &Results,
+    json_path: Option<&Path>,
+    html_path: Option<&Path>,
+) -> Result<(PathBuf, PathBuf), Failure> {
+    let input = results.report_input();
+    let json_path =
+        json_path.map_or_else(|| beside(&results.session, ".results.json"), Path::to_owned);
+    let html_path =
+        html_path.map_or_else(|| beside(&results.session, ".report.html"), Path::to_owned);
+    let json = serde_json::to_string_pretty(&skinrig_report::json(&input))
+        .map_err(Failure::internal)?;
+    let html = skinrig_report::html(&input).map_err(Failure::internal)?;
+    write(&json_path, json.as_bytes())?;
+    write(&html_path, html.as_bytes())?;
+    Ok((json_path, html_path))
+}
+
+fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    std::fs::write(path, bytes).map_err(|e| {
+        Failure::internal(format!(
+            "{}: cannot write: {e}\n  next: free space or choose another place with --out",
+            path.display()
+        ))
+    })
+}
+
+/// Prints the results table and the paths of what was written.
+pub fn print_results(results: &Results, json: bool, paths: &(PathBuf, PathBuf)) {
+    if json {
+        let mut document = skinrig_report::json(&results.report_input());
+        if let Some(object) = document.as_object_mut() {
+            object.insert("files".into(), serde_json::json!({
+                "session": results.session, "results": paths.0, "report": paths.1,
+            }));
+        }
+        crate::print_json(&document);
+    } else {
+        let color = std::io::stdout().is_terminal();
+        print!("{}", skinrig_report::terminal_table(&results.report_input(), color));
+        println!("\nsession  {}", results.session.display());
+        println!("results  {}", paths.0.display());
+        println!("report   {}", paths.1.display());
+    }
+}
+
+/// Ok, or code 4 when the scored RMSE is above the limit (or there is none to compare).
+///
+/// # Errors
+/// [`Failure::limit`].
+pub fn check_limit(results: &Results, max_rmse_mm: Option<f64>) -> Outcome {
+    let Some(limit) = max_rmse_mm else { return Ok(Exit::Ok) };
+    match results.analysis.scored.rmse_mm.value {
+        Some(rmse) if rmse <= limit => Ok(Exit::Ok),
+        Some(rmse) => Err(Failure::limit(format!(
+            "scored RMSE: expected at most {limit} mm (--max-rmse), found {rmse:.3} mm"
+        ))),
+        None => Err(Failure::limit(format!(
+            "scored RMSE: expected at most {limit} mm (--max-rmse), found none: no scored press was located"
+        ))),
+    }
+}
+
+/// `skinrig analyze`.
+///
+/// # Errors
+/// See [`analyze_session`], [`write_results`], [`check_limit`].
+pub fn analyze(args: &AnalyzeArgs, json: bool) -> Outcome {
+    let results = analyze_session(&args.session, &args.overrides)?;
+    let html = args.out.as_ref().map(|out| out.with_extension("html"));
+    let paths = write_results(&results, args.out.as_deref(), html.as_deref())?;
+    print_results(&results, json, &paths);
+    check_limit(&results, args.max_rmse)
+}
+
+/// `skinrig report`.
+///
+/// # Errors
+/// See [`analyze_session`], [`write_results`].
+pub fn report(args: &ReportArgs, json: bool) -> Outcome {
+    let results = analyze_session(&args.session, &[])?;
+    let paths = write_results(&results, None, args.out.as_deref())?;
+    if json {
+        crate::print_json(&serde_json::json!({ "report": paths.1, "results": paths.0 }));
+    } else {
+        println!("{}", paths.1.display());
+    }
+    Ok(Exit::Ok)
+}

@@ -1,0 +1,47 @@
+//! Which rig a run uses: simulated, or a recording served as one.
+
+use std::path::Path;
+
+use skinrig_device::{CameraSettings, Rig, Roi};
+use skinrig_model::{RunHeader, SimLevel};
+use skinrig_protocol::{CameraRequest, Protocol};
+use skinrig_sim::replay::{RecordedRig, replayed_rig};
+use skinrig_sim::{SimConfig, in_real_time, simulated_rig};
+
+use crate::exit::Failure;
+use crate::recording::SessionRecording;
+use crate::results::RigDocument;
+
+/// The simulated rig for `protocol`.
+#[must_use]
+pub fn simulated(protocol: &Protocol, level: SimLevel, seed: u64, real_time: bool) -> Rig {
+    let mut config = SimConfig::new(seed, level);
+    config.outline = protocol.surroundings.outline;
+    let mut rig = simulated_rig(&config);
+    for (settings, request) in rig.camera_settings.iter_mut().zip(&protocol.cameras) {
+        apply(settings, request);
+    }
+    if real_time { in_real_time(rig) } else { rig }
+}
+
+fn apply(settings: &mut CameraSettings, request: &CameraRequest) {
+    settings.biases.extend(request.biases.clone());
+    settings.roi = request.roi.map(|[x, y, width, height]| Roi { x, y, width, height });
+}
+
+/// A recorded session as a rig.
+///
+/// # Errors
+/// [`Failure::input`] when the session cannot be read.
+pub fn replayed(path: &Path, header: &RunHeader, document: &RigDocument) -> Result<Rig, Failure> {
+    let recording = SessionRecording::open(path, header).map_err(Failure::input)?;
+    let recorded = RecordedRig {
+        name: header.rig_name.clone(),
+        robot_from_skin: header.robot_from_skin,
+        geometry: document.geometry,
+        stream_formats: header.stream_formats,
+        camera_settings: [CameraSettings::default(), CameraSettings::default()],
+        description_json: document.rig.to_string(),
+    };
+    Ok(replayed_rig(recorded, Box::new(recording)))
+}

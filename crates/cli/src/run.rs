@@ -1,0 +1,254 @@
+//! `skinrig run`: protocol -> plan -> controller over a rig -> session -> results.
+
+use std::path::{Path, PathBuf};
+
+use chrono::Utc;
+use skinrig_controller::{ControlHandle, RunReport, execute};
+use skinrig_device::Rig;
+use skinrig_model::{AnalysisSettings, CameraId, HostDuration, RunEnd, RunHeader, SimLevel};
+use skinrig_protocol::Plan;
+use skinrig_recorder::{SessionReader, SessionWriter};
+
+use crate::args::RunArgs;
+use crate::check;
+use crate::exit::{Exit, Failure, Outcome};
+use crate::progress::ProgressView;
+use crate::results::{self, RigDocument};
+use crate::sink::SessionSink;
+use crate::{paths, rig, signals};
+
+/// What is to be recorded, before the rig adds what it knows.
+pub struct Intent<'a> {
+    /// The protocol or schedule, byte for byte.
+    pub text: &'a str,
+    /// Its file name.
+    pub file_name: &'a str,
+    /// Short name, for the session's file name.
+    pub name: &'a str,
+    /// Its SHA-256.
+    pub sha256: &'a str,
+    /// Overrides from the command line.
+    pub overrides: &'a [String],
+    /// Seed of the run.
+    pub seed: u64,
+    /// Which prototype.
+    pub prototype: &'a str,
+    /// Who.
+    pub operator: &'a str,
+    /// How to analyse it.
+    pub analysis: &'a AnalysisSettings,
+    /// The command line.
+    pub command_line: &'a str,
+    /// Rig time that the plan should take.
+    pub expected: HostDuration,
+}
+
+/// Records `plan` on `rig` into a new session in `folder`.
+///
+/// # Errors
+/// [`Failure::internal`] when the session cannot be made. A rig or recorder fault during the run is in the report.
+pub fn record(
+    intent: &Intent<'_>,
+    plan: &Plan,
+    rig: Rig,
+    folder: &Path,
+) -> Result<(PathBuf, RunReport), Failure> {
+    let started = Utc::now();
+    let header = header(intent, plan, &rig, &started.to_rfc3339())?;
+    let path = paths::new_session(folder, started, intent.name, intent.prototype)?;
+    let writer = SessionWriter::create(&path).map_err(Failure::internal)?;
+    let view = ProgressView::new(plan.presses.len(), intent.expected);
+    let scheduled = rig.kind == "imported";
+    let mut sink = SessionSink::new(writer, view, scheduled);
+
+    let control = ControlHandle::new();
+    let operator = control.clone();
+    signals::on_ctrl_c(move |times| match times {
+        1 => {
+            eprintln!("\nstopping after this press; ctrl-C again retracts and stops now");
+            operator.stop();
+        }
+        2 => {
+            eprintln!("\nretracting and stopping now");
+            operator.abort();
+        }
+        _ => std::process::exit(i32::from(Exit::Stopped as u8)),
+    })
+    .map_err(Failure::internal)?;
+
+    let report = execute(plan, header, rig, &control, &mut sink);
+    for problem in &report.problems {
+        eprintln!("warning: {problem}");
+    }
+    if let Err(error) = sink.seal() {
+        eprintln!("warning: {error}");
+    }
+    Ok((path, report))
+}
+
+fn header(
+    intent: &Intent<'_>,
+    plan: &Plan,
+    rig: &Rig,
+    started_at: &str,
+) -> Result<RunHeader, Failure> {
+    let description = serde_json::from_str(&rig.description_json)
+        .unwrap_or_else(|_| serde_json::Value::String(rig.description_json.clone()));
+    let document = RigDocument {
+        geometry: rig.geometry,
+        analysis: intent.analysis.clone(),
+        rig: description,
+    };
+    Ok(RunHeader {
+        protocol_text: intent.text.to_owned(),
+        protocol_name: intent.file_name.to_owned(),
+        protocol_sha256: intent.sha256.to_owned(),
+        overrides: intent.overrides.to_vec(),
+        plan_json: serde_json::to_string(plan).map_err(Failure::internal)?,
+        plan_sha256: plan.digest(),
+        seed: intent.seed,
+        rig_kind: rig.kind.clone(),
+        rig_name: rig.name.clone(),
+        rig_json: serde_json::to_string(&document).map_err(Failure::internal)?,
+        robot_from_skin: rig.robot_from_skin,
+        stream_formats: CameraId::ALL.map(|c| rig.cameras[c.index()].capabilities().format),
+        prototype: intent.prototype.to_owned(),
+        operator: intent.operator.to_owned(),
+        started_at: started_at.to_owned(),
+        host: host_name(),
+        software: format!("skinrig {}", env!("CARGO_PKG_VERSION")),
+        command_line: intent.command_line.to_owned(),
+        presses: plan.presses.clone(),
+    })
+}
+
+/// The machine's name as the system gives it; `unknown` where it gives none.
+fn host_name() -> String {
+    std::fs::read_to_string("/etc/hostname")
+        .ok()
+        .or_else(|| std::env::var("HOSTNAME").ok())
+        .or_else(|| std::env::var("COMPUTERNAME").ok())
+        .map(|n| n.trim().to_owned())
+        .filter(|n| !n.is_empty())
+        .unwrap_or_else(|| "unknown".into())
+}
+
+/// `skinrig run`.
+///
+/// # Errors
+/// [`Failure`] with the code that says what kind.
+pub fn run(args: &RunArgs, command_line: &str, json: bool) -> Outcome {
+    let (session, report) = match (&args.replay, &args.protocol) {
+        (Some(recording), _) => replay(recording, &args.sessions, command_line)?,
+        (None, Some(protocol)) => fresh(args, protocol, command_line, json)?,
+        (None, None) => return Err(Failure::input("expected a protocol file or --replay SESSION")),
+    };
+    conclude(&session, &report, args.no_analysis, args.max_rmse, json)
+}
+
+/// Analyses a recorded session, prints its results, and turns the run's end into an exit code.
+///
+/// # Errors
+/// [`Failure`] with the code that says what kind.
+pub fn conclude(
+    session: &Path,
+    report: &RunReport,
+    no_analysis: bool,
+    max_rmse_mm: Option<f64>,
+    json: bool,
+) -> Outcome {
+    let mut limit = Ok(Exit::Ok);
+    if no_analysis {
+        println!("{}", session.display());
+    } else {
+        let results = results::analyze_session(session, &[])?;
+        let written = results::write_results(&results, None, None)?;
+        results::print_results(&results, json, &written);
+        limit = results::check_limit(&results, max_rmse_mm);
+    }
+    let kept = format!("the session up to there is kept: {}", session.display());
+    match &report.end {
+        RunEnd::Completed => limit,
+        RunEnd::Stopped(reason) => {
+            eprintln!("stopped: {reason}; {kept}");
+            Ok(Exit::Stopped)
+        }
+        RunEnd::Faulted(reason) => Err(Failure::rig(format!("{reason}\n  {kept}"))),
+    }
+}
+
+fn fresh(
+    args: &RunArgs,
+    protocol: &Path,
+    command_line: &str,
+    json: bool,
+) -> Result<(PathBuf, RunReport), Failure> {
+    let checked = check::load(protocol, &args.overrides)?;
+    let (protocol, mut plan) = (checked.protocol, checked.plan);
+    let level = match &args.level {
+        Some(name) => {
+            name.parse::<SimLevel>().map_err(|e| Failure::input(format!("--level: {e}")))?
+        }
+        None => protocol.scene.level,
+    };
+    let seed = args.seed.unwrap_or(protocol.seed);
+    plan.seed = seed;
+    let summary = plan.summary();
+    if !json {
+        println!("{summary}");
+        println!("rig       simulated ({level}), seed {seed}\n");
+    }
+    let rig = rig::simulated(&protocol, level, seed, args.real_time);
+    let intent = Intent {
+        text: &protocol.text,
+        file_name: &protocol.file_name,
+        name: &protocol.name,
+        sha256: &protocol.sha256,
+        overrides: &protocol.overrides,
+        seed,
+        prototype: &protocol.prototype.id,
+        operator: &protocol.operator,
+        analysis: &protocol.analysis,
+        command_line,
+        expected: HostDuration::from_secs_f64(summary.duration_s),
+    };
+    record(&intent, &plan, rig, &args.sessions)
+}
+
+fn replay(
+    recording: &Path,
+    folder: &Path,
+    command_line: &str,
+) -> Result<(PathBuf, RunReport), Failure> {
+    let reader = SessionReader::open(recording).map_err(Failure::input)?;
+    let header = reader.header().map_err(Failure::input)?;
+    let plan: Plan = serde_json::from_str(&header.plan_json).map_err(|e| {
+        Failure::input(format!("{}: expected a plan in the session, found: {e}", recording.display()))
+    })?;
+    let document: RigDocument = serde_json::from_str(&header.rig_json).map_err(|e| {
+        Failure::input(format!(
+            "{}: expected the description of the rig in the session, found: {e}",
+            recording.display()
+        ))
+    })?;
+    let name = header.protocol_name.rsplit('/').next().unwrap_or("replay");
+    let name = format!("replay-{}", name.trim_end_matches(".yaml"));
+    let expected = reader.end().map_err(Failure::input)?.map_or(HostDuration::ZERO, |(t, _)| {
+        HostDuration(t.0)
+    });
+    let intent = Intent {
+        text: &header.protocol_text,
+        file_name: &header.protocol_name,
+        name: &name,
+        sha256: &header.protocol_sha256,
+        overrides: &header.overrides,
+        seed: header.seed,
+        prototype: &header.prototype,
+        operator: &header.operator,
+        analysis: &document.analysis,
+        command_line,
+        expected,
+    };
+    let rig = rig::replayed(recording, &header, &document)?;
+    record(&intent, &plan, rig, folder)
+}

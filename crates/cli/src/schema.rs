@@ -1,0 +1,17 @@
+//! `skinrig schema`.
+
+use crate::args::{SchemaArgs, SchemaKind};
+use crate::exit::{Exit, Outcome};
+
+/// Prints a JSON Schema.
+///
+/// # Errors
+/// None; the schemas are built in.
+pub fn schema(args: &SchemaArgs) -> Outcome {
+    let schema = match args.kind {
+        SchemaKind::Protocol => skinrig_protocol::schema_json(),
+        SchemaKind::Schedule => skinrig_protocol::schedule_schema_json(),
+    };
+    print!("{schema}");
+    Ok(Exit::Ok)
+}

@@ -1,0 +1,49 @@
+//! `skinrig verify`.
+
+use skinrig_recorder::verify as recheck;
+
+use crate::args::SessionArg;
+use crate::exit::{Exit, Failure, Outcome};
+use crate::source::Rescan;
+
+/// Recomputes everything in a session.
+///
+/// # Errors
+/// [`Failure::input`] for a file that is no session; [`Failure::limit`] when something does not match.
+pub fn verify(args: &SessionArg, json: bool) -> Outcome {
+    let report = recheck(&args.session, &mut Rescan::default()).map_err(Failure::input)?;
+    let name = args.session.display();
+    if json {
+        crate::print_json(&serde_json::json!({
+            "session": args.session, "sound": report.is_sound(), "sealed": report.sealed,
+            "problems": report.problems, "more_problems": report.more_problems,
+            "totals": report.totals,
+        }));
+    } else {
+        for problem in &report.problems {
+            println!("{name}: {problem}");
+        }
+        if report.more_problems > 0 {
+            println!("{name}: and {} more", report.more_problems);
+        }
+        if let (true, Some(t)) = (report.is_sound(), report.totals) {
+            println!(
+                "{name}: sound{}; {} presses, {} events, {} chunks, {:.1} MB of camera bytes, {} pose samples",
+                if report.sealed { ", sealed" } else { ", not sealed: hashes over the whole were not checked" },
+                t.presses.planned + t.sync.planned,
+                t.cd_events,
+                t.chunks,
+                t.raw_bytes as f64 / 1e6,
+                t.pose_samples
+            );
+        }
+    }
+    if report.is_sound() {
+        Ok(Exit::Ok)
+    } else {
+        Err(Failure::limit(format!(
+            "{name}: {} problem(s); the file is not what was recorded",
+            report.problems.len() as u64 + report.more_problems
+        )))
+    }
+}
