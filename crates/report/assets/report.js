@@ -283,7 +283,16 @@
       const tr = el('tr');
       for (const [key, , digits] of columns) {
         const value = C[key][i];
-        if (key === 'press') { const th = el('th', text(value)); th.scope = 'row'; tr.append(th); continue; }
+        if (key === 'press') {
+          const th = el('th');
+          const button = el('button', text(value));
+          th.scope = 'row';
+          button.type = 'button';
+          button.setAttribute('aria-label', `Show press ${value}`);
+          th.append(button);
+          tr.append(th);
+          continue;
+        }
         const td = el('td', value === null && digits === undefined ? '' : text(value, digits), digits === undefined ? (key === 'reason' ? 'reason' : '') : 'num');
         if (key === 'verdict') td.prepend(el('i', '', 'key ' + (/^[a-z]+$/.test(value) ? value : '')));
         tr.append(td);
