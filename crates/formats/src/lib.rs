@@ -6,6 +6,7 @@
 
 pub mod error;
 pub mod hdf5;
+pub mod inspect;
 pub mod positions;
 pub mod raw;
 pub mod stream;

@@ -120,6 +120,12 @@ impl Decoder {
         }
     }
 
+    /// Time of the first timed word, µs; `None` before the first time base word.
+    #[must_use]
+    pub fn first_us(&self) -> Option<u64> {
+        self.output.chunk_first_us
+    }
+
     /// Time of the last timed word (time base, CD event or trigger edge), µs; `None` before the first time
     /// base word.
     #[must_use]

@@ -1,0 +1,141 @@
+//! Reading events from a bimvee container, beside a plain read of the file and h5py, on the same file.
+#![expect(clippy::print_stdout, reason = "a bench prints its table")]
+
+use std::fs::File;
+use std::hint::black_box;
+use std::io::Read as _;
+use std::path::Path;
+use std::process::Command;
+
+use rand::{RngExt, SeedableRng};
+use rand_xoshiro::Xoshiro256PlusPlus;
+use skinrig_bench::Table;
+use skinrig_formats::Geometry;
+use skinrig_formats::hdf5::{Container, EventWriter};
+use skinrig_model::{CdEvent, Polarity};
+
+const EVENTS: usize = 7_000_000;
+
+/// Reads as a Python user would: four arrays in memory. Prints the best of five rounds in seconds.
+const H5PY: &str = r#"
+import sys, time, h5py
+best = 1e9
+for _ in range(6):
+    start = time.perf_counter()
+    with h5py.File(sys.argv[1]) as f:
+        d = f["data"]
+        arrays = [d['"%s"' % k][:] for k in ("ts", "x", "y", "pol")]
+    best = min(best, time.perf_counter() - start)
+print(best, len(arrays[0]), h5py.__version__)
+"#;
+
+/// The layout of the published files: contiguous columns, as h5py writes them.
+const CONTIGUOUS: &str = r#"
+import sys, h5py
+with h5py.File(sys.argv[1]) as a, h5py.File(sys.argv[2], "w") as b:
+    for k in ("ts", "x", "y", "pol"):
+        v = a["data"]['"%s"' % k][:]
+        b['data/"%s"' % k] = v.astype("i8") if k in "xy" else v
+"#;
+
+fn python(script: &str, args: &[&Path]) -> Option<String> {
+    let python = std::env::var("SKINRIG_BENCH_PYTHON").unwrap_or_else(|_| "python3".into());
+    let output = Command::new(python)
+        .arg("-c")
+        .arg(script)
+        .args(args)
+        .output()
+        .ok()?;
+    let text = String::from_utf8(output.stdout).ok()?;
+    output.status.success().then_some(text)
+}
+
+fn write(path: &Path) {
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(3);
+    let mut writer = EventWriter::create(path, 0).expect("a new file");
+    let mut t_us = 0;
+    let mut batch = Vec::new();
+    for _ in 0..EVENTS / 10_000 {
+        batch.clear();
+        batch.extend((0..10_000).map(|_| {
+            t_us += rng.random_range(0..250);
+            CdEvent {
+                t_us,
+                x: rng.random_range(0..640),
+                y: rng.random_range(0..480),
+                polarity: Polarity::from_bit(rng.random()),
+            }
+        }));
+        writer.append(&batch).expect("sorted events");
+    }
+    writer.finish().expect("a complete file");
+}
+
+fn measure(title: &str, path: &Path) {
+    let megabytes = std::fs::metadata(path).expect("the file").len() as f64 / 1e6;
+    let mev = EVENTS as f64 / 1e6;
+    let title = format!("{title}: {mev:.1} M events, {megabytes:.0} MB");
+    let method =
+        "one core, file in the page cache; ours checks every value and delivers slices of CdEvent";
+    let mut table = Table::new(&title, "Mev", method);
+    table.row("Container::events", mev, || {
+        let container = Container::open(path).expect("a container");
+        let mut events = container
+            .events(None, Geometry::EVK1)
+            .expect("one dictionary");
+        let mut count = 0;
+        loop {
+            match events.next_batch().expect("good rows") {
+                [] => break,
+                batch => count += black_box(batch).len(),
+            }
+        }
+        assert_eq!(count, EVENTS);
+    });
+    let mut buffer = vec![0; 256 * 1024];
+    table.baseline(
+        "plain read of the file, 256 KiB at a time",
+        mev,
+        move || {
+            let mut file = File::open(path).expect("the file");
+            while file.read(&mut buffer).expect("readable") > 0 {
+                black_box(&buffer);
+            }
+        },
+    );
+    println!("{}", table.run(5));
+    match python(H5PY, &[path]) {
+        Some(text) => {
+            let mut words = text.split_whitespace();
+            let seconds: f64 = words
+                .next()
+                .and_then(|w| w.parse().ok())
+                .unwrap_or(f64::NAN);
+            println!(
+                "  h5py {}, four arrays, unchecked: {:.1} Mev/s ({seconds:.4} s)",
+                words.nth(1).unwrap_or("?"),
+                mev / seconds
+            );
+        }
+        None => println!(
+            "  h5py: not measured (no python3 with h5py; SKINRIG_BENCH_PYTHON names another)"
+        ),
+    }
+}
+
+fn main() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let ours = dir.path().join("ours.hdf5");
+    write(&ours);
+    measure(
+        "bimvee container as written here (chunked, u16 pixels)",
+        &ours,
+    );
+    let theirs = dir.path().join("theirs.hdf5");
+    if python(CONTIGUOUS, &[&ours, &theirs]).is_some() {
+        measure(
+            "bimvee container as h5py writes it (contiguous, i64 pixels)",
+            &theirs,
+        );
+    }
+}

@@ -1,0 +1,138 @@
+//! How fast camera bytes reach the session file, beside a plain file.
+#![expect(clippy::print_stdout, reason = "a bench prints its table")]
+
+use std::error::Error;
+use std::fs::File;
+use std::hint::black_box;
+use std::io::Write;
+use std::path::Path;
+
+use rand::{Rng, SeedableRng};
+use rand_xoshiro::Xoshiro256PlusPlus;
+use skinrig_bench::Table;
+use skinrig_model::{
+    AttemptId, CameraId, ChunkFacts, HostTime, PlannedPress, Point2, PressId, RawChunk, Record,
+    RigidTransform, RunHeader, StreamFormat, press::PressRole,
+};
+use skinrig_recorder::{SessionWriter, codec};
+
+const CHUNK: usize = 1 << 20;
+const CHUNKS: u64 = 256;
+
+/// EVT2 words: a time word every 16 µs and `events` random events between two of them.
+fn evt2(events: u32, bytes: usize) -> Vec<u8> {
+    let mut random = Xoshiro256PlusPlus::seed_from_u64(1);
+    let mut words: Vec<u32> = Vec::with_capacity(bytes / 4);
+    let mut t = 1_000_000u32;
+    while words.len() < bytes / 4 {
+        words.push(0x8000_0000 | t >> 6);
+        words.extend((0..events).map(|_| random.next_u32() & 0x1FFF_FFFF));
+        t += 16;
+    }
+    words.truncate(bytes / 4);
+    words.into_iter().flat_map(u32::to_le_bytes).collect()
+}
+
+fn plain_file(path: &Path, chunk: &[u8]) -> std::io::Result<()> {
+    let mut file = File::create(path)?;
+    for _ in 0..CHUNKS {
+        file.write_all(chunk)?;
+    }
+    file.sync_all()
+}
+
+fn session(path: &Path, chunk: &[u8]) -> Result<(), Box<dyn Error>> {
+    if path.exists() {
+        std::fs::remove_file(path)?;
+    }
+    let text = "{}".to_owned();
+    // SHA-256 of `{}`.
+    let digest = "44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a".to_owned();
+    let mut writer = SessionWriter::create(path)?;
+    writer.accept(Record::Started(Box::new(RunHeader {
+        protocol_text: text.clone(),
+        protocol_name: "bench".into(),
+        protocol_sha256: digest.clone(),
+        overrides: vec![],
+        plan_json: text.clone(),
+        plan_sha256: digest,
+        seed: 1,
+        rig_kind: "simulated".into(),
+        rig_name: "bench".into(),
+        rig_json: text,
+        robot_from_skin: RigidTransform::identity(),
+        stream_formats: [StreamFormat::Evt2; 2],
+        prototype: String::new(),
+        operator: String::new(),
+        started_at: String::new(),
+        host: String::new(),
+        software: String::new(),
+        command_line: String::new(),
+        presses: vec![PlannedPress {
+            id: PressId(0),
+            role: PressRole::Score,
+            repetition: 0,
+            location: 0,
+            at: Point2::new(0.0, 0.0),
+            depth_mm: 2.0,
+        }],
+    })))?;
+    for seq in 0..CHUNKS {
+        writer.accept(Record::Chunk(RawChunk {
+            camera: CameraId::One,
+            seq,
+            host_time: HostTime(seq as i64),
+            lost_before: 0,
+            bytes: chunk.to_vec(),
+            facts: ChunkFacts::default(),
+            triggers: vec![],
+        }))?;
+    }
+    // Returns when everything before it is on the disk.
+    let attempt = AttemptId {
+        press: PressId(0),
+        number: 1,
+    };
+    writer.accept(Record::Intent {
+        attempt,
+        t: HostTime(0),
+    })?;
+    Ok(())
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let folder = tempfile::tempdir()?;
+    let (busy, idle) = (evt2(160, CHUNK), evt2(0, CHUNK));
+    let megabytes = (CHUNKS as usize * CHUNK) as f64 / 1e6;
+    for (name, chunk) in [("busy", &busy), ("idle", &idle)] {
+        let title = format!("ingest of a {name} EVT2 stream: {CHUNKS} chunks of 1 MiB");
+        let mut table = Table::new(
+            &title,
+            "MB",
+            "bytes as they came per second, until durable (fsync, synchronous=FULL)",
+        );
+        let (file, database) = (folder.path().join("plain"), folder.path().join("session"));
+        table.baseline("plain file, one fsync at the end", megabytes, move || {
+            plain_file(&file, chunk).expect("the temporary folder takes a file");
+        });
+        table.row("session file, one commit per 8 MiB", megabytes, move || {
+            session(&database, chunk).expect("the temporary folder takes a session");
+        });
+        println!("{}", table.run(3));
+    }
+    let folded = codec::fold(&idle).ok_or("an idle stream folds")?;
+    let mut table = Table::new(
+        "th-rle in memory, 1 MiB chunks",
+        "MB",
+        "bytes as they came per second, one core",
+    );
+    let mb = CHUNK as f64 / 1e6;
+    table.baseline("copy", mb, || drop(black_box(idle.clone())));
+    table.row("fold, idle", mb, || drop(black_box(codec::fold(&idle))));
+    table.row("fold, busy", mb, || drop(black_box(codec::fold(&busy))));
+    table.row("unfold, idle", mb, || {
+        drop(black_box(codec::unfold(&folded, CHUNK)))
+    });
+    println!("{}", table.run(100));
+    Ok(())
+}
