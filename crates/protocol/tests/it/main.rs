@@ -1,0 +1,8 @@
+//! Tests of the protocol crate through its public API, in one binary.
+#![expect(clippy::unwrap_used, reason = "tests")]
+
+mod common;
+mod errors;
+mod laws;
+mod schedules;
+mod shipped;

@@ -1,0 +1,81 @@
+//! Press times and roles of recordings that were made without skinrig.
+
+use crate::common::shipped;
+use skinrig_model::{HostDuration, HostTime, Point2, PressRole};
+use skinrig_protocol::Schedule;
+
+fn schedule(name: &str, overrides: &[&str]) -> Schedule {
+    let overrides: Vec<String> = overrides.iter().map(|s| (*s).to_owned()).collect();
+    Schedule::parse(name, shipped(name).as_bytes(), &overrides).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// A time in integer nanoseconds.
+fn ns(t: HostTime) -> i64 {
+    t.0
+}
+
+#[test]
+fn times_of_the_published_recording() {
+    let schedule = schedule("paper-recording.schedule.yaml", &[]);
+    let positions: Vec<Point2> = (0..289).map(|k| Point2::new(f64::from(k), 0.0)).collect();
+    let (planned, times) = schedule.planned(&positions).unwrap();
+    assert_eq!(planned.len(), 3 + 2500);
+    // The first downward motion begins at 0; sync presses 1 s apart; the path 3 s after the last.
+    assert_eq!(ns(times[0]), 450_000_000);
+    assert_eq!(ns(times[2]) - ns(times[0]), 2_000_000_000);
+    assert_eq!(ns(times[3]) - ns(times[2]), 3_000_000_000);
+    assert_eq!(schedule.phases.at(times[0]).approach, HostTime::ZERO);
+    // 17 periods are 868 / 17 s; a repetition takes 868 s and pauses 3 s, whatever part of it is used.
+    assert_eq!(ns(times[3 + 17]) - ns(times[3]), 51_058_823_529);
+    assert_eq!(ns(times[3 + 250]) - ns(times[3]), 871_000_000_000);
+    assert_eq!(ns(times[3 + 9 * 250]) - ns(times[3]), 9 * 871_000_000_000);
+    let press = planned[3 + 250];
+    assert_eq!(
+        (press.repetition, press.location, press.role),
+        (1, 0, PressRole::Score)
+    );
+    assert_eq!(planned[3].role, PressRole::Calibrate);
+    assert!(
+        planned
+            .iter()
+            .enumerate()
+            .all(|(k, p)| p.id.0 as usize == k)
+    );
+    let timing = schedule.phases.at(times[3]);
+    assert_eq!(
+        (timing.release - timing.contact),
+        HostDuration::from_millis(550)
+    );
+    assert_eq!(schedule.csv_unit_mm, 1000.0);
+}
+
+#[test]
+fn the_other_reading_of_the_sync_interval_is_one_key_away() {
+    let schedule = schedule("paper-recording.schedule.yaml", &["sync.interval=2 s"]);
+    let (_, times) = schedule.planned(&[Point2::default(); 289]).unwrap();
+    assert_eq!(ns(times[3]) - ns(times[0]), 7_000_000_000);
+}
+
+#[test]
+fn alternating_presses_never_do_both() {
+    let schedule = schedule(
+        "single-repetition.schedule.yaml",
+        &["evaluation.alternate.first=2"],
+    );
+    let (planned, _) = schedule.planned(&[Point2::default(); 289]).unwrap();
+    let roles: Vec<PressRole> = planned[3..7].iter().map(|p| p.role).collect();
+    use PressRole::{Calibrate, Score};
+    assert_eq!(roles, [Score, Calibrate, Score, Calibrate]);
+    assert_eq!(planned.iter().filter(|p| p.role == Calibrate).count(), 125);
+}
+
+#[test]
+fn the_number_of_positions_must_fit() {
+    let error = schedule("ten-presses.schedule.yaml", &[])
+        .planned(&[Point2::default(); 9])
+        .unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "expected 10 press positions, `presses_per_repetition` of ten-presses.schedule.yaml, found 9; correct the key or use the recording's own CSV"
+    );
+}
