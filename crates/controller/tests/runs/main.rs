@@ -1,6 +1,7 @@
 //! The controller on a scripted rig.
 
 mod course;
+mod edges;
 mod guard;
 mod mock;
 mod progress;

@@ -1,0 +1,89 @@
+//! Runs that never arm, and runs that their caller drops.
+
+use skinrig_controller::{ControllerSettings, Run};
+use skinrig_model::*;
+use skinrig_protocol::plan::{Plan, Step};
+
+use crate::course::{START, faults, run_plan};
+use crate::mock::*;
+
+#[test]
+fn plans_that_do_not_hold_together_never_arm() {
+    type Change = fn(&mut Plan);
+    let broken: [(&str, Change); 7] = [
+        ("no travel", |p| {
+            p.steps.retain(|s| !matches!(s, Step::Travel { .. }));
+        }),
+        ("a press less", |p| {
+            p.steps.pop();
+            p.steps.pop();
+        }),
+        ("too fast", |p| p.limits.max_speed_mm_s = 10.0),
+        ("too deep", |p| p.limits.max_depth_mm = 1.0),
+        ("outside", |p| p.limits.workspace_max_mm[0] = 12.0),
+        ("beyond the robot", |p| {
+            p.limits.max_speed_mm_s = 500.0;
+            if let Some(Step::Travel { speed_mm_s, .. }) = p.steps.get_mut(1) {
+                *speed_mm_s = 201.0;
+            }
+        }),
+        ("low travel", |p| {
+            if let Some(Step::Travel { to, .. }) = p.steps.get_mut(1) {
+                to.z_mm = 1.0;
+            }
+        }),
+    ];
+    for (case, change) in broken {
+        let mut plan = plan();
+        change(&mut plan);
+        let told = run_plan(&plan, faults(), START, Sink::default());
+        assert!(matches!(told.report.end, RunEnd::Faulted(_)), "{case}");
+        assert_eq!(told.report.missed, 3, "{case}");
+        let w = lock(&told.world);
+        assert!(!w.ever_armed && w.commands.is_empty(), "{case}");
+        drop(w);
+        told.check(case);
+    }
+}
+
+#[test]
+fn a_run_that_is_dropped_or_unwound_comes_to_rest() {
+    // The last one: the robot panics once more while the caller's panic unwinds.
+    for (unwound, second) in [(false, None), (true, None), (true, Some(Failure::Panic))] {
+        let world = World::shared(faults(), [0.0, 0.0, -1.0]);
+        let control = lock(&world).control.clone();
+        let plan = plan();
+        let mut sink = Sink::default();
+        let dropped = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
+            let settings = ControllerSettings::default();
+            let run = Run::with_settings(
+                &plan,
+                header(&plan),
+                rig(&world),
+                &control,
+                &mut sink,
+                settings,
+            );
+            let armed = run.arm();
+            assert!(armed.is_ok() && lock(&world).armed);
+            {
+                let mut w = lock(&world);
+                w.faults.at_call = second.map(|f| (w.calls + 20, f));
+            }
+            if unwound {
+                std::panic::panic_any("mock caller panics".to_owned());
+            }
+        }));
+        assert_eq!(dropped.is_err(), unwound);
+        let w = lock(&world);
+        assert!(!w.armed && w.streaming == [false; 2] && w.tip[2] > 4.94);
+        assert!(second.is_none() || w.calls > 30);
+        assert!(matches!(
+            sink.records.last(),
+            Some(Record::Ended {
+                end: RunEnd::Faulted(_),
+                ..
+            })
+        ));
+    }
+}
