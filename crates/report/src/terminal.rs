@@ -237,6 +237,9 @@ pub(crate) fn table(input: &ReportInput<'_>, color: bool) -> String {
         ));
         out += &paint.warn(&wrap("event     ", &text));
     }
+    if let Some(text) = crate::derive::disagreement(a) {
+        out += &paint.warn(&wrap("warning   ", &text));
+    }
     for warning in &a.warnings {
         out += &paint.warn(&wrap("warning   ", &plain(warning)));
     }
