@@ -1,7 +1,8 @@
-//! Presses the paper's grid on the optical skin and prints what comes out: event counts, rates, localisation error with the
-//! true camera geometry, speed.
+//! Presses the paper's grid on the optical skin and prints what comes out.
 //!
-//! `cargo run --release -p skinrig-sim --example optical_grid -- [presses] [events.csv press_of_the_csv]`
+//! Event counts, rates, localisation error with the true camera geometry, speed:
+//!
+//! `cargo run --release -p skinrig-sim --example optical_grid -- [presses] [depth in mm] [events.csv press]`
 #![expect(clippy::print_stdout, reason = "an example that prints its result")]
 
 use std::io::Write;
@@ -12,15 +13,14 @@ use skinrig_sim::optical::OpticalModel;
 use skinrig_sim::scene::{GRID_NS, PixelEvent, PixelModel, SceneConfig, TipSample};
 
 const PERIOD_STEPS: i64 = 3_003;
-const DEPTH_MM: f64 = 2.0;
 const CROP: [(u16, u16); 2] = [(185, 360), (200, 355)];
 
 /// Height of the tip `ms` after the press began: 150 ms down, 250 ms held, 150 ms up.
-fn height_mm(ms: f64) -> f64 {
-    let touch = |part: f64| 3.0 - (3.0 + DEPTH_MM) * part;
+fn height_mm(ms: f64, depth_mm: f64) -> f64 {
+    let touch = |part: f64| 3.0 - (3.0 + depth_mm) * part;
     match ms {
         t if t < 150.0 => touch(t / 150.0),
-        t if t < 400.0 => -DEPTH_MM,
+        t if t < 400.0 => -depth_mm,
         t if t < 550.0 => touch((550.0 - t) / 150.0),
         _ => 3.0,
     }
@@ -92,7 +92,8 @@ fn intersect(geometry: &StereoGeometry, u: [f64; 2]) -> Option<Point2> {
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let presses: usize = arguments.first().map_or(Ok(250), |a| a.parse())?;
-    let dump: Option<(&String, usize)> = match (arguments.get(1), arguments.get(2)) {
+    let depth_mm: f64 = arguments.get(1).map_or(Ok(2.0), |a| a.parse())?;
+    let dump: Option<(&String, usize)> = match (arguments.get(2), arguments.get(3)) {
         (Some(path), Some(n)) => Some((path, n.parse()?)),
         _ => None,
     };
@@ -125,7 +126,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let tips: Vec<TipSample> = (i64::from(t0 != 0)..=PERIOD_STEPS)
             .map(|k| TipSample {
                 t_ns: (t0 + k) * GRID_NS,
-                position: Point3::new(p.x_mm, p.y_mm, height_mm(k as f64 - 1000.0)),
+                position: Point3::new(p.x_mm, p.y_mm, height_mm(k as f64 - 1000.0, depth_mm)),
             })
             .collect();
         last = t0 + PERIOD_STEPS;

@@ -14,8 +14,8 @@ pub struct InvalidOpticalSetting {
     pub found: f64,
 }
 
-/// Constants of the optical model. "Assumption" marks values without a public source; the defaults are chosen so
-/// that event counts, polarities and spreads resemble the published ones (`docs/optical-model.md`).
+/// Constants of the optical model. "Assumption" marks values without a public source; the defaults are chosen
+/// so that event counts, polarities and spreads resemble the published ones (`docs/optical-model.md`).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OpticalConfig {
     // ---- emitters
@@ -32,7 +32,8 @@ pub struct OpticalConfig {
     pub attenuation_per_mm: f64,
     /// Light scattered into a ray per length and unit of fluence, 1/mm (assumption).
     pub scatter_per_mm: f64,
-    /// Light that no dent can take away (over the skin, dark current), in units of an emitter's radiance (assumption).
+    /// Light that no dent can take away (over the skin, dark current), in units of an emitter's radiance
+    /// (assumption).
     pub stray: f64,
 
     // ---- indentation
@@ -42,7 +43,8 @@ pub struct OpticalConfig {
     pub thinning_loss_per_mm: f64,
     /// Guided light lost per mm of path and unit of surface slope, 1/mm (assumption).
     pub slope_loss_per_mm: f64,
-    /// Part of the light that falls on the dent's flanks which they send on into the camera (assumption).
+    /// Brightness of the dent's flanks in units of a white matt flank under the modelled fluence; above 1
+    /// because light also reaches them through the skin's thickness (assumption).
     pub flank_gain: f64,
     /// Part of the indentation's effect that follows with a delay, 0..=1 (assumption).
     pub creep_fraction: f64,
@@ -55,13 +57,15 @@ pub struct OpticalConfig {
     /// Gaussian height of the skin's illuminated band over its rows, as a fraction of the number of rows
     /// (assumption).
     pub band_sigma_rows: f64,
-    /// Height of a dent's image apart from its distance: light reaches the lens at many inclinations, px (assumption).
+    /// Height of a dent's image apart from its distance: light reaches the lens at many inclinations, px
+    /// (assumption).
     pub dent_sigma_px: f64,
     /// A camera sees no dent as nearer than this, mm: the height of the image stays finite.
     pub nearest_mm: f64,
 
     // ---- pixels
-    /// Mean ON threshold, natural-log intensity (not published for the EVK1; assumption, a common nominal value).
+    /// Mean ON threshold, natural-log intensity (not published for the EVK1; assumption, a common nominal
+    /// value).
     pub threshold_on: f64,
     /// Mean OFF threshold, natural-log intensity (assumption, as above).
     pub threshold_off: f64,

@@ -1,7 +1,9 @@
-//! What the tip does to the skin: the dent's shape, how it takes light from the columns and returns some of it.
+//! What the tip does to the skin: the dent's shape, how it takes light from the columns and returns some of
+//! it.
 //!
-//! For a dent that is `a` mm deep, column `u` loses the part `x = 1 - exp(-a loss(u))` of the light that comes from behind
-//! it, and a pixel in row `v` of that column sees `I / I0 = 1 + x c(u, v)`. Everything but `x` is computed once per dent.
+//! For a dent that is `a` mm deep, column `u` loses the part `x = 1 - exp(-a loss(u))` of the light that
+//! comes from behind it, and a pixel in row `v` of that column sees `I / I0 = 1 + x c(u, v)`. Everything but
+//! `x` is computed once per dent.
 
 use std::ops::Range;
 
@@ -45,8 +47,9 @@ impl DentShape {
         self.half_side_mm * core::f64::consts::SQRT_2 + FLANK_DECAYS * self.decay_mm
     }
 
-    /// Depth at `offset` from the tip's axis as a part of the depth under the tip, and the outward direction of the flank
-    /// (zero under the tip). The surface follows the tip's flat end and rises exponentially outside.
+    /// Depth at `offset` from the tip's axis as a part of the depth under the tip, and the outward direction
+    /// of the flank (zero under the tip). The surface follows the tip's flat end and rises exponentially
+    /// outside.
     fn depth(&self, offset: Vec2) -> (f64, Vec2) {
         let over = |v: f64| (v.abs() - self.half_side_mm).max(0.0).copysign(v);
         let out = [over(offset[0]), over(offset[1])];
@@ -225,7 +228,7 @@ fn cross(
             along * d[1] - to[1] + s * d[1],
         ];
         let (depth, outward) = shape.depth(offset);
-        let slope = if depth < 1.0 {
+        let slope = if depth > 0.0 && depth < 1.0 {
             depth / shape.decay_mm
         } else {
             0.0
@@ -254,7 +257,8 @@ fn flank_light(light: &Illumination, place: Vec2) -> [f64; FLANK_DIRECTIONS] {
     lit
 }
 
-/// Index of a unit direction on the diamond |x| + |y| = 1, counted counter-clockwise from +x: cheap and exact everywhere.
+/// Index of a unit direction on the diamond |x| + |y| = 1, counted counter-clockwise from +x: cheap and exact
+/// everywhere.
 fn direction_index(d: Vec2) -> usize {
     let t = d[1] / (d[0].abs() + d[1].abs());
     let turn = if d[0] >= 0.0 { t } else { 2.0 - t };
@@ -285,8 +289,8 @@ struct Image {
 }
 
 impl Image {
-    /// The nearer the dent, the taller its image: half the skin's thickness spans `rows_per_radian * h / 2r` rows. The dent
-    /// comes from the touched surface, so that its lit flank appears in the upper half.
+    /// The nearer the dent, the taller its image: half the skin's thickness spans `rows_per_radian * h / 2r`
+    /// rows. The dent comes from the touched surface, so that its lit flank appears in the upper half.
     fn new(scene: &SceneConfig, config: &OpticalConfig, place: Vec2) -> Self {
         let to = [
             place[0] - scene.camera.position.x_mm,

@@ -1,7 +1,8 @@
 //! The light in the undisturbed skin: emitters, fluence, and what each column of the camera sees.
 //!
-//! Light travels in the skin's plane (the 4 mm guide it). A column's light is what comes from the wall at the far end
-//! of its ray, where emitters sit, plus what the skin scatters into the ray on the way, plus stray light.
+//! Light travels in the skin's plane (the 4 mm guide it). A column's light is what comes from the wall at the
+//! far end of its ray, where emitters sit, plus what the skin scatters into the ray on the way, plus stray
+//! light.
 
 use skinrig_model::{CameraModel, Point2, SENSOR_WIDTH, SkinOutline};
 
@@ -40,8 +41,8 @@ pub(super) struct Illumination {
 }
 
 impl Illumination {
-    /// Emitters evenly spaced along the edges at small and large y and small x (the edge at large x has the cameras),
-    /// each aimed at the middle of the camera edge (paper, section "Sensor Design").
+    /// Emitters evenly spaced along the edges at small and large y and small x (the edge at large x has the
+    /// cameras), each aimed at the middle of the camera edge (paper, section "Sensor Design").
     pub(super) fn new(outline: &SkinOutline, config: &OpticalConfig) -> Self {
         let path = emitter_path(outline);
         let total: f64 = path.windows(2).map(|w| distance(w[0], w[1])).sum();
@@ -81,7 +82,8 @@ impl Illumination {
         }
     }
 
-    /// What one emitter sends through `p`: direction of travel and fluence (per mm: light spreads in a plane).
+    /// What one emitter sends through `p`: direction of travel and fluence (per mm: light spreads in a
+    /// plane).
     pub(super) fn at(&self, emitter: &Emitter, p: Vec2) -> (Vec2, f64) {
         let to = [p[0] - emitter.at[0], p[1] - emitter.at[1]];
         let r = length(to).max(1.0);
@@ -231,7 +233,8 @@ fn inside(outline: &SkinOutline, at: impl Fn(f64) -> Vec2, to_centre_mm: f64) ->
     (enter, border(grid(after - 1), grid(after), false))
 }
 
-/// The three edges without cameras as a polyline, from the end of the lower edge around to the end of the upper one.
+/// The three edges without cameras as a polyline, from the end of the lower edge around to the end of the
+/// upper one.
 fn emitter_path(outline: &SkinOutline) -> Vec<Vec2> {
     let (hx, hy) = (outline.width_mm / 2.0, outline.height_mm / 2.0);
     let (c, r) = (outline.chamfer_mm, outline.radius_mm);
@@ -288,7 +291,8 @@ mod tests {
         assert_eq!(light.emitters.len(), 32);
         for e in &light.emitters {
             let p = Point2::new(e.at[0], e.at[1]);
-            // On the outline (a chord of an arc runs up to 0.03 mm inside), never on the chamfers or the right edge.
+            // On the outline (a chord of an arc runs up to 0.03 mm inside), never on the chamfers or the
+            // right edge.
             assert!(skin.clearance_mm(p).abs() < 0.05, "{p:?}");
             assert!(p.x_mm < 40.0, "{p:?}");
             let aimed = [60.0 - e.at[0], 2.0 - e.at[1]];

@@ -27,8 +27,8 @@ pub(super) struct Noise {
     next_ns: f64,
 }
 
-/// Rate of shot-noise events at brightness `q` (1 = the picture's brightest) as a part of the highest rate. A dark pixel is too slow to
-/// show its noise, a bright one has little of it.
+/// Rate of shot-noise events at brightness `q` (1 = the picture's brightest) as a part of the highest rate. A
+/// dark pixel is too slow to show its noise, a bright one has little of it.
 fn shot_weight(q: f64) -> f64 {
     /// Brightness with the most noise.
     const WORST: f64 = 0.3;
@@ -154,7 +154,8 @@ impl Noise {
                 pick -= rate;
             }
         }
-        // Shot noise (and the last bit of rounding of the hot pixels): a row by its rate, then columns until one accepts.
+        // Shot noise (and the last bit of rounding of the hot pixels): a row by its rate, then columns until
+        // one accepts.
         let wanted = self.random.unit() * self.shot_below.last().copied().unwrap_or(0.0);
         let y = self
             .shot_below

@@ -1,8 +1,9 @@
 //! The pixels of one camera: references, thresholds, refractory time.
 //!
-//! A pixel remembers the light of its last event and speaks when the light has changed by its threshold (in log
-//! intensity) since. Light is `1 + x c` (see the `dent` module), monotone in the dent's depth: so each pixel knows the two values of
-//! `x` at which it will speak next, each column the two depths, and nothing else is looked at while the dent moves.
+//! A pixel remembers the light of its last event and speaks when the light has changed by its threshold (in
+//! log intensity) since. Light is `1 + x c` (see the `dent` module), monotone in the dent's depth: so each
+//! pixel knows the two values of `x` at which it will speak next, each column the two depths, and nothing
+//! else is looked at while the dent moves.
 
 use skinrig_model::{Polarity, SENSOR_HEIGHT, SENSOR_WIDTH};
 
@@ -111,7 +112,8 @@ impl Pixels {
                     threshold(config.threshold_on),
                     threshold(config.threshold_off),
                 );
-                // A pixel's last event, before the session, left its reference anywhere between its thresholds.
+                // A pixel's last event, before the session, left its reference anywhere between its
+                // thresholds.
                 let reference = libm::exp(0.5 * (random.unit() * (on + off) - on));
                 Pixel {
                     reference,

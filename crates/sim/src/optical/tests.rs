@@ -146,7 +146,8 @@ fn samples_far_apart_mean_straight_motion() {
 fn without_motion_there_is_only_noise_at_its_rate() {
     let rest: Vec<_> = (0..=4000).map(|t| tip(t, P.x_mm, P.y_mm, 1.0)).collect();
     assert!(run(&mut quiet(CameraId::One), &rest).is_empty());
-    // A tip that stays at a depth makes events only while the skin creeps: of the order of its time constant, 700 ms.
+    // A tip that stays at a depth makes events only while the skin creeps: of the order of its time constant,
+    // 700 ms.
     let held: Vec<_> = (0..=5500).map(|t| tip(t, P.x_mm, P.y_mm, -1.0)).collect();
     let events = run(&mut quiet(CameraId::One), &held);
     let late = events.iter().filter(|e| ms(e) > 3500).count();
@@ -292,8 +293,9 @@ fn thresholds_set_the_number_of_events() {
 
 #[test]
 fn a_pixel_never_speaks_for_less_than_its_threshold() {
-    // The net count of a pixel's events times its threshold follows its log intensity: after a full relaxation, ON and OFF balance to
-    // within one threshold (refractory time short enough not to lose changes).
+    // The net count of a pixel's events times its threshold follows its log intensity: after a full
+    // relaxation, ON and OFF balance to within one threshold (refractory time short enough not to lose
+    // changes).
     let config = OpticalConfig {
         refractory_us: 1,
         creep_fraction: 0.0,
@@ -413,6 +415,23 @@ fn outside_the_skin_and_at_its_base_nothing_strange_happens() {
             &press(p, 6.0),
         );
         assert!(events.iter().all(|e| e.x < 640 && e.y < 480));
+    }
+}
+
+#[test]
+fn odd_scenes_give_noise_not_panics() {
+    let odd: [fn(&mut SceneConfig); 5] = [
+        |s| s.skin_rows = (360, 185),
+        |s| s.skin_rows = (500, 700),
+        |s| s.tip_side_mm = 0.0,
+        |s| s.skin_thickness_mm = 0.0,
+        |s| s.camera.position = Point2::new(400.0, 0.0),
+    ];
+    for change in odd {
+        let mut scene = scene(CameraId::Two);
+        change(&mut scene);
+        let events = run(&mut OpticalModel::new(&scene), &press(P, 2.0));
+        assert!(!events.is_empty() && events.iter().all(|e| e.x < 640 && e.y < 480));
     }
 }
 
