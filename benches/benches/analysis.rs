@@ -1,4 +1,5 @@
 //! Analysis: DBSCAN per press against the definition on the same events, and a whole analysis per event.
+#![expect(clippy::print_stdout, reason = "a bench prints its table")]
 
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};

@@ -275,7 +275,7 @@ fn a_planted_session_comes_out_with_its_clocks_geometry_and_places() {
     assert!((events - 53.0 * 600.0 - 3250.0).abs() < 400.0, "{events}");
     let json = serde_json::to_string(&a).unwrap();
     let back: skinrig_analysis::Analysis = serde_json::from_str(&json).unwrap();
-    assert_eq!(results_hash(&back), results_hash(&a));
+    assert_eq!((back.counts, back.warnings), (a.counts, a.warnings));
 }
 
 #[test]
@@ -340,7 +340,7 @@ fn whatever_goes_wrong_has_its_own_row_and_reason() {
     let contact = |row: usize| plan()[row].4;
     let lost = camera_us(1, contact(46)) as u64;
     input.gaps[1].push((lost, lost + 10));
-    // Camera 2 sees nothing of press 45 and little of 44; camera 1 sees press 43 elsewhere.
+    // Camera 2 sees nothing of press 45 and little of 44; press 43 appears beside the skin.
     let inside = |row: usize, k: usize, e: &CdEvent| {
         let from = camera_us(k, contact(row) - 0.1) as u64;
         (from..from + 700_000).contains(&e.t_us)
@@ -352,9 +352,13 @@ fn whatever_goes_wrong_has_its_own_row_and_reason() {
         kept += u32::from(inside(44, 1, e) && keep);
         keep
     });
-    for e in &mut source.events[0] {
-        if inside(43, 0, e) {
-            e.x = (e.x / 4) + 2;
+    let planted = StereoGeometry::paper_like(PLANTED);
+    let beside = Point2::new(-35.0, 47.0); // within the box, outside the rounded corner
+    for (k, events) in source.events.iter_mut().enumerate() {
+        let column = |p| planted.cameras[k].column_of_point(p).unwrap();
+        let shift = (column(beside) - column(plan()[43].3)).round();
+        for e in events.iter_mut().filter(|e| inside(43, k, e)) {
+            e.x = (f64::from(e.x) + shift).clamp(0.0, 639.0) as u16;
         }
     }
     let a = analyze(&input, &source).unwrap();

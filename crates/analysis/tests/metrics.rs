@@ -1,0 +1,154 @@
+//! Metrics against numbers worked out by hand, and the laws of their intervals.
+
+use proptest::prelude::*;
+use skinrig_analysis::metrics::{Exclusions, metrics};
+use skinrig_analysis::result::{LocationOutcome, Metrics, PressResult};
+use skinrig_analysis::sets::ScoreSet;
+use skinrig_model::{Point2, PressId, PressRole, SkinOutline};
+
+/// A scored press at (10 + location, 2) whose estimate is off by `error`; `None`: no estimate.
+fn row(location: u32, error: Option<(f64, f64)>, verdict: &str) -> PressResult {
+    let truth = Point2::new(10.0 + f64::from(location), 2.0);
+    PressResult {
+        press: PressId(0),
+        role: PressRole::Score,
+        repetition: 0,
+        location,
+        planned: truth,
+        depth_mm: 2.0,
+        truth: Some(truth),
+        verdict: verdict.to_owned(),
+        reason: None,
+        timing: None,
+        views: [None, None],
+        location_outcome: error.map_or(LocationOutcome::Missing, |(dx, dy)| {
+            LocationOutcome::Located {
+                at: Point2::new(truth.x_mm + dx, truth.y_mm + dy),
+                sine: 0.9,
+            }
+        }),
+    }
+}
+
+fn measure(rows: &[PressResult], exclusions: Exclusions) -> Metrics {
+    metrics(
+        &ScoreSet::from_presses(rows),
+        exclusions,
+        &SkinOutline::PAPER,
+        500,
+        1,
+    )
+}
+
+fn near(found: Option<f64>, wanted: f64) -> bool {
+    found.is_some_and(|f| (f - wanted).abs() < 1e-12)
+}
+
+#[test]
+fn values_are_those_of_the_definitions() {
+    let rows = [
+        row(0, Some((3.0, 4.0)), "valid"),
+        row(0, Some((1.0, 0.0)), "valid"),
+        row(1, Some((0.0, -2.0)), "valid"),
+        row(1, Some((50.0, 0.0)), "excluded"),
+        row(2, None, "excluded"),
+        row(3, None, "invalid"),
+        row(4, None, "missed"),
+    ];
+    let m = measure(&rows, Exclusions::Applied);
+    assert!(near(m.rmse_mm.value, (30.0f64 / 3.0).sqrt()));
+    assert!(near(m.rmse_x_mm.value, (10.0f64 / 3.0).sqrt()));
+    assert!(near(m.rmse_y_mm.value, (20.0f64 / 3.0).sqrt()));
+    assert!(near(m.bias_x_mm.value, 4.0 / 3.0) && near(m.bias_y_mm.value, 2.0 / 3.0));
+    assert!(near(m.median_mm.value, 2.0));
+    assert!(near(m.p95_mm.value, 2.0 + 0.9 * 3.0));
+    // Two estimates of location 0, (2, 4) mm apart: sample std sqrt(20 / 2).
+    assert!(near(m.repeat_std_mm.value, 10f64.sqrt()));
+    assert_eq!(
+        (m.rmse_mm.n, m.repeat_std_mm.n, m.located_rate.n),
+        (3, 1, 6)
+    );
+    assert!(near(m.located_rate.value, 0.5));
+    assert!(near(m.rmse_diagonal_percent, 10f64.sqrt() / 2f64.sqrt()));
+
+    let all = measure(&rows, Exclusions::Ignored);
+    assert!(near(all.rmse_mm.value, (2530.0f64 / 4.0).sqrt()));
+    assert!(near(all.located_rate.value, 4.0 / 6.0));
+    assert_eq!(all.repeat_std_mm.n, 2);
+}
+
+#[test]
+fn too_few_presses_give_no_number_instead_of_a_false_one() {
+    let m = measure(&[], Exclusions::Applied);
+    assert_eq!(
+        (m.rmse_mm.value, m.rmse_mm.n, m.located_rate.value),
+        (None, 0, None)
+    );
+    let m = measure(&[row(0, None, "excluded")], Exclusions::Applied);
+    assert_eq!((m.rmse_mm.value, m.median_mm.value), (None, None));
+    assert_eq!((m.located_rate.value, m.located_rate.n), (Some(0.0), 1));
+    // One location: a value, but nothing to resample.
+    let m = measure(&[row(0, Some((1.0, 1.0)), "valid")], Exclusions::Applied);
+    assert!(
+        m.rmse_mm.value.is_some() && m.rmse_mm.low.is_none() && m.repeat_std_mm.value.is_none()
+    );
+}
+
+#[test]
+fn depths_are_not_repetitions_of_each_other() {
+    let mut deep = row(0, Some((5.0, 0.0)), "valid");
+    deep.depth_mm = 4.0;
+    let m = measure(
+        &[row(0, Some((0.0, 0.0)), "valid"), deep],
+        Exclusions::Applied,
+    );
+    assert_eq!(m.repeat_std_mm.value, None);
+}
+
+#[test]
+fn the_interval_covers_as_often_as_it_says() {
+    // 120 sessions of 60 locations with normal errors of 3 mm in x and y: RMSE 3 sqrt(2). Percentile intervals of a
+    // bootstrap cover a little less than 95 %.
+    let mut state = 5u64;
+    let mut unit = || {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1u64 << 53) as f64
+    };
+    let mut normal = || (0..12).map(|_| unit()).sum::<f64>() - 6.0;
+    let covered = (0..120)
+        .filter(|_| {
+            let rows: Vec<PressResult> = (0..60)
+                .map(|i| row(i, Some((3.0 * normal(), 3.0 * normal())), "valid"))
+                .collect();
+            let m = measure(&rows, Exclusions::Applied).rmse_mm;
+            let truth = 3.0 * 2f64.sqrt();
+            m.low.unwrap() <= truth && truth <= m.high.unwrap()
+        })
+        .count();
+    assert!((104..=120).contains(&covered), "{covered} of 120");
+}
+
+proptest! {
+    #[test]
+    fn intervals_hold_their_value_and_repetitions_do_not_narrow_them(
+        errors in prop::collection::vec((-20.0f64..20.0, -20.0f64..20.0), 4..30), copies in 2usize..5,
+    ) {
+        let rows: Vec<PressResult> =
+            errors.iter().zip(0..).map(|(e, i)| row(i, Some(*e), "valid")).collect();
+        let m = measure(&rows, Exclusions::Applied);
+        for e in [m.rmse_mm, m.rmse_x_mm, m.rmse_y_mm, m.bias_x_mm, m.median_mm, m.p95_mm] {
+            prop_assert!(e.low <= e.high);
+            prop_assert!(e.n as usize == errors.len());
+        }
+        let (x, y, r) = (m.rmse_x_mm.value.unwrap(), m.rmse_y_mm.value.unwrap(), m.rmse_mm.value.unwrap());
+        prop_assert!((x * x + y * y - r * r).abs() < 1e-9 * (1.0 + r * r));
+        // The same presses several times at the same places tell nothing new.
+        let repeated: Vec<PressResult> = (0..copies).flat_map(|_| rows.clone()).collect();
+        let again = measure(&repeated, Exclusions::Applied);
+        prop_assert!((again.rmse_mm.low.unwrap() - m.rmse_mm.low.unwrap()).abs() < 1e-9);
+        prop_assert!((again.rmse_mm.high.unwrap() - m.rmse_mm.high.unwrap()).abs() < 1e-9);
+        prop_assert_eq!(again.repeat_std_mm.value.map(|v| v < 1e-9), Some(true));
+    }
+}
