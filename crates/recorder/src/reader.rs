@@ -173,7 +173,7 @@ impl SessionReader {
             planned_from,
         )?;
         let mut header = self
-            .all(DOING, "SELECT * FROM session", |row| header_from(row))?
+            .all(DOING, "SELECT * FROM session", header_from)?
             .pop()
             .ok_or_else(|| self.no_header())?;
         let [(x, tx), (y, ty), (z, tz)] = axes[..] else {

@@ -292,6 +292,23 @@ impl Drop for Farewell {
     }
 }
 
+/// A fault of the writing side in words: a record that cannot be kept is no damage to the file.
+fn told(fault: Fault, path: &Path, doing: &'static str) -> String {
+    match fault {
+        Fault::Bad {
+            place,
+            expected,
+            found,
+        } => {
+            format!(
+                "{}: {place}: expected {expected}, found {found}",
+                path.display()
+            )
+        }
+        sql @ Fault::Sql(_) => sql.at(path, doing).to_string(),
+    }
+}
+
 enum Next {
     Records(VecDeque<(Record, usize)>),
     CommitNow,
@@ -306,13 +323,18 @@ impl Worker {
         let mut written = 0;
         let close = loop {
             let step = match self.next(opened.map(|t| t + COMMIT_AFTER)) {
-                Next::Records(records) => self.write_all(records, &mut written),
+                Next::Records(records) => self.write_all(records, &mut written).and_then(|()| {
+                    // A steady trickle of small records must not put the commit off for ever.
+                    match opened {
+                        Some(t) if t.elapsed() >= COMMIT_AFTER => self.commit(written),
+                        _ => Ok(()),
+                    }
+                }),
                 Next::CommitNow => self.commit(written),
                 Next::Close(close) => break close,
             };
             if let Err(fault) = step {
-                self.shared
-                    .fail(fault.at(&path, "writing a record").to_string());
+                self.shared.fail(told(fault, &path, "writing a record"));
             }
             opened = self
                 .journal
@@ -322,7 +344,7 @@ impl Worker {
         let failed = self.shared.lock().failed.is_some();
         if !failed && let Err(fault) = self.commit(written) {
             self.shared
-                .fail(fault.at(&path, "committing the last records").to_string());
+                .fail(told(fault, &path, "committing the last records"));
         }
         let failed = self.shared.lock().failed.is_some();
         let Self {
