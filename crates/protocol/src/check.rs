@@ -229,7 +229,7 @@ impl Checker<'_> {
             let v = p.to_array()[k];
             if !(v >= min[k] - TINY_MM && v <= max[k] + TINY_MM) {
                 let key = if axis == "z" && segment != Segment::FromHome {
-                    "motion.clearance` or `limits.workspace"
+                    "limits.workspace"
                 } else {
                     key
                 };
@@ -266,12 +266,7 @@ impl Checker<'_> {
         deadline: HostDuration,
     ) {
         let clearance = self.plan.limits.clearance_mm;
-        let key = if segment == Segment::FromHome {
-            "motion.home` or `path"
-        } else {
-            "path"
-        };
-        self.workspace(segment, to, key);
+        self.workspace(segment, to, "path");
         if let Some(from) = from.filter(|_| segment == Segment::FromHome) {
             self.workspace(segment, from, "motion.home");
         }

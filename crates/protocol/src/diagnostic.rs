@@ -212,6 +212,16 @@ impl Collector {
         Finding(self.found.last_mut().map(|(_, d)| d))
     }
 
+    /// Moves the findings in source `from` to the same bytes of source `to`.
+    pub fn move_findings(&mut self, from: usize, to: usize) {
+        for (span, diagnostic) in &mut self.found {
+            if span.source == from {
+                span.source = to;
+                diagnostic.location = self.sources.locate(*span);
+            }
+        }
+    }
+
     /// True when nothing is wrong so far.
     pub fn is_clean(&self) -> bool {
         self.found.is_empty()

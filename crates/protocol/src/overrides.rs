@@ -52,7 +52,9 @@ fn apply_one(
         // The value is YAML of its own, at its place in the argument.
         let padded = format!("{}{value}", " ".repeat(start));
         let part = out.sources.add("--set", padded);
-        let mut node = yaml::parse(out, part)?;
+        let node = yaml::parse(out, part);
+        out.move_findings(part, source);
+        let mut node = node?;
         resource(&mut node, part, source);
         node
     };

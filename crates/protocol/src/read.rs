@@ -68,6 +68,7 @@ pub(crate) fn read_table(
                 if !slip {
                     out.error(head, join(path, key.name), "a required key is missing")
                         .expected(format!("`{}`: {}", key.name, expectation(&key.shape)))
+                        .found("no such key")
                         .help(format!("add `{}: {}`", key.name, example(&key.shape)));
                 }
             }
@@ -100,7 +101,8 @@ pub(crate) fn read_table(
                 });
                 if !slip {
                     out.error(head, path, "a required key is missing")
-                        .expected(format!("exactly one of {}", one_of(group.iter().copied())));
+                        .expected(format!("exactly one of {}", one_of(group.iter().copied())))
+                        .found("none of them");
                 }
             }
             [_, others @ ..] => {
@@ -169,7 +171,8 @@ pub(crate) fn read(
         (Shape::Flag, Kind::Scalar { text, plain: true }) if text == "false" => Value::Flag(false),
         (Shape::Text, Kind::Scalar { .. }) => {
             out.error(node.span, path, "the text is blank")
-                .expected("a text");
+                .expected("a text")
+                .found("blanks");
             return None;
         }
         (Shape::Flag, Kind::Scalar { text, .. }) => {

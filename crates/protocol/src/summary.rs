@@ -121,8 +121,12 @@ impl fmt::Display for PlanSummary {
         )?;
         writeln!(
             f,
-            "presses   {presses}: {} calibrate, {} score, {} sync; {} locations, {} repetitions, depth {depth}",
-            self.calibrate, self.score, self.sync, self.locations, self.repetitions
+            "presses   {presses}: {} calibrate, {} score, {} sync; {}, {}, depth {depth}",
+            self.calibrate,
+            self.score,
+            self.sync,
+            counted(self.locations, "location"),
+            counted(self.repetitions, "repetition")
         )?;
         writeln!(f, "path      {:.0} mm", self.path_length_mm)?;
         writeln!(
@@ -138,6 +142,12 @@ impl fmt::Display for PlanSummary {
             scaled(self.expected_bytes)
         )
     }
+}
+
+/// `1 repetition`, `2 repetitions`.
+pub(crate) fn counted(n: u32, what: &str) -> String {
+    let plural = if n == 1 { "" } else { "s" };
+    format!("{n} {what}{plural}")
 }
 
 /// `2 h 05 min 40 s`.

@@ -6,6 +6,7 @@ use skinrig_model::{Point2, PressRole};
 
 use crate::area::{Area, Surroundings};
 use crate::plan::Plan;
+use crate::summary::counted;
 
 /// Millimetres around the skin for axes and legend.
 const BORDER_MM: f64 = 14.0;
@@ -304,8 +305,9 @@ fn closest_pair_mm(visits: &[Point2]) -> f64 {
 fn legend_text(plan: &Plan, locations: usize) -> String {
     let s = plan.summary();
     format!(
-        "{locations} locations, {} repetitions, {} presses; seen from above",
-        s.repetitions,
+        "{}, {}, {} presses; seen from above",
+        counted(locations as u32, "location"),
+        counted(s.repetitions, "repetition"),
         plan.presses.len()
     )
 }

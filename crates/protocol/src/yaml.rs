@@ -137,6 +137,7 @@ impl<'a> Reader<'a, '_> {
                 let help = syntax_help(self.text, at);
                 self.collector
                     .error(self.span(at, at), "", "not valid YAML")
+                    .expected("YAML")
                     .found(error.info())
                     .maybe_help(help);
                 None
@@ -170,6 +171,7 @@ impl<'a> Reader<'a, '_> {
                     self.collector
                         .error(span, "", "more than one YAML document")
                         .expected("one document in the file")
+                        .found("the begin of another one")
                         .help("remove the line `---`, or split the file");
                     return None;
                 }
@@ -228,6 +230,7 @@ impl<'a> Reader<'a, '_> {
                 self.collector
                     .error(span, self.here(), "aliases are not used here")
                     .expected("a value")
+                    .found("an alias")
                     .help("write the value out in place of the alias");
                 Node {
                     span,
@@ -256,6 +259,7 @@ impl<'a> Reader<'a, '_> {
                 _ => {
                     self.collector
                         .error(key.span, self.here(), "a key must be a word")
+                        .expected("a word before the colon")
                         .found(key.describe());
                     self.node(event, at)?;
                     continue;
@@ -268,14 +272,16 @@ impl<'a> Reader<'a, '_> {
             if entries.len() >= MOST_KEYS {
                 self.collector
                     .error(key.span, path, "too many keys")
-                    .expected(format!("at most {MOST_KEYS} keys in one mapping"));
+                    .expected(format!("at most {MOST_KEYS} keys in one mapping"))
+                    .found("more");
                 return None;
             }
             if let Some(first) = entries.iter().find(|e| e.key == text) {
                 let line = self.collector.sources.locate(first.key_span).line;
                 self.collector
                     .error(key.span, path, "the key is given twice")
-                    .found(format!("`{text}` here and in line {line}"))
+                    .expected("each key once")
+                    .found(format!("{} here and in line {line}", quote(&text)))
                     .help("remove one of the two");
                 continue;
             }

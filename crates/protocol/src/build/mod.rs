@@ -67,6 +67,7 @@ pub(crate) fn open(
     if matches!(root.kind, yaml::Kind::Null) && out.is_clean() {
         out.error(root.span, "", "the file is empty")
             .expected(format!("a {}", table.name))
+            .found("nothing")
             .help("begin with `skinrig: 1`, or copy one of the shipped files");
         return Err(out.finish());
     }
@@ -101,6 +102,8 @@ pub(crate) fn protocol(
         (None, true) => {
             let span = Span::default();
             out.error(span, "", "the file could not be understood")
+                .expected("a protocol")
+                .found("an input that passed every check and still has no meaning")
                 .help("this is a defect of skinrig; please report it with the file");
         }
         _ => {}

@@ -22,6 +22,7 @@ pub(super) fn scene(f: &Field, out: &mut Collector) -> Option<Scene> {
             .find(|n| Some(n.name()) == item.as_word())?;
         if needs.contains(&need) {
             out.error(item.span, item.path.as_str(), "the need is given twice")
+                .expected("each need once")
                 .found(format!("`{}`", need.name()));
         }
         needs.push(need);
@@ -29,6 +30,7 @@ pub(super) fn scene(f: &Field, out: &mut Collector) -> Option<Scene> {
     if f.entries().is_empty() {
         out.error(f.span, "scene", "the scene is empty")
             .expected("`needs`, `level` or both")
+            .found("neither")
             .help("write `scene: {needs: [event_rates, localisation]}`");
         return None;
     }
@@ -406,6 +408,7 @@ pub(super) fn marks(f: &Field, out: &mut Collector) -> Option<Vec<MarkKind>> {
             .find(|m| Some(m.name()) == item.as_word())?;
         if marks.contains(&mark) {
             out.error(item.span, item.path.as_str(), "the mark is given twice")
+                .expected("each mark once")
                 .found(format!("`{}`", mark.name()));
         }
         marks.push(mark);

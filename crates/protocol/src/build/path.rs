@@ -218,6 +218,7 @@ fn csv_points(
             if !skip_blank {
                 out.error(span, "", format!("row {row} is blank"))
                     .expected("numbers in the columns `x` and `y`")
+                    .found("nothing but blanks")
                     .help("remove the row, or write `skip_blank_rows: true` in the protocol");
                 clean = false;
             }

@@ -25,6 +25,13 @@ fn finding(from: &str, to: &str, path: &str, message: &str, rest: &str) {
         .collect();
     assert_eq!(found.len(), 1, "{to}\n{error}");
     assert!(
+        error
+            .list()
+            .iter()
+            .all(|d| d.expected.is_some() && d.found.is_some()),
+        "{error}"
+    );
+    assert!(
         error.to_string().contains(rest),
         "{rest} is not said\n{error}"
     );
@@ -368,6 +375,14 @@ fn hostile_texts() {
         let missing =
             error.contains(said) || error.contains("not a whole number") && said == "the value";
         assert!(missing, "{start}: {error}");
+        assert_eq!(
+            error.matches("= expected").count(),
+            error.matches("--> ").count()
+        );
+        assert_eq!(
+            error.matches("= found").count(),
+            error.matches("--> ").count()
+        );
         assert!(error.len() < 100_000, "{start}: {} bytes", error.len());
     }
     for (bytes, said) in [
@@ -409,6 +424,7 @@ proptest! {
                 for d in error.list() {
                     prop_assert!(d.location.line >= 1 && d.location.line <= text.split('\n').count());
                     prop_assert!(d.location.column >= 1);
+                    prop_assert!(d.expected.is_some() && d.found.is_some(), "{}", error);
                 }
             }
         }

@@ -1,5 +1,7 @@
 //! The shipped protocols and schedules: they parse, their plans are safe and unchanged, their schema is current.
 
+use serde_json::Value;
+
 use crate::common::{folder, nothing, parse, shipped};
 use skinrig_protocol::{Protocol, Schedule, check, path_svg, schedule_schema_json, schema_json};
 
@@ -122,4 +124,165 @@ fn texts_and_hashes_are_kept_byte_for_byte() {
     assert_ne!(protocol.sha256, plain.sha256);
     assert_eq!(protocol.compile(), plain.compile());
     assert_eq!(plain.sha256.len(), 64);
+}
+
+/// The few words of JSON Schema that the generated schemas use. `Err` names the first place that does not fit.
+fn validate(schema: &Value, value: &Value, root: &Value, place: &str) -> Result<(), String> {
+    let fail = |what: &str| Err(format!("{place}: {what}: {value}"));
+    if let Some(reference) = schema.get("$ref").and_then(Value::as_str) {
+        let target = root.pointer(reference.trim_start_matches('#'));
+        validate(target.expect("a definition"), value, root, place)?;
+    }
+    if let Some(types) = schema.get("type") {
+        let is = |t: &str| match t {
+            "object" => value.is_object(),
+            "array" => value.is_array(),
+            "string" => value.is_string(),
+            "integer" => value.is_i64() || value.is_u64(),
+            "number" => value.is_number(),
+            "boolean" => value.is_boolean(),
+            other => panic!("unknown type {other}"),
+        };
+        let fits = match types {
+            Value::Array(list) => list.iter().any(|t| is(t.as_str().unwrap())),
+            one => is(one.as_str().unwrap()),
+        };
+        if !fits {
+            return fail("type");
+        }
+    }
+    if schema.get("const").is_some_and(|c| c != value) {
+        return fail("const");
+    }
+    let number = value.as_f64();
+    for (word, ok) in [
+        ("minimum", (|v, l| v >= l) as fn(f64, f64) -> bool),
+        ("maximum", |v, l| v <= l),
+        ("exclusiveMinimum", |v, l| v > l),
+    ] {
+        if let (Some(limit), Some(v)) = (schema.get(word).and_then(Value::as_f64), number)
+            && !ok(v, limit)
+        {
+            return fail(word);
+        }
+    }
+    for part in schema
+        .get("allOf")
+        .and_then(Value::as_array)
+        .into_iter()
+        .flatten()
+    {
+        validate(part, value, root, place)?;
+    }
+    if let Some(options) = schema.get("oneOf").and_then(Value::as_array) {
+        let fitting = options
+            .iter()
+            .filter(|o| validate(o, value, root, place).is_ok())
+            .count();
+        if fitting != 1 {
+            return fail("oneOf");
+        }
+    }
+    for key in schema
+        .get("required")
+        .and_then(Value::as_array)
+        .into_iter()
+        .flatten()
+    {
+        if value.get(key.as_str().unwrap()).is_none() {
+            return fail(&format!("required {key}"));
+        }
+    }
+    if let Some(object) = value.as_object() {
+        for (key, inner) in object {
+            let place = format!("{place}.{key}");
+            match (
+                schema.pointer(&format!("/properties/{key}")),
+                schema.get("additionalProperties"),
+            ) {
+                (Some(of), _) => validate(of, inner, root, &place)?,
+                (None, Some(Value::Bool(false))) => return Err(format!("{place}: unknown key")),
+                (None, Some(of)) => validate(of, inner, root, &place)?,
+                (None, None) => {}
+            }
+        }
+    }
+    if let Some(list) = value.as_array() {
+        let limit = |word| schema.get(word).and_then(Value::as_u64).map(|n| n as usize);
+        if limit("minItems").is_some_and(|n| list.len() < n)
+            || limit("maxItems").is_some_and(|n| list.len() > n)
+        {
+            return fail("length");
+        }
+        if let Some(of) = schema.get("items") {
+            for (k, item) in list.iter().enumerate() {
+                validate(of, item, root, &format!("{place}[{k}]"))?;
+            }
+        }
+    }
+    Ok(())
+}
+
+#[test]
+fn shipped_files_fit_their_schemas() {
+    for (schema, files) in [
+        (
+            schema_json(),
+            PROTOCOLS.map(|n| format!("{n}.yaml")).to_vec(),
+        ),
+        (
+            schedule_schema_json(),
+            ["paper-recording", "single-repetition", "ten-presses"]
+                .map(|n| format!("{n}.schedule.yaml"))
+                .to_vec(),
+        ),
+    ] {
+        let schema: Value = serde_json::from_str(&schema).unwrap();
+        for file in files {
+            let mut value: Value = serde_yaml::from_str(&shipped(&file)).unwrap();
+            validate(&schema, &value, &schema, &file).unwrap();
+            value["prototype"]["colour"] = "grey".into();
+            let error = validate(&schema, &value, &schema, &file).unwrap_err();
+            assert!(error.ends_with("prototype.colour: unknown key"), "{error}");
+        }
+    }
+}
+
+/// Every key of the schema is known to the reader, and what the schema requires is required.
+#[test]
+fn schema_and_reader_know_the_same_keys() {
+    let schema: Value = serde_json::from_str(&schema_json()).unwrap();
+    let expected = |text: &str| {
+        let error = parse(text, &[]).unwrap_err();
+        let unknown = error
+            .list()
+            .iter()
+            .find(|d| d.message == "unknown key")
+            .unwrap();
+        unknown.expected.clone().unwrap()
+    };
+    for (table, text) in [
+        ("", "nonsense: 1\n"),
+        ("motion", "motion: {nonsense: 1}\n"),
+        ("analysis", "analysis: {nonsense: 1}\n"),
+        ("meander", "path: {meander: {nonsense: 1}}\n"),
+        ("keep_out", "frame: {keep_outs: [{nonsense: 1}]}\n"),
+        ("roi", "cameras: {camera1: {roi: {nonsense: 1}}}\n"),
+    ] {
+        let object = match table {
+            "" => &schema,
+            name => &schema["$defs"][name],
+        };
+        let said = expected(text);
+        for key in object["properties"].as_object().unwrap().keys() {
+            assert!(said.contains(&format!("`{key}`")), "{key}: {said}");
+        }
+        let count = object["properties"].as_object().unwrap().len();
+        assert_eq!(said.matches('`').count(), 2 * count, "{said}");
+    }
+    let missing = parse("x: 1\n", &[]).unwrap_err();
+    for key in schema["required"].as_array().unwrap() {
+        let path = key.as_str().unwrap();
+        assert!(missing.list().iter().any(|d| d.path == path), "{path}");
+    }
 }
