@@ -95,6 +95,7 @@ impl EventSource for Memory {
 fn whole() {
     let (input, source) = session();
     let events: f64 = source.0.iter().map(|e| e.len() as f64 / 1e6).sum();
+    let mut counts = vec![0u32; 640 * 480];
     let mut table = Table::new(
         "analysis of one repetition (289 presses, two cameras, no trigger marks)",
         "Mev",
@@ -104,7 +105,6 @@ fn whole() {
     table.row("whole analysis", events, || {
         std::hint::black_box(analyze(&input, &source).map(|a| a.counts).ok());
     });
-    let mut counts = vec![0u32; 640 * 480];
     table.baseline("count per pixel", events, || {
         for e in source.0.iter().flatten() {
             counts[usize::from(e.y) * 640 + usize::from(e.x)] += 1;
