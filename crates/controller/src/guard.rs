@@ -205,8 +205,8 @@ impl GuardedIndenter {
             }
             let pose = PoseSample {
                 t: s.t,
-                commanded: self.skin_from_robot.apply(s.commanded),
-                measured: self.skin_from_robot.apply(s.measured),
+                commanded: to_nanometre(self.skin_from_robot.apply(s.commanded)),
+                measured: to_nanometre(self.skin_from_robot.apply(s.measured)),
                 force_n: s.force_n,
             };
             self.last = Some(pose);
@@ -260,4 +260,11 @@ pub(crate) fn check_target(limits: &RunLimits, target: Point3<Skin>) -> Result<(
         });
     }
     Ok(())
+}
+/// Rounds a pose to whole nanometres, far below any robot's resolution (omega.3: about 10 µm). Going to another
+/// frame and back changes the last bits of a coordinate; rounded, a replayed pose is the recorded one to the last
+/// bit, and so is everything computed from it.
+fn to_nanometre(p: Point3<Skin>) -> Point3<Skin> {
+    let round = |mm: f64| (mm * 1e6).round() / 1e6;
+    Point3::new(round(p.x_mm), round(p.y_mm), round(p.z_mm))
 }
