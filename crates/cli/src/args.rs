@@ -27,8 +27,10 @@ pub enum Command {
     Check(ProtocolArgs),
 
     /// Compile a protocol into steps; print them, or draw the path.
-    #[command(after_help = "Examples:\n  skinrig plan protocols/paper-meander.yaml --svg path.svg\n  \
-        skinrig plan protocols/demo.yaml --set path.meander.pitch=6mm --steps")]
+    #[command(
+        after_help = "Examples:\n  skinrig plan protocols/paper-meander.yaml --svg path.svg\n  \
+        skinrig plan protocols/demo.yaml --set path.meander.pitch=6mm --steps"
+    )]
     Plan(PlanArgs),
 
     /// Run a protocol (on the simulated rig), record, analyse, report.
@@ -47,12 +49,16 @@ pub enum Command {
     Show(ShowArgs),
 
     /// Analyse a session; write its results beside it and print them.
-    #[command(after_help = "Examples:\n  skinrig analyze sessions/NAME.session.sqlite\n  \
-        skinrig analyze sessions/NAME.session.sqlite --set analysis.centroid=all_clusters --out other.json")]
+    #[command(
+        after_help = "Examples:\n  skinrig analyze sessions/NAME.session.sqlite\n  \
+        skinrig analyze sessions/NAME.session.sqlite --set analysis.centroid=all_clusters --out other.json"
+    )]
     Analyze(AnalyzeArgs),
 
     /// Write the HTML report of a session (analysing it first when needed).
-    #[command(after_help = "Example:\n  skinrig report sessions/NAME.session.sqlite --out report.html")]
+    #[command(
+        after_help = "Example:\n  skinrig report sessions/NAME.session.sqlite --out report.html"
+    )]
     Report(ReportArgs),
 
     /// Recompute every checksum, count and hash of a session.
@@ -60,12 +66,16 @@ pub enum Command {
     Verify(SessionArg),
 
     /// Make a session from the published dataset's files.
-    #[command(after_help = "Example:\n  skinrig import --camera1 camera1.hdf5 --camera2 camera2.hdf5 \\\n    \
-        --presses press_positions.csv --schedule protocols/paper-recording.schedule.yaml")]
+    #[command(
+        after_help = "Example:\n  skinrig import --camera1 camera1.hdf5 --camera2 camera2.hdf5 \\\n    \
+        --presses press_positions.csv --schedule protocols/paper-recording.schedule.yaml"
+    )]
     Import(ImportArgs),
 
     /// Write a session's data in other programs' formats.
-    #[command(after_help = "Example:\n  skinrig export sessions/NAME.session.sqlite --to raw --to presses --out export/")]
+    #[command(
+        after_help = "Example:\n  skinrig export sessions/NAME.session.sqlite --to raw --to presses --out export/"
+    )]
     Export(ExportArgs),
 
     /// Print what is in a RAW, HDF5 or session file.

@@ -39,8 +39,11 @@ pub fn load(path: &Path, overrides: &[String]) -> Result<Checked, Failure> {
 }
 
 fn describe(path: &Path, violations: &[Violation]) -> String {
-    let mut text =
-        format!("{}: the plan breaks {} limit(s)\n", path.display(), violations.len());
+    let mut text = format!(
+        "{}: the plan breaks {} limit(s)\n",
+        path.display(),
+        violations.len()
+    );
     for violation in violations {
         text.push_str(&format!("  {violation}\n"));
     }
@@ -74,7 +77,11 @@ pub fn plan(args: &PlanArgs, json: bool) -> Outcome {
     let checked = load(&args.protocol.protocol, &args.protocol.overrides)?;
     let summary = checked.plan.summary();
     if let Some(file) = &args.svg {
-        std::fs::write(file, path_svg(&checked.plan, &checked.protocol.surroundings)).map_err(|e| {
+        std::fs::write(
+            file,
+            path_svg(&checked.plan, &checked.protocol.surroundings),
+        )
+        .map_err(|e| {
             Failure::internal(format!("{}: cannot write the path: {e}", file.display()))
         })?;
     }
@@ -102,17 +109,23 @@ fn describe_step(step: &Step) -> String {
     let seconds = |d: skinrig_model::HostDuration| format!("{:.3} s", d.as_secs_f64());
     match step {
         Step::Begin { repetition: None } => "begin of the sync presses".into(),
-        Step::Begin { repetition: Some(r) } => format!("begin of repetition {}", r + 1),
-        Step::Travel { to, speed_mm_s, deadline } => {
+        Step::Begin {
+            repetition: Some(r),
+        } => format!("begin of repetition {}", r + 1),
+        Step::Travel {
+            to,
+            speed_mm_s,
+            deadline,
+        } => {
             let [x, y, z] = to.to_array();
             let within = seconds(*deadline);
             format!("travel to ({x:.3}, {y:.3}, {z:.3}) mm at {speed_mm_s} mm/s within {within}")
         }
         Step::Pause { duration } => format!("pause {}", seconds(*duration)),
         Step::Press(p) => {
-            let at = p.start_after_begin.map_or_else(String::new, |t| {
-                format!(", {} after begin", seconds(t))
-            });
+            let at = p
+                .start_after_begin
+                .map_or_else(String::new, |t| format!(", {} after begin", seconds(t)));
             format!(
                 "press {} at ({:.3}, {:.3}) mm, {} mm deep{at}: approach {:.3}, indent {:.3}, retract \
                  {:.3} mm/s, hold {}, within {}",

@@ -50,22 +50,34 @@ pub struct Failure {
 impl Failure {
     /// Bad input.
     pub fn input(message: impl fmt::Display) -> Self {
-        Self { exit: Exit::Input, message: message.to_string() }
+        Self {
+            exit: Exit::Input,
+            message: message.to_string(),
+        }
     }
 
     /// A fault of the program or the machine.
     pub fn internal(message: impl fmt::Display) -> Self {
-        Self { exit: Exit::Internal, message: message.to_string() }
+        Self {
+            exit: Exit::Internal,
+            message: message.to_string(),
+        }
     }
 
     /// A rig fault.
     pub fn rig(message: impl fmt::Display) -> Self {
-        Self { exit: Exit::Rig, message: message.to_string() }
+        Self {
+            exit: Exit::Rig,
+            message: message.to_string(),
+        }
     }
 
     /// A limit that was not met.
     pub fn limit(message: impl fmt::Display) -> Self {
-        Self { exit: Exit::Limit, message: message.to_string() }
+        Self {
+            exit: Exit::Limit,
+            message: message.to_string(),
+        }
     }
 }
 

@@ -88,9 +88,17 @@ fn raw(
         .find(|d| d.role == DeviceRole::of_camera(camera))
         .map_or("unknown", |d| d.identity.serial.as_str());
     // RAW headers carry a civil date without a zone; the session's start is UTC.
-    let date = header.started_at.chars().take(19).collect::<String>().replace('T', " ");
+    let date = header
+        .started_at
+        .chars()
+        .take(19)
+        .collect::<String>()
+        .replace('T', " ");
     let format = header.stream_formats[camera.index()];
-    let metadata = RawMetadata { format, ..RawMetadata::evk1(&date, serial) };
+    let metadata = RawMetadata {
+        format,
+        ..RawMetadata::evk1(&date, serial)
+    };
     let mut writer = RawWriter::create(path, &metadata).map_err(failed(path))?;
     let mut fault = None;
     reader
@@ -160,9 +168,27 @@ fn presses(reader: &SessionReader, path: &Path) -> Result<(), Failure> {
     let mut out = csv_file(path)?;
     let unwritable = |e: csv::Error| Failure::internal(format!("{}: {e}", path.display()));
     out.write_record([
-        "press", "role", "repetition", "location", "x_mm", "y_mm", "depth_mm", "attempt", "verdict",
-        "reason", "scheduled", "approach_s", "contact_s", "at_depth_s", "retract_s", "release_s",
-        "clear_s", "measured_x_mm", "measured_y_mm", "measured_depth_mm", "peak_force_n",
+        "press",
+        "role",
+        "repetition",
+        "location",
+        "x_mm",
+        "y_mm",
+        "depth_mm",
+        "attempt",
+        "verdict",
+        "reason",
+        "scheduled",
+        "approach_s",
+        "contact_s",
+        "at_depth_s",
+        "retract_s",
+        "release_s",
+        "clear_s",
+        "measured_x_mm",
+        "measured_y_mm",
+        "measured_depth_mm",
+        "peak_force_n",
     ])
     .map_err(unwritable)?;
     for (planned, attempts) in reader.presses().map_err(Failure::input)? {
@@ -181,7 +207,9 @@ fn presses(reader: &SessionReader, path: &Path) -> Result<(), Failure> {
                 format!("{:.6}", planned.depth_mm),
                 attempt.id.number.to_string(),
                 o.map_or("open", |o| o.verdict.name()).to_owned(),
-                o.and_then(|o| o.verdict.reason()).unwrap_or_default().to_owned(),
+                o.and_then(|o| o.verdict.reason())
+                    .unwrap_or_default()
+                    .to_owned(),
                 o.map_or_else(String::new, |o| o.scheduled.to_string()),
                 seconds(t.map(|t| t.approach)),
                 seconds(t.map(|t| t.contact)),
@@ -197,7 +225,8 @@ fn presses(reader: &SessionReader, path: &Path) -> Result<(), Failure> {
             .map_err(unwritable)?;
         }
     }
-    out.flush().map_err(|e| Failure::internal(format!("{}: {e}", path.display())))
+    out.flush()
+        .map_err(|e| Failure::internal(format!("{}: {e}", path.display())))
 }
 
 /// One row per pose sample.
@@ -205,8 +234,14 @@ fn poses(reader: &SessionReader, path: &Path) -> Result<(), Failure> {
     let mut out = csv_file(path)?;
     let unwritable = |e: csv::Error| Failure::internal(format!("{}: {e}", path.display()));
     out.write_record([
-        "t_s", "commanded_x_mm", "commanded_y_mm", "commanded_z_mm", "measured_x_mm",
-        "measured_y_mm", "measured_z_mm", "force_n",
+        "t_s",
+        "commanded_x_mm",
+        "commanded_y_mm",
+        "commanded_z_mm",
+        "measured_x_mm",
+        "measured_y_mm",
+        "measured_z_mm",
+        "force_n",
     ])
     .map_err(unwritable)?;
     let mut fault = None;
@@ -222,13 +257,18 @@ fn poses(reader: &SessionReader, path: &Path) -> Result<(), Failure> {
     if let Some(e) = fault {
         return Err(unwritable(e));
     }
-    out.flush().map_err(|e| Failure::internal(format!("{}: {e}", path.display())))
+    out.flush()
+        .map_err(|e| Failure::internal(format!("{}: {e}", path.display())))
 }
 
 fn pose_row(s: &PoseSample) -> Vec<String> {
     let mut row = vec![format!("{:.9}", s.t.as_secs_f64())];
     let coordinates = [s.commanded.to_array(), s.measured.to_array()];
     row.extend(coordinates.as_flattened().iter().map(|v| format!("{v:.6}")));
-    row.push(if s.force_n.is_nan() { String::new() } else { format!("{:.4}", s.force_n) });
+    row.push(if s.force_n.is_nan() {
+        String::new()
+    } else {
+        format!("{:.4}", s.force_n)
+    });
     row
 }

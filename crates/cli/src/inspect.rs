@@ -2,4 +2,6 @@
 use crate::args::InspectArgs;
 use crate::exit::{Exit, Outcome};
 /// x
-pub fn inspect(_: &InspectArgs, _: bool) -> Outcome { Ok(Exit::Ok) }
+pub fn inspect(_: &InspectArgs, _: bool) -> Outcome {
+    Ok(Exit::Ok)
+}

@@ -1,7 +1,11 @@
 //! The `skinrig` command line: arguments, wiring of the crates, terminal output, exit codes.
 //!
 //! The binary is a thin shell over [`main_with`]; whole-system tests use the same modules.
-#![expect(clippy::print_stdout, clippy::print_stderr, reason = "this crate owns the terminal")]
+#![expect(
+    clippy::print_stdout,
+    clippy::print_stderr,
+    reason = "this crate owns the terminal"
+)]
 
 pub mod args;
 pub mod check;
@@ -38,7 +42,11 @@ pub fn main_with(arguments: impl IntoIterator<Item = OsString>) -> Exit {
         Ok(cli) => cli,
         Err(error) => {
             // Help and version are not errors; clap prints them to standard output.
-            let exit = if error.use_stderr() { Exit::Input } else { Exit::Ok };
+            let exit = if error.use_stderr() {
+                Exit::Input
+            } else {
+                Exit::Ok
+            };
             let _ = error.print();
             return exit;
         }
@@ -72,12 +80,19 @@ fn dispatch(cli: &Cli, arguments: &[OsString]) -> Outcome {
 
 /// The arguments as one line, for the session's header.
 fn command_line(arguments: &[OsString]) -> String {
-    let words: Vec<_> = arguments.iter().skip(1).map(|a| a.to_string_lossy()).collect();
+    let words: Vec<_> = arguments
+        .iter()
+        .skip(1)
+        .map(|a| a.to_string_lossy())
+        .collect();
     format!("skinrig {}", words.join(" "))
 }
 
 /// Prints a JSON value for programs, and its end of line.
 pub(crate) fn print_json(value: &serde_json::Value) {
     // Pretty printing of a `Value` cannot fail.
-    println!("{}", serde_json::to_string_pretty(value).unwrap_or_default());
+    println!(
+        "{}",
+        serde_json::to_string_pretty(value).unwrap_or_default()
+    );
 }

@@ -26,8 +26,12 @@ pub fn new_session(
             folder.display()
         ))
     })?;
-    let stem =
-        format!("{}-{}-{}", started.format("%Y%m%dT%H%M%SZ"), slug(protocol), slug(prototype));
+    let stem = format!(
+        "{}-{}-{}",
+        started.format("%Y%m%dT%H%M%SZ"),
+        slug(protocol),
+        slug(prototype)
+    );
     let mut path = folder.join(format!("{stem}{SESSION_SUFFIX}"));
     let mut n = 2;
     while path.exists() {
@@ -40,7 +44,10 @@ pub fn new_session(
 /// The file beside `session` with another ending, for example `.report.html`.
 #[must_use]
 pub fn beside(session: &Path, suffix: &str) -> PathBuf {
-    let name = session.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    let name = session
+        .file_name()
+        .map(|n| n.to_string_lossy().into_owned())
+        .unwrap_or_default();
     let stem = name.strip_suffix(SESSION_SUFFIX).unwrap_or(&name);
     session.with_file_name(format!("{stem}{suffix}"))
 }
@@ -56,7 +63,11 @@ fn slug(text: &str) -> String {
         }
     }
     let out = out.trim_end_matches('-');
-    if out.is_empty() { "unnamed".into() } else { out.chars().take(40).collect() }
+    if out.is_empty() {
+        "unnamed".into()
+    } else {
+        out.chars().take(40).collect()
+    }
 }
 
 #[cfg(test)]
@@ -73,8 +84,14 @@ mod tests {
     #[test]
     fn results_lie_beside_the_session() {
         let session = Path::new("s/x.session.sqlite");
-        assert_eq!(beside(session, ".report.html"), Path::new("s/x.report.html"));
-        assert_eq!(beside(Path::new("y.db"), ".report.html"), Path::new("y.db.report.html"));
+        assert_eq!(
+            beside(session, ".report.html"),
+            Path::new("s/x.report.html")
+        );
+        assert_eq!(
+            beside(Path::new("y.db"), ".report.html"),
+            Path::new("y.db.report.html")
+        );
     }
 
     #[test]
@@ -84,6 +101,10 @@ mod tests {
         let first = new_session(dir.path(), t, "demo", "A").unwrap();
         std::fs::write(&first, b"").unwrap();
         let second = new_session(dir.path(), t, "demo", "A").unwrap();
-        assert!(second.to_string_lossy().ends_with("demo-a-2.session.sqlite"));
+        assert!(
+            second
+                .to_string_lossy()
+                .ends_with("demo-a-2.session.sqlite")
+        );
     }
 }

@@ -41,7 +41,11 @@ impl ProgressView {
         } else {
             Display::Lines { tenths: 0 }
         };
-        Self { tracker: ProgressTracker::new(Some(expected)), display, drawn: None }
+        Self {
+            tracker: ProgressTracker::new(Some(expected)),
+            display,
+            drawn: None,
+        }
     }
 
     /// The run as of the last record.
@@ -93,12 +97,22 @@ fn line(tracker: &ProgressTracker) -> String {
         format!("  {block}  ({:.1}, {:.1}) mm", press.at.x_mm, press.at.y_mm)
     });
     let rate = |camera| {
-        tracker.events_per_s(camera).map_or_else(|| "-".into(), |r| format!("{:.1}", r / 1e3))
+        tracker
+            .events_per_s(camera)
+            .map_or_else(|| "-".into(), |r| format!("{:.1}", r / 1e3))
     };
     let lost: u64 = p.cameras.iter().map(|c| c.lost_bytes).sum();
-    let lost = if lost > 0 { format!("  LOST {lost} bytes") } else { String::new() };
+    let lost = if lost > 0 {
+        format!("  LOST {lost} bytes")
+    } else {
+        String::new()
+    };
     let paused = if p.paused { "  PAUSED" } else { "" };
-    let invalid = if p.invalid > 0 { format!("  {} invalid", p.invalid) } else { String::new() };
+    let invalid = if p.invalid > 0 {
+        format!("  {} invalid", p.invalid)
+    } else {
+        String::new()
+    };
     format!(
         "press {}{press}  cam1 {} cam2 {} kev/s  trigger {} sent, {}+{} seen{invalid}{lost}{paused}  eta {}",
         tracker.press_label(),

@@ -25,7 +25,10 @@ pub fn provenance(
         })
         .collect();
     let (run_end, run_end_reason) = match reader.end()? {
-        None => ("not ended".to_owned(), Some("the recording was cut off".to_owned())),
+        None => (
+            "not ended".to_owned(),
+            Some("the recording was cut off".to_owned()),
+        ),
         Some((_, end)) => {
             let reason = match &end {
                 RunEnd::Completed => None,
@@ -46,12 +49,18 @@ pub fn provenance(
     let notes = reader
         .notes()?
         .into_iter()
-        .map(|n| NoteRow { t_s: n.t.as_secs_f64(), text: n.text })
+        .map(|n| NoteRow {
+            t_s: n.t.as_secs_f64(),
+            text: n.text,
+        })
         .collect();
     let mut lost_bytes = [0; 2];
     for camera in skinrig_model::CameraId::ALL {
-        lost_bytes[camera.index()] =
-            reader.chunk_index(camera)?.iter().map(|c| c.lost_before).sum();
+        lost_bytes[camera.index()] = reader
+            .chunk_index(camera)?
+            .iter()
+            .map(|c| c.lost_before)
+            .sum();
     }
     Ok(Provenance {
         session_id: reader.session_id()?,

@@ -43,9 +43,16 @@ impl SessionRecording {
         };
         Ok(Self {
             devices: reader.devices()?,
-            commands: reader.commands()?.into_iter().map(|c| (c.t, c.command)).collect(),
+            commands: reader
+                .commands()?
+                .into_iter()
+                .map(|c| (c.t, c.command))
+                .collect(),
             marks: reader.marks_sent()?.into(),
-            chunks: [reader.chunk_index(one)?.into(), reader.chunk_index(two)?.into()],
+            chunks: [
+                reader.chunk_index(one)?.into(),
+                reader.chunk_index(two)?.into(),
+            ],
             scanners: header.stream_formats.map(Scanner::new),
             poses_from: HostTime::ZERO,
             poses_end,
@@ -68,7 +75,9 @@ impl Recording for SessionRecording {
     }
 
     fn settings(&self, role: DeviceRole) -> Vec<Setting> {
-        self.device(role).map(|d| d.settings.clone()).unwrap_or_default()
+        self.device(role)
+            .map(|d| d.settings.clone())
+            .unwrap_or_default()
     }
 
     fn next_command(&mut self) -> Result<Option<(HostTime, MotionCommand)>, RecordingError> {
@@ -79,7 +88,8 @@ impl Recording for SessionRecording {
         while self.poses_from <= self.poses_end {
             let to = self.poses_from + POSE_WINDOW;
             let poses = self.reader.poses(self.poses_from, to).map_err(unreadable)?;
-            self.poses_from = to;
+            // Both ends belong to a piece.
+            self.poses_from = to + HostDuration(1);
             if !poses.is_empty() {
                 return Ok(Some(poses));
             }
@@ -92,8 +102,13 @@ impl Recording for SessionRecording {
     }
 
     fn next_chunk(&mut self, camera: CameraId) -> Result<Option<RawChunk>, RecordingError> {
-        let Some(meta) = self.chunks[camera.index()].pop_front() else { return Ok(None) };
-        let bytes = self.reader.chunk_bytes(camera, meta.seq).map_err(unreadable)?;
+        let Some(meta) = self.chunks[camera.index()].pop_front() else {
+            return Ok(None);
+        };
+        let bytes = self
+            .reader
+            .chunk_bytes(camera, meta.seq)
+            .map_err(unreadable)?;
         // The stored facts are those of the first decoding; the edges come from decoding again.
         let (_, triggers) = self.scanners[camera.index()].push(&bytes);
         Ok(Some(RawChunk {

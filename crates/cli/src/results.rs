@@ -39,7 +39,10 @@ impl Results {
     /// As the report crate takes it.
     #[must_use]
     pub fn report_input(&self) -> ReportInput<'_> {
-        ReportInput { analysis: &self.analysis, provenance: self.provenance.clone() }
+        ReportInput {
+            analysis: &self.analysis,
+            provenance: self.provenance.clone(),
+        }
     }
 }
 
@@ -68,7 +71,11 @@ pub fn analyze_session(path: &Path, overrides: &[String]) -> Result<Results, Fai
     let analysis = skinrig_analysis::analyze(&input, &events).map_err(Failure::input)?;
     let provenance =
         crate::provenance::provenance(&reader, &header, &analysis).map_err(unreadable)?;
-    Ok(Results { session: path.to_owned(), analysis, provenance })
+    Ok(Results {
+        session: path.to_owned(),
+        analysis,
+        provenance,
+    })
 }
 
 /// The analysis settings of the session's own protocol or schedule with more overrides.
@@ -76,7 +83,10 @@ fn overridden_settings(
     header: &RunHeader,
     overrides: &[String],
 ) -> Result<AnalysisSettings, Failure> {
-    if let Some(other) = overrides.iter().find(|o| !o.trim_start().starts_with("analysis.")) {
+    if let Some(other) = overrides
+        .iter()
+        .find(|o| !o.trim_start().starts_with("analysis."))
+    {
         return Err(Failure::input(format!(
             "--set {other}: expected a key below `analysis.`; a recorded session's other values cannot change"
         )));
@@ -100,7 +110,11 @@ fn session_input(
     settings: AnalysisSettings,
     rig: RigGeometry,
 ) -> Result<SessionInput, RecorderError> {
-    let planned = reader.presses()?.into_iter().map(|(planned, _)| planned).collect();
+    let planned = reader
+        .presses()?
+        .into_iter()
+        .map(|(planned, _)| planned)
+        .collect();
     let outcomes = reader.last_outcomes()?;
     let [one, two] = CameraId::ALL;
     Ok(SessionInput {
@@ -128,8 +142,8 @@ pub fn write_results(
         json_path.map_or_else(|| beside(&results.session, ".results.json"), Path::to_owned);
     let html_path =
         html_path.map_or_else(|| beside(&results.session, ".report.html"), Path::to_owned);
-    let json = serde_json::to_string_pretty(&skinrig_report::json(&input))
-        .map_err(Failure::internal)?;
+    let json =
+        serde_json::to_string_pretty(&skinrig_report::json(&input)).map_err(Failure::internal)?;
     let html = skinrig_report::html(&input).map_err(Failure::internal)?;
     write(&json_path, json.as_bytes())?;
     write(&html_path, html.as_bytes())?;
@@ -150,14 +164,20 @@ pub fn print_results(results: &Results, json: bool, paths: &(PathBuf, PathBuf)) 
     if json {
         let mut document = skinrig_report::json(&results.report_input());
         if let Some(object) = document.as_object_mut() {
-            object.insert("files".into(), serde_json::json!({
-                "session": results.session, "results": paths.0, "report": paths.1,
-            }));
+            object.insert(
+                "files".into(),
+                serde_json::json!({
+                    "session": results.session, "results": paths.0, "report": paths.1,
+                }),
+            );
         }
         crate::print_json(&document);
     } else {
         let color = std::io::stdout().is_terminal();
-        print!("{}", skinrig_report::terminal_table(&results.report_input(), color));
+        print!(
+            "{}",
+            skinrig_report::terminal_table(&results.report_input(), color)
+        );
         println!("\nsession  {}", results.session.display());
         println!("results  {}", paths.0.display());
         println!("report   {}", paths.1.display());
@@ -169,7 +189,9 @@ pub fn print_results(results: &Results, json: bool, paths: &(PathBuf, PathBuf)) 
 /// # Errors
 /// [`Failure::limit`].
 pub fn check_limit(results: &Results, max_rmse_mm: Option<f64>) -> Outcome {
-    let Some(limit) = max_rmse_mm else { return Ok(Exit::Ok) };
+    let Some(limit) = max_rmse_mm else {
+        return Ok(Exit::Ok);
+    };
     match results.analysis.scored.rmse_mm.value {
         Some(rmse) if rmse <= limit => Ok(Exit::Ok),
         Some(rmse) => Err(Failure::limit(format!(

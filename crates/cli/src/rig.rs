@@ -26,7 +26,12 @@ pub fn simulated(protocol: &Protocol, level: SimLevel, seed: u64, real_time: boo
 
 fn apply(settings: &mut CameraSettings, request: &CameraRequest) {
     settings.biases.extend(request.biases.clone());
-    settings.roi = request.roi.map(|[x, y, width, height]| Roi { x, y, width, height });
+    settings.roi = request.roi.map(|[x, y, width, height]| Roi {
+        x,
+        y,
+        width,
+        height,
+    });
 }
 
 /// A recorded session as a rig.

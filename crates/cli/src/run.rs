@@ -141,7 +141,11 @@ pub fn run(args: &RunArgs, command_line: &str, json: bool) -> Outcome {
     let (session, report) = match (&args.replay, &args.protocol) {
         (Some(recording), _) => replay(recording, &args.sessions, command_line)?,
         (None, Some(protocol)) => fresh(args, protocol, command_line, json)?,
-        (None, None) => return Err(Failure::input("expected a protocol file or --replay SESSION")),
+        (None, None) => {
+            return Err(Failure::input(
+                "expected a protocol file or --replay SESSION",
+            ));
+        }
     };
     conclude(&session, &report, args.no_analysis, args.max_rmse, json)
 }
@@ -186,9 +190,9 @@ fn fresh(
     let checked = check::load(protocol, &args.overrides)?;
     let (protocol, mut plan) = (checked.protocol, checked.plan);
     let level = match &args.level {
-        Some(name) => {
-            name.parse::<SimLevel>().map_err(|e| Failure::input(format!("--level: {e}")))?
-        }
+        Some(name) => name
+            .parse::<SimLevel>()
+            .map_err(|e| Failure::input(format!("--level: {e}")))?,
         None => protocol.scene.level,
     };
     let seed = args.seed.unwrap_or(protocol.seed);
@@ -223,7 +227,10 @@ fn replay(
     let reader = SessionReader::open(recording).map_err(Failure::input)?;
     let header = reader.header().map_err(Failure::input)?;
     let plan: Plan = serde_json::from_str(&header.plan_json).map_err(|e| {
-        Failure::input(format!("{}: expected a plan in the session, found: {e}", recording.display()))
+        Failure::input(format!(
+            "{}: expected a plan in the session, found: {e}",
+            recording.display()
+        ))
     })?;
     let document: RigDocument = serde_json::from_str(&header.rig_json).map_err(|e| {
         Failure::input(format!(
@@ -233,9 +240,10 @@ fn replay(
     })?;
     let name = header.protocol_name.rsplit('/').next().unwrap_or("replay");
     let name = format!("replay-{}", name.trim_end_matches(".yaml"));
-    let expected = reader.end().map_err(Failure::input)?.map_or(HostDuration::ZERO, |(t, _)| {
-        HostDuration(t.0)
-    });
+    let expected = reader
+        .end()
+        .map_err(Failure::input)?
+        .map_or(HostDuration::ZERO, |(t, _)| HostDuration(t.0));
     let intent = Intent {
         text: &header.protocol_text,
         file_name: &header.protocol_name,

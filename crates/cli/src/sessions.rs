@@ -12,9 +12,9 @@ use crate::exit::{Exit, Failure, Outcome};
 pub fn sessions(args: &SessionsArgs, json: bool) -> Outcome {
     let mut found = list(&args.folder).map_err(Failure::input)?;
     if let Some(wanted) = &args.prototype {
-        found.retain(|s| {
-            matches!(&s.state, SessionState::Readable { prototype, .. } if prototype == wanted)
-        });
+        found.retain(
+            |s| matches!(&s.state, SessionState::Readable { prototype, .. } if prototype == wanted),
+        );
     }
     if json {
         crate::print_json(&serde_json::to_value(&found).map_err(Failure::internal)?);
@@ -36,11 +36,20 @@ pub fn sessions(args: &SessionsArgs, json: bool) -> Outcome {
 
 fn line(session: &SessionSummary) -> String {
     let name = session.path.file_name();
-    let file = name.map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    let file = name
+        .map(|n| n.to_string_lossy().into_owned())
+        .unwrap_or_default();
     match &session.state {
         SessionState::Broken { reason } => format!("broken: {file}: {reason}"),
         SessionState::Readable {
-            started_at, prototype, protocol_name, rig_name, end, sealed, totals, ..
+            started_at,
+            prototype,
+            protocol_name,
+            rig_name,
+            end,
+            sealed,
+            totals,
+            ..
         } => {
             let protocol = protocol_name.rsplit('/').next().unwrap_or_default();
             let state = match (end.as_deref(), sealed) {

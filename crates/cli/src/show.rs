@@ -109,10 +109,22 @@ fn press_rows(reader: &SessionReader) -> Result<Vec<serde_json::Value>, Recorder
 fn print(d: &serde_json::Value) {
     let text = |key: &str| d[key].as_str().unwrap_or("-").to_owned();
     let count = |v: &serde_json::Value| v.as_u64().unwrap_or(0);
-    println!("session    {}{}", text("id"), if d["sealed"] == true { "" } else { "  NOT SEALED" });
+    println!(
+        "session    {}{}",
+        text("id"),
+        if d["sealed"] == true {
+            ""
+        } else {
+            "  NOT SEALED"
+        }
+    );
     println!("started    {}  by {}", text("started_at"), text("operator"));
     println!("prototype  {}", text("prototype"));
-    println!("protocol   {}  sha256 {}", text("protocol"), text("protocol_sha256"));
+    println!(
+        "protocol   {}  sha256 {}",
+        text("protocol"),
+        text("protocol_sha256")
+    );
     for o in d["overrides"].as_array().into_iter().flatten() {
         println!("           --set {}", o.as_str().unwrap_or_default());
     }
@@ -122,49 +134,89 @@ fn print(d: &serde_json::Value) {
         || "-".into(),
         |s| clock_text(skinrig_model::HostDuration::from_secs_f64(s)),
     );
-    println!("end        {}  after {duration}", d["end"].as_str().unwrap_or("not ended"));
+    println!(
+        "end        {}  after {duration}",
+        d["end"].as_str().unwrap_or("not ended")
+    );
     if let Some(reason) = d["end_reason"].as_str() {
         println!("           {reason}");
     }
     let p = &d["totals"]["presses"];
     println!(
         "presses    {} planned = {} valid + {} missed + {} invalid + {} excluded; {} sync",
-        p["planned"], p["valid"], p["missed"], p["invalid"], p["excluded"],
+        p["planned"],
+        p["valid"],
+        p["missed"],
+        p["invalid"],
+        p["excluded"],
         d["totals"]["sync"]["planned"]
     );
     println!("devices");
     for device in d["devices"].as_array().into_iter().flatten() {
         let s = |k: &str| device[k].as_str().unwrap_or("-").to_owned();
-        println!("  {:<12} {}  serial {}  firmware {}", s("role"), s("model"), s("serial"), s("firmware"));
+        println!(
+            "  {:<12} {}  serial {}  firmware {}",
+            s("role"),
+            s("model"),
+            s("serial"),
+            s("firmware")
+        );
         for row in device["settings"].as_array().into_iter().flatten() {
             let cell = |i: usize| row[i].as_str().unwrap_or("-").to_owned();
-            println!("    {:<24} asked {}  read back {}", cell(0), cell(1), cell(2));
+            println!(
+                "    {:<24} asked {}  read back {}",
+                cell(0),
+                cell(1),
+                cell(2)
+            );
         }
     }
     println!("streams");
     for c in d["cameras"].as_array().into_iter().flatten() {
         println!(
             "  camera {}  {}  {} events, {} trigger edges, {:.1} MB in {} chunks ({:.1} MB stored), {} bytes lost",
-            c["camera"], c["format"].as_str().unwrap_or("-"), c["events"], c["trigger_edges"],
-            count(&c["bytes"]) as f64 / 1e6, c["chunks"], count(&c["stored_bytes"]) as f64 / 1e6,
+            c["camera"],
+            c["format"].as_str().unwrap_or("-"),
+            c["events"],
+            c["trigger_edges"],
+            count(&c["bytes"]) as f64 / 1e6,
+            c["chunks"],
+            count(&c["stored_bytes"]) as f64 / 1e6,
             c["lost_bytes"],
         );
     }
     for row in d["interruptions"].as_array().into_iter().flatten() {
-        println!("{:>9.3} s  {}: {}", row[0].as_f64().unwrap_or(0.0), row[1].as_str().unwrap_or(""), row[2].as_str().unwrap_or(""));
+        println!(
+            "{:>9.3} s  {}: {}",
+            row[0].as_f64().unwrap_or(0.0),
+            row[1].as_str().unwrap_or(""),
+            row[2].as_str().unwrap_or("")
+        );
     }
     for row in d["notes"].as_array().into_iter().flatten() {
-        println!("{:>9.3} s  note: {}", row[0].as_f64().unwrap_or(0.0), row[1].as_str().unwrap_or(""));
+        println!(
+            "{:>9.3} s  note: {}",
+            row[0].as_f64().unwrap_or(0.0),
+            row[1].as_str().unwrap_or("")
+        );
     }
     if let Some(rows) = d["presses"].as_array() {
         println!("\n press  role       rep  loc      x      y  depth  verdict");
         for r in rows {
             println!(
                 "{:>6}  {:<9} {:>4} {:>4} {:>6.1} {:>6.1} {:>6.2}  {}{}",
-                r["press"], r["role"].as_str().unwrap_or("-"), r["repetition"], r["location"],
-                r["x_mm"].as_f64().unwrap_or(f64::NAN), r["y_mm"].as_f64().unwrap_or(f64::NAN),
-                r["depth_mm"].as_f64().unwrap_or(f64::NAN), r["verdict"].as_str().unwrap_or("-"),
-                r["reason"].as_str().map(|t| format!(": {t}")).unwrap_or_default(),
+                r["press"],
+                r["role"].as_str().unwrap_or("-"),
+                r["repetition"],
+                r["location"],
+                r["x_mm"].as_f64().unwrap_or(f64::NAN),
+                r["y_mm"].as_f64().unwrap_or(f64::NAN),
+                r["depth_mm"].as_f64().unwrap_or(f64::NAN),
+                r["verdict"].as_str().unwrap_or("-"),
+                r["reason"]
+                    .as_str()
+                    .map(|t| format!(": {t}"))
+                    .unwrap_or_default(),
             );
         }
     }

@@ -17,7 +17,11 @@ impl SessionSink {
     /// A sink over a new session. `scheduled` marks every outcome as taken from a schedule, not measured.
     #[must_use]
     pub const fn new(writer: SessionWriter, view: ProgressView, scheduled: bool) -> Self {
-        Self { writer, view, scheduled }
+        Self {
+            writer,
+            view,
+            scheduled,
+        }
     }
 
     /// Seals the session.
@@ -36,6 +40,8 @@ impl RecordSink for SessionSink {
             outcome.scheduled = true;
         }
         self.view.update(&record);
-        self.writer.accept(record).map_err(|e| SinkFault(e.to_string()))
+        self.writer
+            .accept(record)
+            .map_err(|e| SinkFault(e.to_string()))
     }
 }

@@ -18,7 +18,10 @@ impl SessionEvents {
     /// The events of `path`, whose cameras send `formats`.
     #[must_use]
     pub fn new(path: &Path, formats: [StreamFormat; 2]) -> Self {
-        Self { path: path.to_owned(), formats }
+        Self {
+            path: path.to_owned(),
+            formats,
+        }
     }
 }
 
@@ -31,7 +34,9 @@ impl EventSource for SessionEvents {
         let reader = SessionReader::open(&self.path).map_err(|e| e.to_string())?;
         let mut decoder = Decoder::new(self.formats[camera.index()]);
         reader
-            .for_each_chunk(camera, 0, |_, bytes| decoder.for_each_slice(bytes, &mut *each))
+            .for_each_chunk(camera, 0, |_, bytes| {
+                decoder.for_each_slice(bytes, &mut *each)
+            })
             .map_err(|e| e.to_string())
     }
 }
@@ -49,6 +54,8 @@ impl ChunkScanner for Rescan {
         format: StreamFormat,
         bytes: &[u8],
     ) -> (ChunkFacts, Vec<TriggerEdge>) {
-        self.scanners[camera.index()].get_or_insert_with(|| Scanner::new(format)).push(bytes)
+        self.scanners[camera.index()]
+            .get_or_insert_with(|| Scanner::new(format))
+            .push(bytes)
     }
 }

@@ -29,7 +29,11 @@ pub fn verify(args: &SessionArg, json: bool) -> Outcome {
         if let (true, Some(t)) = (report.is_sound(), report.totals) {
             println!(
                 "{name}: sound{}; {} presses, {} events, {} chunks, {:.1} MB of camera bytes, {} pose samples",
-                if report.sealed { ", sealed" } else { ", not sealed: hashes over the whole were not checked" },
+                if report.sealed {
+                    ", sealed"
+                } else {
+                    ", not sealed: hashes over the whole were not checked"
+                },
                 t.presses.planned + t.sync.planned,
                 t.cd_events,
                 t.chunks,

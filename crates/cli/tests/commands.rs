@@ -1,5 +1,8 @@
 //! The command line as a new user meets it.
-#![expect(clippy::unwrap_used, reason = "a test that cannot start the program must fail")]
+#![expect(
+    clippy::unwrap_used,
+    reason = "a test that cannot start the program must fail"
+)]
 
 use assert_cmd::Command;
 use predicates::prelude::*;
@@ -17,13 +20,28 @@ fn skinrig() -> Command {
 
 #[test]
 fn every_command_has_help_with_an_example() {
-    let all = skinrig().arg("--help").assert().success().get_output().stdout.clone();
+    let all = skinrig()
+        .arg("--help")
+        .assert()
+        .success()
+        .get_output()
+        .stdout
+        .clone();
     let all = String::from_utf8(all).unwrap();
     for name in COMMANDS {
         assert!(all.contains(name), "{name} is missing from --help");
-        let help = skinrig().args([name, "--help"]).assert().success().get_output().stdout.clone();
+        let help = skinrig()
+            .args([name, "--help"])
+            .assert()
+            .success()
+            .get_output()
+            .stdout
+            .clone();
         let help = String::from_utf8(help).unwrap();
-        assert!(help.contains("Example") && help.contains(&format!("skinrig {name}")), "{help}");
+        assert!(
+            help.contains("Example") && help.contains(&format!("skinrig {name}")),
+            "{help}"
+        );
     }
     assert!(all.contains("Exit codes"), "{all}");
 }
@@ -36,7 +54,12 @@ fn bad_input_ends_with_code_2_and_says_what_to_do() {
         vec!["show", "no/such.session.sqlite"],
         vec!["verify", "Cargo.toml"],
         vec!["inspect", "no/such.raw"],
-        vec!["run", "protocols/demo.yaml", "--set", "path.meander.pich=6mm"],
+        vec![
+            "run",
+            "protocols/demo.yaml",
+            "--set",
+            "path.meander.pich=6mm",
+        ],
         vec!["run", "protocols/demo.yaml", "--level", "perfect"],
     ] {
         skinrig()
@@ -50,7 +73,8 @@ fn bad_input_ends_with_code_2_and_says_what_to_do() {
 
 #[test]
 fn shipped_protocols_pass_their_own_check() {
-    for entry in std::fs::read_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/../../protocols")).unwrap() {
+    for entry in std::fs::read_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/../../protocols")).unwrap()
+    {
         let path = entry.unwrap().path();
         let name = path.file_name().unwrap().to_string_lossy().into_owned();
         if name.ends_with(".yaml") && !name.ends_with(".schedule.yaml") {

@@ -58,8 +58,10 @@ impl ChunkFeed {
             // Idle stretches are closed second by second, so that no chunk spans hours.
             while event.t_us - self.chunk_from_us >= CHUNK_SPAN_US {
                 let end = self.chunk_from_us + CHUNK_SPAN_US;
-                if let Some(Err(e)) =
-                    self.encoder.as_mut().map(|x| x.advance_to(end, &mut self.bytes))
+                if let Some(Err(e)) = self
+                    .encoder
+                    .as_mut()
+                    .map(|x| x.advance_to(end, &mut self.bytes))
                 {
                     return self.fail(e.to_string());
                 }
@@ -83,7 +85,11 @@ impl ChunkFeed {
     /// [`RunEnded`].
     pub fn raw(&mut self, bytes: &[u8]) -> Result<(), RunEnded> {
         self.bytes.extend_from_slice(bytes);
-        if self.bytes.len() >= CHUNK_BYTES { self.send() } else { Ok(()) }
+        if self.bytes.len() >= CHUNK_BYTES {
+            self.send()
+        } else {
+            Ok(())
+        }
     }
 
     /// Ends the stream with an error for the user.
@@ -101,7 +107,9 @@ impl ChunkFeed {
         }
         let bytes = std::mem::take(&mut self.bytes);
         let (facts, triggers) = self.scanner.push(&bytes);
-        self.queue.send(Ok((bytes, facts, triggers))).map_err(|_| RunEnded)
+        self.queue
+            .send(Ok((bytes, facts, triggers)))
+            .map_err(|_| RunEnded)
     }
 }
 
@@ -148,7 +156,17 @@ impl FileCamera {
                 };
             })
             .map_err(|e| format!("cannot start a reading thread: {e}"))?;
-        Ok(Self { camera, file, format, clock, queue, waiting: None, base_us: None, seq: 0, streaming: false })
+        Ok(Self {
+            camera,
+            file,
+            format,
+            clock,
+            queue,
+            waiting: None,
+            base_us: None,
+            seq: 0,
+            streaming: false,
+        })
     }
 
     /// Hands over chunks that end within `until_us` after the file's first word; all with `None`.

@@ -4,7 +4,9 @@
 //! controller, so that an imported session has the same shape as any other; its outcomes are marked as
 //! scheduled, because nothing was measured.
 
-use skinrig_device::{Clock, DeviceError, Indenter, IndenterCapabilities, MotionLimits, RobotSample};
+use skinrig_device::{
+    Clock, DeviceError, Indenter, IndenterCapabilities, MotionLimits, RobotSample,
+};
 use skinrig_model::{DeviceIdentity, DeviceRole, HostDuration, HostTime, Point3, Robot, Setting};
 use skinrig_sim::SimClock;
 
@@ -48,7 +50,11 @@ impl ScheduledIndenter {
         let share = (travelled / length).max(0.0);
         let [a, b, c] = self.from.to_array();
         let [x, y, z] = self.to.to_array();
-        Point3::new(a + share * (x - a), b + share * (y - b), c + share * (z - c))
+        Point3::new(
+            a + share * (x - a),
+            b + share * (y - b),
+            c + share * (z - c),
+        )
     }
 
     fn state_error(&self, expected: &str, found: &str) -> DeviceError {
@@ -119,7 +125,12 @@ impl Indenter for ScheduledIndenter {
         while self.next_sample <= now {
             let t = self.next_sample;
             let measured = self.position_at(t);
-            samples.push(RobotSample { t, commanded: self.to, measured, force_n: f64::NAN });
+            samples.push(RobotSample {
+                t,
+                commanded: self.to,
+                measured,
+                force_n: f64::NAN,
+            });
             self.next_sample += POSE_PERIOD;
         }
         Ok(())

@@ -10,10 +10,10 @@ mod plan;
 use std::path::Path;
 
 use skinrig_device::{CameraSettings, Rig};
+use skinrig_formats::Geometry;
 use skinrig_formats::hdf5::Container;
 use skinrig_formats::positions::{LengthUnit, PositionTable};
 use skinrig_formats::raw::RawReader;
-use skinrig_formats::Geometry;
 use skinrig_model::{CameraId, HostDuration, Point2, RigidTransform, StreamFormat};
 use skinrig_protocol::Schedule;
 use skinrig_sim::SimClock;
@@ -98,14 +98,34 @@ fn read_positions(path: &Path, schedule: &Schedule) -> Result<Vec<Point2>, Failu
                 table.blank_lines
             )));
         }
-        eprintln!("note: {}: blank line(s) {:?} are no presses", path.display(), table.blank_lines);
+        eprintln!(
+            "note: {}: blank line(s) {:?} are no presses",
+            path.display(),
+            table.blank_lines
+        );
     }
-    Ok(table.presses.iter().map(|p| Point2::new(p.x_mm * scale, p.y_mm * scale)).collect())
+    Ok(table
+        .presses
+        .iter()
+        .map(|p| Point2::new(p.x_mm * scale, p.y_mm * scale))
+        .collect())
 }
 
 #[derive(Debug)]
-enum FileKind { Hdf5, Raw }
-impl FileKind { fn of(p:&Path)->std::io::Result<Self>{ let b=std::fs::read(p)?; Ok(if b.starts_with(b"\x89HDF"){Self::Hdf5}else{Self::Raw}) } }
+enum FileKind {
+    Hdf5,
+    Raw,
+}
+impl FileKind {
+    fn of(p: &Path) -> std::io::Result<Self> {
+        let b = std::fs::read(p)?;
+        Ok(if b.starts_with(b"\x89HDF") {
+            Self::Hdf5
+        } else {
+            Self::Raw
+        })
+    }
+}
 /// Opens one camera's file and starts reading it.
 fn open(
     camera: CameraId,
@@ -120,14 +140,25 @@ fn open(
         FileKind::Hdf5 => {
             // Opened here once, so that a wrong file is refused before a session is made.
             let container = Container::open(&path).map_err(Failure::input)?;
-            container.choose(stream.as_deref()).map_err(Failure::input)?;
-            FileCamera::new(camera, file, StreamFormat::Evt2, clock.clone(), move |feed| {
-                read_hdf5(&path, stream.as_deref(), feed)
-            })
+            container
+                .choose(stream.as_deref())
+                .map_err(Failure::input)?;
+            FileCamera::new(
+                camera,
+                file,
+                StreamFormat::Evt2,
+                clock.clone(),
+                move |feed| read_hdf5(&path, stream.as_deref(), feed),
+            )
         }
         FileKind::Raw => {
-            let format = RawReader::open(&path).map_err(Failure::input)?.header().format;
-            FileCamera::new(camera, file, format, clock.clone(), move |feed| read_raw(&path, feed))
+            let format = RawReader::open(&path)
+                .map_err(Failure::input)?
+                .header()
+                .format;
+            FileCamera::new(camera, file, format, clock.clone(), move |feed| {
+                read_raw(&path, feed)
+            })
         }
     };
     opened.map_err(Failure::internal)
@@ -135,7 +166,9 @@ fn open(
 
 fn read_hdf5(path: &Path, stream: Option<&str>, feed: &mut ChunkFeed) -> Result<(), String> {
     let container = Container::open(path).map_err(|e| e.to_string())?;
-    let mut events = container.events(stream, Geometry::EVK1).map_err(|e| e.to_string())?;
+    let mut events = container
+        .events(stream, Geometry::EVK1)
+        .map_err(|e| e.to_string())?;
     loop {
         let batch = events.next_batch().map_err(|e| e.to_string())?;
         if batch.is_empty() || feed.events(batch).is_err() {
