@@ -37,9 +37,17 @@ macro_rules! buffers {
                     $(Self::$variant(values) => {
                         values.resize(out.len(), 0);
                         dataset.read_slice_into(values, &[start], &[out.len()])?;
-                        for (out, value) in out.iter_mut().zip(values) {
-                            let low = *value as u16;
-                            *out = if low as $int == *value { low } else { u16::MAX };
+                        let mut beyond = 0;
+                        for (out, value) in out.iter_mut().zip(&*values) {
+                            *out = *value as u16;
+                            beyond |= *value ^ *out as $int;
+                        }
+                        if beyond != 0 {
+                            for (out, value) in out.iter_mut().zip(&*values) {
+                                if *out as $int != *value {
+                                    *out = u16::MAX;
+                                }
+                            }
                         }
                     })*
                 }

@@ -21,5 +21,5 @@ pub use read::EventReader;
 pub use tree::{Container, DvsEntry};
 pub use write::EventWriter;
 
-/// Rows that are read at once: the columns of one batch stay in the second-level cache.
-const BATCH_ROWS: usize = 8192;
+/// Rows that are read at once: a batch stays in the second-level cache, and is one chunk of a file written here.
+const BATCH_ROWS: usize = 16_384;

@@ -12,7 +12,7 @@ use crate::error::FormatsError;
 /// The hickle version whose layout is written.
 const HICKLE_VERSION: &str = "5.0.3";
 /// Rows per chunk of a column.
-const CHUNK_ROWS: usize = 16_384;
+const CHUNK_ROWS: usize = BATCH_ROWS;
 const TYPES: &str = "hickle_types_table";
 
 /// Writes the events of one sensor as a flat dvs dictionary: `ts` (f64 seconds), `x` and `y` (u16), `pol`
