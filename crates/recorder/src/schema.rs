@@ -20,8 +20,8 @@ pub const APPLICATION_ID: u32 = u32::from_be_bytes(*b"skrg");
 
 static MIGRATOR: Migrator = sqlx::migrate!("../../migrations");
 
-/// Bytes of a page. Of 4, 16 and 64 KiB the middle one: large blobs are written nearly as fast as with
-/// 64 KiB, and a commit of one small row writes a quarter of that.
+/// Bytes of a page. 64 KiB wrote large chunks no faster beyond the noise of `benches/ingest.rs`, and a commit of
+/// one small row would write four times as much.
 const PAGE_BYTES: u32 = 16384;
 
 /// How long to wait for another program's lock.
