@@ -239,7 +239,10 @@ fn shipped_files_fit_their_schemas() {
     ] {
         let schema: Value = serde_json::from_str(&schema).unwrap();
         for file in files {
-            let mut value: Value = serde_yaml::from_str(&shipped(&file)).unwrap();
+            let mut value: Value = {
+                let options = serde_yaml::options! { strict_booleans: true };
+                serde_yaml::from_str_with_options(&shipped(&file), options).unwrap()
+            };
             validate(&schema, &value, &schema, &file).unwrap();
             value["prototype"]["colour"] = "grey".into();
             let error = validate(&schema, &value, &schema, &file).unwrap_err();
