@@ -265,7 +265,7 @@ impl Journal {
              VALUES (?, ?, ?, ?, ?, ?, ?)",
         )
         .bind(press.id.0)
-        .bind(crate::reader::role_name(press.role))
+        .bind(crate::from_row::role_name(press.role))
         .bind(press.repetition)
         .bind(press.location)
         .bind(press.at.x_mm)

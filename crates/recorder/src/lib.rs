@@ -18,6 +18,7 @@ pub mod rows;
 pub mod verify;
 pub mod writer;
 
+mod from_row;
 mod insert;
 mod pose;
 mod query;
