@@ -7,6 +7,7 @@ pub trait Clock: Send {
     /// The present. Never goes back.
     fn now(&self) -> HostTime;
 
-    /// Waits until `t` (at once when it is past). A simulated clock jumps there.
+    /// Waits until `t` (at once when it is past). A simulated clock jumps there. A replayed clock may end a
+    /// wait early, at an instant at which its recording holds a command: wait again to go on.
     fn wait_until(&mut self, t: HostTime);
 }

@@ -5,15 +5,16 @@ use std::collections::{BTreeMap, VecDeque};
 use skinrig_device::{CameraCapabilities, CameraSettings, DeviceError, EventCamera};
 use skinrig_formats::{Scanner, evt2};
 use skinrig_model::{
-    CameraId, CdEvent, DeviceIdentity, DeviceRole, HostTime, RawChunk, SENSOR_HEIGHT, SENSOR_WIDTH,
-    Setting, StreamFormat, TriggerEdge,
+    CameraId, DeviceIdentity, DeviceRole, HostTime, RawChunk, SENSOR_HEIGHT, SENSOR_WIDTH, Setting,
+    StreamFormat,
 };
 
 use crate::camera_clock::CameraClock;
+use crate::camera_stream::{Outgoing, Streaming};
 use crate::config::SimConfig;
 use crate::faults::{Fault, When};
 use crate::random::{Purpose, Stream};
-use crate::scene::{GRID_NS, PixelEvent, PixelModel, TipSample};
+use crate::scene::{GRID_NS, PixelModel};
 use crate::world::{LineEdge, Shared, World};
 
 /// Bias names, ranges and defaults in mV (evk1.md section 2.9). The simulation stores them; they have no
@@ -56,32 +57,6 @@ pub struct SimCamera {
     scanner: Scanner,
     out: Outgoing,
     gone: bool,
-}
-
-/// What exists only while streaming.
-struct Streaming {
-    grid: i64,
-    pixels: Option<Box<dyn PixelModel>>,
-    encoder: evt2::Encoder,
-    /// Trigger edges not yet encoded, with the instant at which the camera sees them.
-    edges: VecDeque<LineEdge>,
-    tips: Vec<TipSample>,
-    events: Vec<PixelEvent>,
-    fresh: Vec<u8>,
-}
-
-/// Bytes on their way to the host.
-#[derive(Default)]
-struct Outgoing {
-    seq: u64,
-    bytes: Vec<u8>,
-    /// When the last of `bytes` arrived.
-    arrived: HostTime,
-    /// Bytes lost since the last chunk.
-    lost_before: u64,
-    /// Bytes still to be lost.
-    to_lose: u64,
-    ready: VecDeque<RawChunk>,
 }
 
 impl SimCamera {
@@ -257,115 +232,6 @@ fn struck(
         None => true,
     });
     (unplug.and_then(known), losses)
-}
-
-impl Streaming {
-    /// One grid step: its events and edges as bytes in `fresh`.
-    fn step(&mut self, from: TipSample, to: TipSample, clock: CameraClock, set: &CameraSettings) {
-        self.events.clear();
-        if let Some(pixels) = &mut self.pixels {
-            pixels.advance(&[from, to], &mut self.events);
-        }
-        let triggered = set.trigger_channels.contains(&TRIGGER_CHANNEL);
-        for event in &self.events {
-            while let Some(edge) = self.edges.front().copied()
-                && edge.t_ns <= event.t_ns
-            {
-                self.edges.pop_front();
-                encode_edge(&mut self.encoder, edge, triggered, clock, &mut self.fresh);
-            }
-            if set.roi.is_some_and(|r| {
-                !(r.x..r.x + r.width).contains(&event.x)
-                    || !(r.y..r.y + r.height).contains(&event.y)
-            }) {
-                continue;
-            }
-            let cd = CdEvent {
-                t_us: clock.camera_us(event.t_ns),
-                x: event.x,
-                y: event.y,
-                polarity: event.polarity,
-            };
-            let written = self.encoder.cd(cd, &mut self.fresh);
-            debug_assert!(written.is_ok(), "pixel events out of order: {written:?}");
-        }
-        while let Some(edge) = self.edges.front().copied()
-            && edge.t_ns < to.t_ns
-        {
-            self.edges.pop_front();
-            encode_edge(&mut self.encoder, edge, triggered, clock, &mut self.fresh);
-        }
-        let reached = self
-            .encoder
-            .advance_to(clock.camera_us(to.t_ns), &mut self.fresh);
-        debug_assert!(reached.is_ok(), "time ran backwards: {reached:?}");
-    }
-}
-
-fn encode_edge(
-    encoder: &mut evt2::Encoder,
-    edge: LineEdge,
-    triggered: bool,
-    clock: CameraClock,
-    out: &mut Vec<u8>,
-) {
-    if triggered {
-        let edge = TriggerEdge {
-            t_us: clock.camera_us(edge.t_ns),
-            channel: TRIGGER_CHANNEL,
-            rising: edge.rising,
-        };
-        let written = encoder.trigger(edge, out);
-        debug_assert!(written.is_ok(), "trigger edges out of order: {written:?}");
-    }
-}
-
-impl Outgoing {
-    /// Takes fresh bytes, which arrived at `at`.
-    fn take(
-        &mut self,
-        fresh: &mut Vec<u8>,
-        at: HostTime,
-        camera: CameraId,
-        scanner: &mut Scanner,
-        chunk_bytes: usize,
-    ) {
-        let dropped = usize::try_from(self.to_lose).map_or(fresh.len(), |n| n.min(fresh.len()));
-        self.to_lose -= dropped as u64;
-        self.lost_before += dropped as u64;
-        let mut rest = &fresh[dropped..];
-        self.arrived = at;
-        while self.bytes.len() + rest.len() >= chunk_bytes {
-            let (head, tail) = rest.split_at(chunk_bytes - self.bytes.len());
-            self.bytes.extend_from_slice(head);
-            rest = tail;
-            self.close(camera, scanner);
-        }
-        if self.bytes.capacity() == 0 {
-            self.bytes.reserve(chunk_bytes.min(1 << 16));
-        }
-        self.bytes.extend_from_slice(rest);
-        fresh.clear();
-    }
-
-    /// Closes the chunk under way, when there is anything to say.
-    fn close(&mut self, camera: CameraId, scanner: &mut Scanner) {
-        if self.bytes.is_empty() && self.lost_before == 0 {
-            return;
-        }
-        let bytes = std::mem::take(&mut self.bytes);
-        let (facts, triggers) = scanner.push(&bytes);
-        self.ready.push_back(RawChunk {
-            camera,
-            seq: self.seq,
-            host_time: self.arrived,
-            lost_before: std::mem::take(&mut self.lost_before),
-            bytes,
-            facts,
-            triggers,
-        });
-        self.seq += 1;
-    }
 }
 
 impl EventCamera for SimCamera {

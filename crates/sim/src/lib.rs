@@ -7,6 +7,7 @@
 
 pub mod camera;
 pub mod camera_clock;
+mod camera_stream;
 pub mod clock;
 pub mod columns;
 pub mod config;

@@ -48,8 +48,8 @@ fn both(mut suite: impl FnMut(&mut dyn FnMut() -> Rig)) {
         let mut recorded = logs.lock().unwrap().clone().into_iter();
         suite(&mut || {
             let log = recorded.next().expect("as many replays as recordings");
-            let rig = replay_of(&log.lock().unwrap());
-            rig
+            let log = log.lock().unwrap().clone();
+            replay_of(&log)
         });
     }
 }

@@ -1,0 +1,60 @@
+//! What every trigger box must do.
+
+use skinrig_model::{HostDuration, HostTime, Mark};
+
+use super::{TICK, pass};
+use crate::{Clock, DeviceError, TriggerBox};
+
+/// The promises of [`TriggerBox`]. `make` gives a fresh box and its clock; `marks` are at least two different
+/// marks in the order in which they are sent.
+pub fn trigger_box(
+    make: &mut dyn FnMut() -> (Box<dyn TriggerBox>, Box<dyn Clock>),
+    marks: &[Mark],
+) {
+    assert!(marks.len() >= 2, "trigger box: give at least two marks");
+    let (mut device, mut clock) = make();
+    assert!(
+        !device.identity().model.is_empty(),
+        "trigger box: expected a model name"
+    );
+    let train = device.capabilities().train_duration;
+    assert!(
+        train > HostDuration::ZERO,
+        "trigger box: a train takes time"
+    );
+    let mut impossible = marks[0];
+    impossible.press.0 = skinrig_model::pulse::MAX_MARKED_PRESS + 1;
+    expect_error!(
+        device.send(impossible),
+        DeviceError::Refused { .. },
+        "trigger box: a press id that does not fit must be refused"
+    );
+    let mut last: Option<HostTime> = None;
+    for &mark in marks {
+        let before = clock.now();
+        let sent = device.send(mark).expect("trigger box: a good mark");
+        assert_eq!(sent.mark, mark, "trigger box: sent another mark");
+        assert!(
+            sent.uncertainty_ns >= 0,
+            "trigger box: negative uncertainty"
+        );
+        assert!(
+            sent.t + HostDuration(sent.uncertainty_ns) >= before,
+            "trigger box: the edge rose at {} before it was asked for at {before}",
+            sent.t
+        );
+        assert!(
+            last.is_none_or(|l| l < sent.t),
+            "trigger box: instants out of order"
+        );
+        last = Some(sent.t);
+        expect_error!(
+            device.send(mark),
+            DeviceError::State { .. },
+            "trigger box: a mark during a train must be a State error"
+        );
+        let free = sent.t + train;
+        let wait = free - clock.now() + TICK;
+        pass(clock.as_mut(), wait, || {});
+    }
+}

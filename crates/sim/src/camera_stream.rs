@@ -1,0 +1,159 @@
+//! What a simulated camera has under way: events and edges being encoded, bytes on their way to the host.
+
+use std::collections::VecDeque;
+
+use skinrig_device::CameraSettings;
+use skinrig_formats::{Scanner, evt2};
+use skinrig_model::{CameraId, CdEvent, HostTime, RawChunk, TriggerEdge};
+
+use crate::camera::TRIGGER_CHANNEL;
+use crate::camera_clock::CameraClock;
+use crate::scene::{PixelEvent, PixelModel, TipSample};
+use crate::world::LineEdge;
+
+/// What exists only while streaming.
+pub(crate) struct Streaming {
+    pub grid: i64,
+    pub pixels: Option<Box<dyn PixelModel>>,
+    pub encoder: evt2::Encoder,
+    /// Trigger edges not yet encoded, with the instant at which the camera sees them.
+    pub edges: VecDeque<LineEdge>,
+    pub tips: Vec<TipSample>,
+    pub events: Vec<PixelEvent>,
+    pub fresh: Vec<u8>,
+}
+
+/// Bytes on their way to the host.
+#[derive(Default)]
+pub(crate) struct Outgoing {
+    pub seq: u64,
+    pub bytes: Vec<u8>,
+    /// Length of the chunk before.
+    pub last_len: usize,
+    /// When the last of `bytes` arrived.
+    pub arrived: HostTime,
+    /// Bytes lost since the last chunk.
+    pub lost_before: u64,
+    /// Bytes still to be lost.
+    pub to_lose: u64,
+    pub ready: VecDeque<RawChunk>,
+}
+
+impl Streaming {
+    /// One grid step: its events and edges as bytes in `fresh`.
+    pub fn step(
+        &mut self,
+        from: TipSample,
+        to: TipSample,
+        clock: CameraClock,
+        set: &CameraSettings,
+    ) {
+        self.events.clear();
+        if let Some(pixels) = &mut self.pixels {
+            pixels.advance(&[from, to], &mut self.events);
+        }
+        let triggered = set.trigger_channels.contains(&TRIGGER_CHANNEL);
+        for event in &self.events {
+            while let Some(edge) = self.edges.front().copied()
+                && edge.t_ns <= event.t_ns
+            {
+                self.edges.pop_front();
+                encode_edge(&mut self.encoder, edge, triggered, clock, &mut self.fresh);
+            }
+            if set.roi.is_some_and(|r| {
+                !(r.x..r.x + r.width).contains(&event.x)
+                    || !(r.y..r.y + r.height).contains(&event.y)
+            }) {
+                continue;
+            }
+            let cd = CdEvent {
+                t_us: clock.camera_us(event.t_ns),
+                x: event.x,
+                y: event.y,
+                polarity: event.polarity,
+            };
+            let written = self.encoder.cd(cd, &mut self.fresh);
+            debug_assert!(written.is_ok(), "pixel events out of order: {written:?}");
+        }
+        while let Some(edge) = self.edges.front().copied()
+            && edge.t_ns < to.t_ns
+        {
+            self.edges.pop_front();
+            encode_edge(&mut self.encoder, edge, triggered, clock, &mut self.fresh);
+        }
+        let reached = self
+            .encoder
+            .advance_to(clock.camera_us(to.t_ns), &mut self.fresh);
+        debug_assert!(reached.is_ok(), "time ran backwards: {reached:?}");
+    }
+}
+
+fn encode_edge(
+    encoder: &mut evt2::Encoder,
+    edge: LineEdge,
+    triggered: bool,
+    clock: CameraClock,
+    out: &mut Vec<u8>,
+) {
+    if triggered {
+        let edge = TriggerEdge {
+            t_us: clock.camera_us(edge.t_ns),
+            channel: TRIGGER_CHANNEL,
+            rising: edge.rising,
+        };
+        let written = encoder.trigger(edge, out);
+        debug_assert!(written.is_ok(), "trigger edges out of order: {written:?}");
+    }
+}
+
+impl Outgoing {
+    /// Takes fresh bytes, which arrived at `at`.
+    pub fn take(
+        &mut self,
+        fresh: &mut Vec<u8>,
+        at: HostTime,
+        camera: CameraId,
+        scanner: &mut Scanner,
+        chunk_bytes: usize,
+    ) {
+        let dropped = usize::try_from(self.to_lose).map_or(fresh.len(), |n| n.min(fresh.len()));
+        self.to_lose -= dropped as u64;
+        self.lost_before += dropped as u64;
+        let mut rest = &fresh[dropped..];
+        self.arrived = at;
+        while self.bytes.len() + rest.len() >= chunk_bytes {
+            let (head, tail) = rest.split_at(chunk_bytes - self.bytes.len());
+            self.bytes.extend_from_slice(head);
+            rest = tail;
+            self.close(camera, scanner);
+        }
+        if self.bytes.capacity() == 0 {
+            // About as much as last time: growing step by step costs more than the bytes themselves.
+            let like_last =
+                (self.last_len + self.last_len / 8).clamp(1 << 12, chunk_bytes.max(1 << 12));
+            self.bytes.reserve_exact(like_last);
+        }
+        self.bytes.extend_from_slice(rest);
+        fresh.clear();
+    }
+
+    /// Closes the chunk under way, when there is anything to say.
+    pub fn close(&mut self, camera: CameraId, scanner: &mut Scanner) {
+        if self.bytes.is_empty() && self.lost_before == 0 {
+            return;
+        }
+        let bytes = std::mem::take(&mut self.bytes);
+        self.last_len = bytes.len();
+        let (facts, triggers) = scanner.push(&bytes);
+        self.ready.push_back(RawChunk {
+            camera,
+            seq: self.seq,
+            host_time: self.arrived,
+            lost_before: std::mem::take(&mut self.lost_before),
+            bytes,
+            facts,
+            triggers,
+        });
+        self.seq += 1;
+    }
+}
