@@ -71,16 +71,12 @@ fn plain_evt2(bytes: &[u8], mut each: impl FnMut(CdEvent)) {
     for word in bytes.chunks_exact(4) {
         let w = u32::from_le_bytes([word[0], word[1], word[2], word[3]]);
         match w >> 28 {
-            kind @ (0 | 1) => {
-                if previous.is_some() {
-                    each(CdEvent {
-                        t_us: base + u64::from(w >> 22 & 0x3f),
-                        x: (w >> 11 & 0x7ff) as u16,
-                        y: (w & 0x7ff) as u16,
-                        polarity: Polarity::from_bit(kind == 1),
-                    });
-                }
-            }
+            kind @ (0 | 1) if previous.is_some() => each(CdEvent {
+                t_us: base + u64::from(w >> 22 & 0x3f),
+                x: (w >> 11 & 0x7ff) as u16,
+                y: (w & 0x7ff) as u16,
+                polarity: Polarity::from_bit(kind == 1),
+            }),
             8 => {
                 let high = w & 0x0fff_ffff;
                 if previous.is_some_and(|p| p > high && p - high > 1 << 27) {

@@ -1,5 +1,4 @@
 //! What `inspect` finds in RAW and HDF5 files, and how it refuses others.
-#![expect(clippy::unwrap_used, reason = "tests")]
 
 use std::path::Path;
 

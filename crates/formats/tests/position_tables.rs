@@ -1,5 +1,4 @@
 //! Press-position tables: units, blank rows, and every kind of bad cell.
-#![expect(clippy::unwrap_used, reason = "tests")]
 
 use std::path::Path;
 

@@ -1,5 +1,4 @@
 //! RAW files: headers of old and new tools, and what the writer makes.
-#![expect(clippy::unwrap_used, reason = "tests")]
 
 use std::path::Path;
 
