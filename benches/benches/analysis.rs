@@ -3,14 +3,20 @@
 
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
+use skinrig_analysis::calibrate::calibrate;
+use skinrig_analysis::clock::{PressSpan, fit_rates};
 use skinrig_analysis::dbscan::Dbscan;
 use skinrig_analysis::grid::PixelGrid;
+use skinrig_analysis::metrics::{Exclusions, metrics};
+use skinrig_analysis::rates::RateHistogram;
+use skinrig_analysis::sets::{CalibrationSet, ScoreSet};
+use skinrig_analysis::triangulate::locate;
 use skinrig_analysis::{EventSource, SessionInput, analyze};
 use skinrig_bench::Table;
 use skinrig_model::{
-    AnalysisSettings, AttemptId, CameraId, CdEvent, HostTime, PlannedPress, Point2, Polarity,
-    PressId, PressOutcome, PressRole, PressTiming, PressVerdict, RigGeometry, SkinOutline,
-    StereoGeometry,
+    AnalysisSettings, AttemptId, CalibrationModel, CameraId, CdEvent, HostTime, PlannedPress,
+    Point2, Polarity, PressId, PressOutcome, PressRole, PressTiming, PressVerdict, RigGeometry,
+    SkinOutline, StereoGeometry,
 };
 
 /// Events of a dense press: the median of a real-rate recording is 17.8 thousand, the largest 39 thousand.
@@ -61,16 +67,23 @@ fn clustering() {
         "one core; counting the events included. Baseline: the definition, every pair of events compared (core and \
          noise only, no clusters)",
     );
-    table.row("pixel counts (this crate)", PRESS_EVENTS as f64 / 1e3, || {
-        grid.clear();
-        for &(u, v) in &events {
-            grid.add(u, v);
-        }
-        std::hint::black_box(dbscan.run(&grid).len());
-    });
+    table.row(
+        "pixel counts (this crate)",
+        PRESS_EVENTS as f64 / 1e3,
+        || {
+            grid.clear();
+            for &(u, v) in &events {
+                grid.add(u, v);
+            }
+            std::hint::black_box(dbscan.run(&grid).len());
+        },
+    );
     table.baseline("all pairs", PRESS_EVENTS as f64 / 1e3, || {
         let near = |a: &(u16, u16), b: &(u16, u16)| {
-            let (dx, dy) = (i32::from(a.0) - i32::from(b.0), i32::from(a.1) - i32::from(b.1));
+            let (dx, dy) = (
+                i32::from(a.0) - i32::from(b.0),
+                i32::from(a.1) - i32::from(b.1),
+            );
             dx * dx + dy * dy <= 100
         };
         let core = |a: &&(u16, u16)| events.iter().filter(|b| near(a, b)).count() >= 10;
@@ -110,6 +123,47 @@ fn whole() {
             counts[usize::from(e.y) * 640 + usize::from(e.x)] += 1;
         }
         std::hint::black_box(&counts);
+    });
+    println!("{}", table.run(3));
+
+    let Ok(done) = analyze(&input, &source) else {
+        return;
+    };
+    let set = CalibrationSet::from_presses(&done.presses);
+    let scores = ScoreSet::from_presses(&done.presses);
+    let mut rates = RateHistogram::new(10_000);
+    source.0[0].iter().for_each(|e| rates.add(e.t_us));
+    let spans: Vec<PressSpan> = done
+        .presses
+        .iter()
+        .filter_map(|p| p.timing)
+        .map(|t| PressSpan {
+            contact_us: t.contact.0 as f64 * 1e-3,
+            release_us: t.release.0 as f64 * 1e-3,
+        })
+        .collect();
+    let start = StereoGeometry::paper_like([45.0, -35.0, 45.0, 46.0, 0.0, 0.0, 0.0, 0.0]);
+    let mut table = Table::new(
+        "parts of the analysis of one repetition",
+        "call",
+        "calibration: 8 parameters, 145 presses, 10 starts. Metrics: 144 presses, 2000 bootstrap samples, both cores. \
+         Baseline: intersecting the rays of all presses once",
+    );
+    table.row("clock fit from event rates", 1.0, || {
+        std::hint::black_box(fit_rates(&rates, &spans).is_ok());
+    });
+    table.row("calibration", 1.0, || {
+        std::hint::black_box(calibrate(&set, &start, CalibrationModel::Full, 1));
+    });
+    table.row("metrics", 1.0, || {
+        let outline = &SkinOutline::PAPER;
+        std::hint::black_box(metrics(&scores, Exclusions::Applied, outline, 2000, 1));
+    });
+    table.baseline("triangulation", 1.0, || {
+        for press in &done.presses {
+            let columns = press.views.map(|v| v.and_then(|v| v.centroid_u));
+            std::hint::black_box(locate(&done.geometry, &SkinOutline::PAPER, columns));
+        }
     });
     println!("{}", table.run(3));
 }
@@ -152,7 +206,10 @@ fn session() -> (SessionInput, Memory) {
             depth_mm: 2.0,
         });
         input.outcomes.push(Some(PressOutcome {
-            attempt: AttemptId { press: id, number: 1 },
+            attempt: AttemptId {
+                press: id,
+                number: 1,
+            },
             verdict: PressVerdict::Valid,
             timing: Some(PressTiming {
                 approach: h(contact - 0.1),

@@ -131,7 +131,7 @@ impl<'a> Accumulator<'a> {
                 return;
             }
             self.newest_us = self.newest_us.max(event.t_us);
-            if event.t_us + SLACK_US < self.newest_us {
+            if event.t_us.saturating_add(SLACK_US) < self.newest_us {
                 self.late += 1;
             }
             if event.y < self.crop.0 || event.y > self.crop.1 {
@@ -193,7 +193,7 @@ impl<'a> Accumulator<'a> {
             }
         }
         while let Some(&window) = self.windows.get(self.next) {
-            if window.idle_start_us > now + SLACK_US {
+            if window.idle_start_us > now.saturating_add(SLACK_US) {
                 break;
             }
             self.next += 1;

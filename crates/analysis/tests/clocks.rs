@@ -1,5 +1,7 @@
 //! Clock fits: from trigger marks with everything that happens to them, and from the presses themselves.
 
+#![expect(clippy::unwrap_used, reason = "tests")]
+
 use skinrig_analysis::clock::{PressSpan, fit_marks, fit_rates};
 use skinrig_analysis::rates::RateHistogram;
 use skinrig_analysis::result::ClockFit;
@@ -291,6 +293,10 @@ fn no_presses_in_the_rates_is_said() {
     assert!(why.contains("expected presses to stand out"), "{why}");
     let why = fit_rates(&RateHistogram::new(10_000), &rhythm(289)).unwrap_err();
     assert!(why.contains("expected presses to stand out"), "{why}");
+    let mut endless = rhythm(9);
+    endless[11].release_us = 1e18;
+    let why = fit_rates(&flat, &endless).unwrap_err();
+    assert!(why.contains("within two days"), "{why}");
     let why = fit_rates(&flat, &rhythm(0)).unwrap_err();
     assert!(why.contains("expected at least 4 presses"), "{why}");
 }

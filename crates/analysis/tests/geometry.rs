@@ -1,5 +1,7 @@
 //! Triangulation against the answers that the public solver gets wrong, the grid, and projected points.
 
+#![expect(clippy::unwrap_used, reason = "tests")]
+
 use proptest::prelude::*;
 use serde_json::Value;
 use skinrig_analysis::result::LocationOutcome;

@@ -1,5 +1,7 @@
 //! Whole analyses of planted sessions: what was planted comes out, and everything that goes wrong has its row.
 
+#![expect(clippy::unwrap_used, reason = "tests")]
+
 use proptest::prelude::*;
 use skinrig_analysis::result::LocationOutcome;
 use skinrig_analysis::{AnalysisError, EventSource, SessionInput, analyze, results_hash};
@@ -470,6 +472,27 @@ fn a_million_events_on_one_pixel_are_counted() {
     let view = a.presses[30].views[0].unwrap();
     assert!(view.events > 1_000_500 && view.cluster_events >= 1_000_000);
     assert!((view.centroid_u.unwrap() - 3.0).abs() < 0.01);
+}
+
+#[test]
+fn broken_times_neither_panic_nor_pass_unseen() {
+    let (input, mut source) = session();
+    let last = CdEvent {
+        t_us: u64::MAX,
+        x: 3,
+        y: 300,
+        polarity: Polarity::On,
+    };
+    source.events[0].push(last);
+    source.events[0].push(CdEvent { t_us: 0, ..last });
+    let a = analyze(&input, &source).unwrap();
+    assert_eq!(a.counts.valid, 50);
+    let said = a.warnings.join("; ");
+    assert!(
+        said.contains("camera 1: 1 events are more than 10 ms out of order"),
+        "{said}"
+    );
+    assert!(said.contains("camera 1: 1 events lie days away"), "{said}");
 }
 
 #[test]

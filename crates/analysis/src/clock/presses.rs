@@ -36,6 +36,8 @@ pub struct RatesFit {
     pub warnings: Vec<String>,
 }
 
+/// Longest session that is searched, bins (46 hours of 10 ms).
+const MOST_BINS: f64 = 16_777_216.0;
 /// Bins that are merged for the first search.
 const MERGE: usize = 5;
 /// Largest drift of the first search.
@@ -81,6 +83,13 @@ pub fn fit_rates(rates: &RateHistogram, presses: &[PressSpan]) -> Result<RatesFi
         return Err(format!(
             "expected at least 4 presses with known times to align the clock by event rates, found {}",
             presses.len()
+        ));
+    }
+    let span_us = presses[presses.len() - 1].release_us - presses[0].contact_us;
+    if !(0.0..=MOST_BINS * rates.bin_us() as f64).contains(&span_us) {
+        return Err(format!(
+            "expected the presses in time order within two days, found {:.0} s between the first and the last",
+            span_us * 1e-6
         ));
     }
     let activity = Activity::new(rates, presses)?;
