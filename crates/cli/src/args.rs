@@ -294,10 +294,6 @@ pub struct InspectArgs {
     /// The file.
     pub file: PathBuf,
 
-    /// Which event stream to read from a file that holds several.
-    #[arg(long, value_name = "NAME")]
-    pub stream: Option<String>,
-
     /// Report silences longer than this, in ms.
     #[arg(long, value_name = "MS", default_value_t = 1000.0)]
     pub gap: f64,

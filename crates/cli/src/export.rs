@@ -1,6 +1,6 @@
 //! `skinrig export`: a session's data in other programs' formats.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use skinrig_formats::hdf5::EventWriter;
 use skinrig_formats::raw::{RawMetadata, RawWriter};
@@ -80,7 +80,7 @@ fn raw(
     reader: &SessionReader,
     header: &RunHeader,
     camera: CameraId,
-    path: &PathBuf,
+    path: &Path,
 ) -> Result<(), Failure> {
     let devices = reader.devices().map_err(Failure::input)?;
     let serial = devices

@@ -95,6 +95,24 @@ pub struct Gap {
 }
 
 impl StreamInspection {
+    /// Begins to look at a stream called `name`; silences longer than `gap_us` will be reported. Feed it as the
+    /// sink of a [`Decoder`](crate::Decoder), then call [`Self::finish`].
+    #[must_use]
+    pub fn new(name: &str, gap_us: u64) -> Self {
+        Self {
+            name: name.into(),
+            threshold_us: gap_us,
+            ..Self::default()
+        }
+    }
+
+    /// Takes the counts and times of the decoder that fed it.
+    pub fn finish(&mut self, decoder: &crate::Decoder) {
+        self.stats = decoder.stats();
+        self.first_us = decoder.first_us();
+        self.last_us = decoder.last_us();
+    }
+
     /// Length of the recording in seconds; `None` without two times in order.
     #[must_use]
     pub fn span_s(&self) -> Option<f64> {
@@ -162,19 +180,14 @@ pub fn inspect(path: &Path, gap_us: u64) -> Result<Inspection, FormatsError> {
 fn inspect_raw(path: &Path, gap_us: u64) -> Result<Inspection, FormatsError> {
     let mut reader = RawReader::open(path)?;
     let mut decoder = reader.decoder();
-    let mut stream = StreamInspection {
-        threshold_us: gap_us,
-        ..StreamInspection::default()
-    };
+    let mut stream = StreamInspection::new("", gap_us);
     loop {
         match reader.next_chunk()? {
             [] => break,
             bytes => decoder.push(bytes, &mut stream),
         }
     }
-    stream.stats = decoder.stats();
-    stream.first_us = decoder.first_us();
-    stream.last_us = decoder.last_us();
+    stream.finish(&decoder);
     let header = reader.header();
     Ok(Inspection {
         kind: FileKind::Raw,
@@ -189,12 +202,8 @@ fn inspect_hdf5(path: &Path, gap_us: u64) -> Result<Inspection, FormatsError> {
     let container = Container::open(path)?;
     let mut streams = Vec::new();
     for entry in container.entries() {
-        let mut stream = StreamInspection {
-            name: entry.name.clone(),
-            ts_offset_s: entry.ts_offset_s,
-            threshold_us: gap_us,
-            ..StreamInspection::default()
-        };
+        let mut stream = StreamInspection::new(&entry.name, gap_us);
+        stream.ts_offset_s = entry.ts_offset_s;
         let mut events = container.events(Some(&entry.name), Geometry::EVK1)?;
         loop {
             let batch = events.next_batch()?;

@@ -104,7 +104,7 @@ impl Indenter for ScheduledIndenter {
         if !self.armed {
             return Err(self.state_error("armed", "disarmed"));
         }
-        if !target.is_finite() || !(speed_mm_s > 0.0 && speed_mm_s.is_finite()) {
+        if !(target.is_finite() && speed_mm_s > 0.0 && speed_mm_s.is_finite()) {
             return Err(DeviceError::Refused {
                 role: DeviceRole::Indenter,
                 serial: self.identity().serial,

@@ -12,6 +12,7 @@ use std::path::Path;
 use skinrig_device::{CameraSettings, Rig};
 use skinrig_formats::Geometry;
 use skinrig_formats::hdf5::Container;
+use skinrig_formats::inspect::FileKind;
 use skinrig_formats::positions::{LengthUnit, PositionTable};
 use skinrig_formats::raw::RawReader;
 use skinrig_model::{CameraId, HostDuration, Point2, RigidTransform, StreamFormat};
@@ -111,21 +112,6 @@ fn read_positions(path: &Path, schedule: &Schedule) -> Result<Vec<Point2>, Failu
         .collect())
 }
 
-#[derive(Debug)]
-enum FileKind {
-    Hdf5,
-    Raw,
-}
-impl FileKind {
-    fn of(p: &Path) -> std::io::Result<Self> {
-        let b = std::fs::read(p)?;
-        Ok(if b.starts_with(b"\x89HDF") {
-            Self::Hdf5
-        } else {
-            Self::Raw
-        })
-    }
-}
 /// Opens one camera's file and starts reading it.
 fn open(
     camera: CameraId,
@@ -135,7 +121,7 @@ fn open(
 ) -> Result<FileCamera, Failure> {
     let file = path.display().to_string();
     let path = path.to_owned();
-    let kind = FileKind::of(&path).map_err(Failure::input)?;
+    let kind = FileKind::detect(&path).map_err(Failure::input)?;
     let opened = match kind {
         FileKind::Hdf5 => {
             // Opened here once, so that a wrong file is refused before a session is made.
@@ -159,6 +145,11 @@ fn open(
             FileCamera::new(camera, file, format, clock.clone(), move |feed| {
                 read_raw(&path, feed)
             })
+        }
+        FileKind::Sqlite | FileKind::Unknown => {
+            return Err(Failure::input(format!(
+                "{file}: expected bimvee HDF5 or Prophesee RAW for {camera}, found another kind of file"
+            )));
         }
     };
     opened.map_err(Failure::internal)
