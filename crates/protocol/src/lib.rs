@@ -2,9 +2,9 @@
 //!
 //! 1. [`Protocol::parse`] reads a protocol and reports everything that is wrong with it at once, each finding with
 //!    file, line, column, key path, expected, found and the line itself ([`Diagnostics`]).
-//! 2. [`Protocol::compile`] turns it into a [`Plan`](plan::Plan): seeds resolved, orders shuffled, positions absolute.
+//! 2. [`Protocol::compile`] turns it into a [`Plan`]: seeds resolved, orders shuffled, positions absolute.
 //! 3. [`check()`] holds every segment of the plan against workspace, skin outline, keep-outs and limits.
-//! 4. [`Plan::summary`](plan::Plan::summary) and [`path_svg`] show it to people.
+//! 4. [`Plan::summary`] and [`path_svg`] show it to people.
 //!
 //! [`Schedule`] describes a recording that was made without skinrig, for imports. The keys of both languages stand in
 //! one table each, which also yields their JSON Schemas ([`schema_json`], [`schedule_schema_json`]).

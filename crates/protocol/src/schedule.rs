@@ -89,6 +89,11 @@ pub struct PressPhases {
 }
 
 impl PressPhases {
+    /// From the begin of the downward motion to the return to clearance height, s.
+    fn length_s(&self) -> f64 {
+        self.clear.as_secs_f64() - self.approach.as_secs_f64()
+    }
+
     /// The moments of the press at `t`.
     #[must_use]
     pub fn at(&self, t: HostTime) -> PressTiming {
@@ -289,13 +294,17 @@ fn assemble(root: &Field, out: &mut Collector) -> Option<Schedule> {
     if let (Some(phases), Some(field)) = (&phases, root.get("period"))
         && let Some(period) = field.as_quantity()
     {
-        let length = phases.clear.as_secs_f64() - phases.approach.as_secs_f64();
+        let length = phases.length_s();
         if length > period {
-            out.error(field.span, "period", "the presses overlap")
-                .expected(format!(
-                    "at least {length} s, from `phases.approach` to `phases.clear`"
-                ))
-                .found(format!("{period} s"));
+            overlap(field, length, period, out);
+        }
+    }
+    for key in ["interval", "pause_after"] {
+        if let (Some(phases), Some(field)) = (&phases, root.get("sync").and_then(|s| s.get(key)))
+            && let Some(time) = field.as_quantity()
+            && time < phases.length_s()
+        {
+            overlap(field, phases.length_s(), time, out);
         }
     }
     let csv = root.get("csv")?;
@@ -329,6 +338,14 @@ fn assemble(root: &Field, out: &mut Collector) -> Option<Schedule> {
         rig: rig?,
         analysis: analysis?,
     })
+}
+
+fn overlap(field: &Field, least_s: f64, found_s: f64, out: &mut Collector) {
+    out.error(field.span, field.path.as_str(), "the presses overlap")
+        .expected(format!(
+            "at least {least_s} s, from `phases.approach` to `phases.clear`"
+        ))
+        .found(format!("{found_s} s"));
 }
 
 fn phases(f: &Field, out: &mut Collector) -> Option<PressPhases> {

@@ -105,10 +105,11 @@ fn circles(f: &Field) -> Option<Vec<Point2>> {
     Some(points)
 }
 
-/// Sine and cosine with the last-bit noise near 0 removed, so that plans are the same on every machine.
+/// Sine and cosine, the same on every machine, with the last-bit noise near 0 removed.
 fn sine_cosine(angle: f64) -> (f64, f64) {
     let tidy = |v: f64| (v * 1e12).round() / 1e12 + 0.0;
-    (tidy(angle.sin()), tidy(angle.cos()))
+    let (sin, cos) = libm::sincos(angle);
+    (tidy(sin), tidy(cos))
 }
 
 fn csv(f: &Field, folder: &Path, loader: Loader<'_>, out: &mut Collector) -> Option<Vec<Point2>> {

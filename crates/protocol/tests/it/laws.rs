@@ -12,6 +12,31 @@ fn keys(violations: &[Violation]) -> Vec<(Segment, &str)> {
 }
 
 #[test]
+fn absent_settings_are_the_documented_defaults() {
+    assert_eq!(
+        demo(&[]).analysis,
+        skinrig_model::AnalysisSettings::default()
+    );
+    let changed = demo(&[
+        "analysis.crop.camera2=[0 px, 479 px]",
+        "analysis.window_before=7 ms",
+        "analysis.window_after=8 ms",
+        "analysis.eps=3 px",
+        "analysis.min_samples=4",
+        "analysis.centroid=all_clusters",
+        "analysis.min_cluster_events=0",
+        "analysis.min_ray_sine=0.1",
+        "analysis.exclude_outside=false",
+        "analysis.calibration=positions_skews",
+        "analysis.bootstrap_resamples=10",
+        "analysis.seed=9",
+        "analysis.rate_bin=20 ms",
+    ])
+    .analysis;
+    insta::assert_debug_snapshot!("analysis", changed);
+}
+
+#[test]
 fn rings_hold_their_radius() {
     let protocol = parse(&shipped("circles.yaml"), &[]).unwrap();
     assert_eq!(protocol.locations.len(), 48);

@@ -79,3 +79,18 @@ fn the_number_of_positions_must_fit() {
         "expected 10 press positions, `presses_per_repetition` of ten-presses.schedule.yaml, found 9; correct the key or use the recording's own CSV"
     );
 }
+
+#[test]
+fn overlapping_presses_are_refused() {
+    for (key, path) in [
+        ("period=800 ms", "period"),
+        ("sync.interval=800 ms", "sync.interval"),
+        ("sync.pause_after=0.8 s", "sync.pause_after"),
+    ] {
+        let text = shipped("ten-presses.schedule.yaml");
+        let error = Schedule::parse("x", text.as_bytes(), &[key.to_owned()]).unwrap_err();
+        assert_eq!(error.list().len(), 1, "{error}");
+        assert_eq!(error.list()[0].path, path);
+        assert_eq!(error.list()[0].message, "the presses overlap");
+    }
+}
