@@ -333,3 +333,82 @@ impl<'a> Accumulator<'a> {
 pub fn rate_bin_us(settings: &AnalysisSettings) -> u64 {
     (settings.rate_bin_ms * 1e3).round().max(1.0) as u64
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn window(row: usize, idle_start_us: u64, start_us: u64, end_us: u64) -> Window {
+        Window {
+            row,
+            start_us,
+            end_us,
+            idle_start_us,
+        }
+    }
+
+    fn event(t_us: u64, y: u16, polarity: Polarity) -> CdEvent {
+        CdEvent {
+            t_us,
+            x: 100,
+            y,
+            polarity,
+        }
+    }
+
+    fn run(windows: &[Window], events: &[CdEvent]) -> Accumulated {
+        let settings = AnalysisSettings::default();
+        let mut all = Accumulator::new(CameraId::One, &settings, windows, &[], Vec::new(), None);
+        events.chunks(2).for_each(|slice| all.take(slice));
+        all.finish().unwrap()
+    }
+
+    #[test]
+    fn windows_include_their_start_and_exclude_their_end_in_any_order_within_the_slack() {
+        let windows = [window(4, 500_000, 1_000_000, 1_600_000)];
+        let on = |t| event(t, 200, Polarity::On);
+        let off = |t| event(t, 200, Polarity::Off);
+        let mut events = vec![
+            on(499_999),
+            on(500_000),
+            off(999_999),
+            on(1_000_000),
+            off(1_300_000),
+            off(1_599_999),
+            on(1_600_000),
+        ];
+        // Rows outside the crop (185..=360) count nowhere.
+        events.push(event(1_600_001, 184, Polarity::On));
+        events.push(event(1_600_002, 361, Polarity::On));
+        // Behind the newest event, but within the slack.
+        events.push(off(1_599_000));
+        let done = run(&windows, &events);
+        let (row, view) = done.views[0];
+        assert_eq!((row, view.events, view.on_events), (4, 4, 1));
+        assert!((view.idle_rate_per_s - 2.0 / 0.5).abs() < 1e-9);
+        assert!((view.rate_per_s - 4.0 / 0.6).abs() < 1e-9);
+        assert_eq!(done.late, 0);
+    }
+
+    #[test]
+    fn overlapping_windows_each_keep_all_of_their_events() {
+        let windows = [
+            window(0, 1_000, 1_000, 5_000),
+            window(1, 3_000, 3_000, 9_000),
+        ];
+        let events: Vec<CdEvent> = (0..100)
+            .map(|i| event(100 * i, 250, Polarity::On))
+            .collect();
+        let views = run(&windows, &events).views;
+        let counts: Vec<(usize, u32)> = views.iter().map(|(row, v)| (*row, v.events)).collect();
+        assert_eq!(counts, [(0, 40), (1, 60)]);
+        assert_eq!(views[0].1.idle_s, 0.0);
+    }
+
+    #[test]
+    fn an_event_that_is_too_late_is_reported() {
+        let windows = [window(0, 1_000, 1_000, 5_000)];
+        let late = [2_000, 16_000, 15_000, 5_999].map(|t| event(t, 250, Polarity::On));
+        assert_eq!(run(&windows, &late).late, 1);
+    }
+}

@@ -115,3 +115,93 @@ pub fn count(presses: &[PressResult]) -> PressCounts {
     }
     counts
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use skinrig_model::Point2;
+
+    #[test]
+    fn location_rules_have_sharp_borders() {
+        let mut settings = AnalysisSettings::default();
+        let at = Point2::new(10.0, 2.0);
+        let rule = |outcome: LocationOutcome, s: &AnalysisSettings| location_rule(&outcome, s);
+        assert_eq!(
+            rule(LocationOutcome::Located { at, sine: -0.05 }, &settings),
+            None
+        );
+        assert_eq!(
+            rule(LocationOutcome::Located { at, sine: -0.0499 }, &settings).as_deref(),
+            Some("nearly parallel rays: sine 0.0499 < 0.05")
+        );
+        let outside = LocationOutcome::Outside { at, sine: 0.5 };
+        assert_eq!(
+            rule(outside, &settings).as_deref(),
+            Some("outside the skin outline")
+        );
+        settings.exclude_outside = false;
+        assert_eq!(rule(outside, &settings), None);
+        assert_eq!(
+            rule(LocationOutcome::Behind { sine: 0.5 }, &settings).as_deref(),
+            Some("behind camera")
+        );
+        assert_eq!(
+            rule(LocationOutcome::Parallel { sine: 0.0 }, &settings).as_deref(),
+            Some("parallel rays")
+        );
+    }
+
+    #[test]
+    fn a_cluster_of_just_enough_events_is_enough() {
+        let settings = AnalysisSettings::default();
+        let outcome = PressOutcome {
+            attempt: skinrig_model::AttemptId {
+                press: skinrig_model::PressId(0),
+                number: 1,
+            },
+            verdict: PressVerdict::Valid,
+            timing: Some(skinrig_model::PressTiming {
+                approach: skinrig_model::HostTime(0),
+                contact: skinrig_model::HostTime(1),
+                at_depth: skinrig_model::HostTime(2),
+                retract: skinrig_model::HostTime(3),
+                release: skinrig_model::HostTime(4),
+                clear: skinrig_model::HostTime(5),
+            }),
+            measured_at: Some(Point2::new(10.0, 2.0)),
+            measured_depth_mm: None,
+            peak_force_n: None,
+            scheduled: false,
+        };
+        let view = |events: u32| {
+            Some(PressView {
+                events,
+                on_events: 0,
+                clusters: 1,
+                cluster_events: events,
+                centroid_u: Some(320.0),
+                centroid_v: Some(270.0),
+                rate_per_s: 1.0,
+                idle_rate_per_s: 1.0,
+                idle_s: 0.5,
+            })
+        };
+        let judge = |role, first, second| {
+            let views = [view(first), view(second)];
+            from_data(
+                role,
+                Some(&outcome),
+                [true; 2],
+                [false; 2],
+                &views,
+                &settings,
+            )
+        };
+        assert_eq!(judge(PressRole::Score, 20, 20), PressVerdict::Valid);
+        assert_eq!(
+            judge(PressRole::Calibrate, 20, 19),
+            PressVerdict::Excluded("too few cluster events: 19 < 20 (camera 2)".to_owned())
+        );
+        assert_eq!(judge(PressRole::Sync, 0, 0), PressVerdict::Valid);
+    }
+}
