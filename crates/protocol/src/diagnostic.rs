@@ -48,6 +48,7 @@ impl Diagnostics {
         }
         let count = match self.list.len() {
             1 => "1 error".to_owned(),
+            n if n >= MOST_FINDINGS => format!("{n} errors; more were not listed"),
             n => format!("{n} errors"),
         };
         out.push_str(&paint.error(&count));
