@@ -64,7 +64,7 @@ pub fn analyze(input: &SessionInput, source: &dyn EventSource) -> Result<Analysi
             verdict::put(row, &PressVerdict::Excluded(rule));
         }
     }
-    let scores = ScoreSet::from_presses(&presses);
+    let scores = ScoreSet::from_presses(&presses, &input.outcomes);
     let measure = |exclusions| {
         metrics(
             &scores,

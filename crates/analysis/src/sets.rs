@@ -4,7 +4,7 @@
 //! those whose role is to score. The calibration takes the one and the metrics the other, so that no press can
 //! ever do both.
 
-use skinrig_model::{Point2, PressId, PressRole, PressVerdict};
+use skinrig_model::{Point2, PressId, PressOutcome, PressRole, PressVerdict};
 
 use crate::result::PressResult;
 
@@ -68,17 +68,24 @@ pub struct Scored {
     pub found: Option<(Point2, [f64; 2])>,
 }
 
-/// Presses that score and were attempted, whatever became of them.
+/// Presses that score and were attempted, whatever became of them, but for those that the journal leaves out.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ScoreSet(Vec<Scored>);
 
 impl ScoreSet {
-    /// Takes the attempted scored presses out of the table.
+    /// Takes the attempted scored presses out of the table. `journal` holds the outcomes of the same presses: what
+    /// it excludes was left out before anybody looked at the data, and says nothing about the skin.
     #[must_use]
-    pub fn from_presses(presses: &[PressResult]) -> Self {
+    pub fn from_presses(presses: &[PressResult], journal: &[Option<PressOutcome>]) -> Self {
         let missed = PressVerdict::Missed(String::new());
+        let left_out = |outcome: Option<&PressOutcome>| {
+            outcome.is_some_and(|o| matches!(o.verdict, PressVerdict::Excluded(_)))
+        };
         let attempted = presses
             .iter()
+            .enumerate()
+            .filter(|(i, _)| !left_out(journal.get(*i).and_then(Option::as_ref)))
+            .map(|(_, p)| p)
             .filter(|p| p.role == PressRole::Score && p.verdict != missed.name());
         Self(
             attempted

@@ -63,8 +63,39 @@ pub fn from_data(
                 view.cluster_events, settings.min_cluster_events
             ));
         }
+        if let Some(idle) = idle_events(&view).filter(|idle| {
+            f64::from(view.events)
+                < idle.expected + settings.min_response_sigma * idle.standard_error
+        }) && settings.min_response_sigma > 0.0
+        {
+            return PressVerdict::Excluded(format!(
+                "no response: {} events, {:.0} ± {:.0} expected at the idle rate ({camera})",
+                view.events, idle.expected, idle.standard_error
+            ));
+        }
     }
     PressVerdict::Valid
+}
+
+/// What a camera would have sent in the press window without a press.
+struct IdleEvents {
+    expected: f64,
+    standard_error: f64,
+}
+
+/// The prediction from the idle time before the press, with Poisson noise in both: over a window `w` and an idle
+/// time `i` the difference of the counts scatters by `sqrt(expected (1 + w / i))`. `None` without idle time.
+fn idle_events(view: &PressView) -> Option<IdleEvents> {
+    if !(view.idle_s > 0.0 && view.rate_per_s > 0.0) {
+        return None;
+    }
+    let window_s = f64::from(view.events) / view.rate_per_s;
+    let expected = view.idle_rate_per_s * window_s;
+    let standard_error = (expected * (1.0 + window_s / view.idle_s)).sqrt();
+    Some(IdleEvents {
+        expected,
+        standard_error,
+    })
 }
 
 /// The rule that leaves a valid press out because of where its rays meet, if any.
@@ -173,6 +204,7 @@ mod tests {
             peak_force_n: None,
             scheduled: false,
         };
+        // A window of 0.5 s after 0.5 s of idle time with 10 events.
         let view = |events: u32| {
             Some(PressView {
                 events,
@@ -181,8 +213,8 @@ mod tests {
                 cluster_events: events,
                 centroid_u: Some(320.0),
                 centroid_v: Some(270.0),
-                rate_per_s: 1.0,
-                idle_rate_per_s: 1.0,
+                rate_per_s: f64::from(events) / 0.5,
+                idle_rate_per_s: 20.0,
                 idle_s: 0.5,
             })
         };
@@ -197,9 +229,16 @@ mod tests {
                 &settings,
             )
         };
-        assert_eq!(judge(PressRole::Score, 20, 20), PressVerdict::Valid);
+        // 10 expected, standard error sqrt(20): the rule needs 32.4.
+        assert_eq!(judge(PressRole::Score, 33, 33), PressVerdict::Valid);
         assert_eq!(
-            judge(PressRole::Calibrate, 20, 19),
+            judge(PressRole::Score, 33, 32),
+            PressVerdict::Excluded(
+                "no response: 32 events, 10 ± 4 expected at the idle rate (camera 2)".to_owned()
+            )
+        );
+        assert_eq!(
+            judge(PressRole::Calibrate, 33, 19),
             PressVerdict::Excluded("too few cluster events: 19 < 20 (camera 2)".to_owned())
         );
         assert_eq!(judge(PressRole::Sync, 0, 0), PressVerdict::Valid);

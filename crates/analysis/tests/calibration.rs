@@ -170,7 +170,7 @@ fn no_press_calibrates_and_scores() {
     rows[5].verdict = "missed".to_owned();
     rows[8].verdict = "excluded".to_owned();
     let calibration = CalibrationSet::from_presses(&rows);
-    let score = ScoreSet::from_presses(&rows);
+    let score = ScoreSet::from_presses(&rows, &[]);
     let of = |role: PressRole| rows.iter().filter(|r| r.role == role).count();
     assert_eq!(calibration.sights().len(), of(PressRole::Calibrate) - 2);
     assert_eq!(

@@ -32,7 +32,7 @@ fn row(location: u32, error: Option<(f64, f64)>, verdict: &str) -> PressResult {
 
 fn measure(rows: &[PressResult], exclusions: Exclusions) -> Metrics {
     metrics(
-        &ScoreSet::from_presses(rows),
+        &ScoreSet::from_presses(rows, &[]),
         exclusions,
         &SkinOutline::PAPER,
         500,

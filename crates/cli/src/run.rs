@@ -5,7 +5,10 @@ use std::path::{Path, PathBuf};
 use chrono::Utc;
 use skinrig_controller::{ControlHandle, RunReport, execute};
 use skinrig_device::Rig;
-use skinrig_model::{AnalysisSettings, CameraId, HostDuration, RunEnd, RunHeader, SimLevel};
+use skinrig_model::{
+    AnalysisSettings, CameraId, HostDuration, PressOutcome, PressVerdict, RunEnd, RunHeader,
+    SimLevel,
+};
 use skinrig_protocol::Plan;
 use skinrig_recorder::{SessionReader, SessionWriter};
 
@@ -14,7 +17,7 @@ use crate::check;
 use crate::exit::{Exit, Failure, Outcome};
 use crate::progress::ProgressView;
 use crate::results::{self, RigDocument};
-use crate::sink::SessionSink;
+use crate::sink::{Foreknowledge, SessionSink};
 use crate::{paths, rig, signals};
 
 /// What is to be recorded, before the rig adds what it knows.
@@ -41,6 +44,8 @@ pub struct Intent<'a> {
     pub command_line: &'a str,
     /// Rig time that the plan should take.
     pub expected: HostDuration,
+    /// What is known of the presses beforehand.
+    pub known: Foreknowledge,
 }
 
 /// Records `plan` on `rig` into a new session in `folder`.
@@ -58,8 +63,7 @@ pub fn record(
     let path = paths::new_session(folder, started, intent.name, intent.prototype)?;
     let writer = SessionWriter::create(&path).map_err(Failure::internal)?;
     let view = ProgressView::new(plan.presses.len(), intent.expected);
-    let scheduled = rig.kind == "imported";
-    let mut sink = SessionSink::new(writer, view, scheduled);
+    let mut sink = SessionSink::new(writer, view, intent.known.clone());
 
     let control = ControlHandle::new();
     let operator = control.clone();
@@ -215,6 +219,7 @@ fn fresh(
         analysis: &protocol.analysis,
         command_line,
         expected: HostDuration::from_secs_f64(summary.duration_s),
+        known: Foreknowledge::default(),
     };
     record(&intent, &plan, rig, &args.sessions)
 }
@@ -256,7 +261,21 @@ fn replay(
         analysis: &document.analysis,
         command_line,
         expected,
+        known: foreknowledge(&reader.last_outcomes().map_err(Failure::input)?),
     };
     let rig = rig::replayed(recording, &header, &document)?;
     record(&intent, &plan, rig, folder)
+}
+
+/// What the recording says about its presses that no device can: schedule and exclusions.
+fn foreknowledge(outcomes: &[Option<PressOutcome>]) -> Foreknowledge {
+    let outcomes = || outcomes.iter().flatten();
+    let excluded = outcomes().filter_map(|o| match &o.verdict {
+        PressVerdict::Excluded(rule) => Some((o.attempt.press, rule.clone())),
+        _ => None,
+    });
+    Foreknowledge {
+        scheduled: outcomes().any(|o| o.scheduled),
+        excluded: excluded.collect(),
+    }
 }

@@ -1,26 +1,37 @@
 //! The consumer of a run's records: the session file first, then the terminal.
 
+use std::collections::BTreeMap;
+
 use skinrig_controller::{RecordSink, SinkFault};
-use skinrig_model::Record;
+use skinrig_model::{PressId, PressVerdict, Record};
 use skinrig_recorder::{RecorderError, Sealed, SessionWriter};
 
 use crate::progress::ProgressView;
+
+/// What the rig cannot know about its presses, but an import or the replay of one can.
+#[derive(Debug, Clone, Default)]
+pub struct Foreknowledge {
+    /// Times and positions come from a schedule; nothing was measured.
+    pub scheduled: bool,
+    /// Presses that are left out, with the rule that says so.
+    pub excluded: BTreeMap<PressId, String>,
+}
 
 /// Writes every record to the session file and shows it.
 pub struct SessionSink {
     writer: SessionWriter,
     view: ProgressView,
-    scheduled: bool,
+    known: Foreknowledge,
 }
 
 impl SessionSink {
-    /// A sink over a new session. `scheduled` marks every outcome as taken from a schedule, not measured.
+    /// A sink over a new session.
     #[must_use]
-    pub const fn new(writer: SessionWriter, view: ProgressView, scheduled: bool) -> Self {
+    pub const fn new(writer: SessionWriter, view: ProgressView, known: Foreknowledge) -> Self {
         Self {
             writer,
             view,
-            scheduled,
+            known,
         }
     }
 
@@ -36,8 +47,12 @@ impl SessionSink {
 
 impl RecordSink for SessionSink {
     fn accept(&mut self, mut record: Record) -> Result<(), SinkFault> {
-        if let (true, Record::Outcome(outcome)) = (self.scheduled, &mut record) {
-            outcome.scheduled = true;
+        if let Record::Outcome(outcome) = &mut record {
+            outcome.scheduled |= self.known.scheduled;
+            let rule = self.known.excluded.get(&outcome.attempt.press);
+            if let (PressVerdict::Valid, Some(rule)) = (&outcome.verdict, rule) {
+                outcome.verdict = PressVerdict::Excluded(rule.clone());
+            }
         }
         self.view.update(&record);
         self.writer

@@ -48,6 +48,9 @@ pub struct AnalysisSettings {
     pub centroid: CentroidRule,
     /// A press with fewer clustered events than this in either camera is excluded (0 = rule off).
     pub min_cluster_events: u32,
+    /// A press whose events in the window are fewer than the idle rate predicts plus this many standard errors, in
+    /// either camera, is excluded: the camera did not see it (0 = rule off).
+    pub min_response_sigma: f64,
     /// A press whose rays meet at less than this sine is excluded as nearly parallel.
     pub min_ray_sine: f64,
     /// Leave estimates outside the skin's outline out of the headline metrics (they are always counted).
@@ -72,6 +75,7 @@ impl Default for AnalysisSettings {
             min_samples: 10,
             centroid: CentroidRule::LargestCluster,
             min_cluster_events: 20,
+            min_response_sigma: 5.0,
             min_ray_sine: 0.05,
             exclude_outside: true,
             calibration: CalibrationModel::Full,

@@ -187,11 +187,19 @@ impl Schedule {
         }
     }
 
+    /// Whether the press is one of those that the schedule uses; sync presses always are.
+    #[must_use]
+    pub fn is_used(&self, press: &PlannedPress) -> bool {
+        press.role == PressRole::Sync || press.location < self.presses_used
+    }
+
     /// Every planned press in order, sync presses first, with its press time. `positions` are the rows of the CSV
     /// in mm, skin frame. Time 0 is the moment at which the first press's downward motion begins.
     ///
     /// Press `i` of repetition `r` comes at `first + r * (presses_per_repetition * period + pause) + i * period`
     /// (times of the published recording: public code); `first` is `sync.pause_after` after the last sync press.
+    /// Presses that are recorded but not used are planned too (see [`Schedule::is_used`]): they are in the
+    /// recording, and the clock alignment needs them.
     ///
     /// # Errors
     /// [`PositionCount`] when the number of positions is not `presses_per_repetition`.
@@ -231,8 +239,7 @@ impl Schedule {
         let repetition_s =
             f64::from(self.presses_per_repetition) * self.period_s + self.pause_between_s;
         for repetition in 0..self.roles.repetitions() {
-            let used = positions.iter().take(self.presses_used as usize);
-            for (location, at) in (0u32..).zip(used) {
+            for (location, at) in (0u32..).zip(positions) {
                 let time = first
                     + f64::from(repetition) * repetition_s
                     + f64::from(location) * self.period_s;

@@ -8,7 +8,7 @@
 //!    of the mean press is put at the measured contacts.
 //! 4. The result is compared with its neighbours one, two, ... whole press periods away over the whole session:
 //!    those expect presses where the recording is quiet, or leave presses unexplained. A press that is where it is
-//!    expected counts +1, one that is not -1, one outside the recording 0. Half the distance to the next best is
+//!    expected, at least half as strong as the median, counts +1, one that is not -1, one outside the recording 0. Half the distance to the next best is
 //!    the margin, in presses; a better neighbour is taken instead.
 
 use super::correlate::Correlator;
@@ -302,7 +302,7 @@ fn best_shift(activity: &Activity, presses: &[PressSpan], map: Map, period: f64)
         let found = rises(activity, presses, moved);
         found
             .iter()
-            .map(|r| (2.0 * r / unit - 1.0).clamp(-1.0, 1.0))
+            .map(|r| (4.0 * r / unit - 1.0).clamp(-1.0, 1.0))
             .sum()
     };
     // Within a period the score may prefer another instant than the onset: the same for all shifts.

@@ -17,8 +17,8 @@ use skinrig_sim::SimClock;
 
 /// A chunk is closed at this size, bytes.
 const CHUNK_BYTES: usize = 1 << 20;
-/// Or when it spans this much camera time, µs.
-const CHUNK_SPAN_US: u64 = 1_000_000;
+/// Or when it spans this much camera time, µs: less than any press takes, so that each press sees bytes arrive.
+const CHUNK_SPAN_US: u64 = 400_000;
 /// Chunks that may wait between the reading thread and the run.
 const QUEUE: usize = 4;
 /// Time words of encoded streams come this often, µs: the sparsest that EVT2 allows, because a container without
@@ -55,7 +55,7 @@ impl ChunkFeed {
                 }
                 self.chunk_from_us = first;
             }
-            // Idle stretches are closed second by second, so that no chunk spans hours.
+            // Idle stretches are closed piece by piece, so that no chunk spans hours.
             while event.t_us - self.chunk_from_us >= CHUNK_SPAN_US {
                 let end = self.chunk_from_us + CHUNK_SPAN_US;
                 if let Some(Err(e)) = self

@@ -22,6 +22,7 @@ use skinrig_sim::SimClock;
 use crate::args::ImportArgs;
 use crate::exit::{Failure, Outcome};
 use crate::run::{Intent, conclude, record};
+use crate::sink::Foreknowledge;
 use camera::{ChunkFeed, FileCamera};
 use indenter::ScheduledIndenter;
 
@@ -37,6 +38,15 @@ pub fn import(args: &ImportArgs, command_line: &str, json: bool) -> Outcome {
         .map_err(|found| Failure::input(format!("in the schedule\n{found}")))?;
     let positions = read_positions(&args.presses, &schedule)?;
     let (presses, times) = schedule.planned(&positions).map_err(Failure::input)?;
+    let unused = format!("not used: presses_used is {}", schedule.presses_used);
+    let excluded = presses
+        .iter()
+        .filter(|p| !schedule.is_used(p))
+        .map(|p| (p.id, unused.clone()));
+    let known = Foreknowledge {
+        scheduled: true,
+        excluded: excluded.collect(),
+    };
     let plan = plan::compile(&schedule, presses, &times);
 
     let clock = SimClock::new();
@@ -79,6 +89,7 @@ pub fn import(args: &ImportArgs, command_line: &str, json: bool) -> Outcome {
         analysis: &schedule.analysis,
         command_line,
         expected: HostDuration(last),
+        known,
     };
     let (session, report) = record(&intent, &plan, rig, &args.sessions)?;
     conclude(&session, &report, args.no_analysis, None, json)

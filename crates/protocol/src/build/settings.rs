@@ -42,6 +42,7 @@ pub(crate) fn analysis(f: &Field, out: &mut Collector) -> Option<AnalysisSetting
             _ => CentroidRule::LargestCluster,
         },
         min_cluster_events: f.count("min_cluster_events")?,
+        min_response_sigma: f.number("min_response_sigma")?,
         min_ray_sine: f.number("min_ray_sine")?,
         exclude_outside: f.flag("exclude_outside")?,
         calibration: match f.word("calibration")? {

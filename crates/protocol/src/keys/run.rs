@@ -206,6 +206,12 @@ pub(crate) static ANALYSIS: Table = Table {
             "A press with fewer clustered events than this in either camera is excluded; 0 turns the rule off.",
         ),
         default(
+            "min_response_sigma",
+            Shape::Number(Range::from_zero(1000.0)),
+            "5",
+            "A press with fewer events than the idle rate predicts plus this many standard errors, in either camera, is excluded; 0 turns the rule off.",
+        ),
+        default(
             "min_ray_sine",
             Shape::Number(Range::from_zero(1.0)),
             "0.05",

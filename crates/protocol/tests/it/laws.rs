@@ -25,6 +25,7 @@ fn absent_settings_are_the_documented_defaults() {
         "analysis.min_samples=4",
         "analysis.centroid=all_clusters",
         "analysis.min_cluster_events=0",
+        "analysis.min_response_sigma=3.5",
         "analysis.min_ray_sine=0.1",
         "analysis.exclude_outside=false",
         "analysis.calibration=positions_skews",

@@ -19,7 +19,9 @@ fn times_of_the_published_recording() {
     let schedule = schedule("paper-recording.schedule.yaml", &[]);
     let positions: Vec<Point2> = (0..289).map(|k| Point2::new(f64::from(k), 0.0)).collect();
     let (planned, times) = schedule.planned(&positions).unwrap();
-    assert_eq!(planned.len(), 3 + 2500);
+    assert_eq!(planned.len(), 3 + 2890);
+    let used = planned.iter().filter(|p| schedule.is_used(p)).count();
+    assert_eq!(used, 3 + 2500);
     // The first downward motion begins at 0; sync presses 1 s apart; the path 3 s after the last.
     assert_eq!(ns(times[0]), 450_000_000);
     assert_eq!(ns(times[2]) - ns(times[0]), 2_000_000_000);
@@ -27,9 +29,9 @@ fn times_of_the_published_recording() {
     assert_eq!(schedule.phases.at(times[0]).approach, HostTime::ZERO);
     // 17 periods are 868 / 17 s; a repetition takes 868 s and pauses 3 s, whatever part of it is used.
     assert_eq!(ns(times[3 + 17]) - ns(times[3]), 51_058_823_529);
-    assert_eq!(ns(times[3 + 250]) - ns(times[3]), 871_000_000_000);
-    assert_eq!(ns(times[3 + 9 * 250]) - ns(times[3]), 9 * 871_000_000_000);
-    let press = planned[3 + 250];
+    assert_eq!(ns(times[3 + 289]) - ns(times[3]), 871_000_000_000);
+    assert_eq!(ns(times[3 + 9 * 289]) - ns(times[3]), 9 * 871_000_000_000);
+    let press = planned[3 + 289];
     assert_eq!(
         (press.repetition, press.location, press.role),
         (1, 0, PressRole::Score)
@@ -66,7 +68,7 @@ fn alternating_presses_never_do_both() {
     let roles: Vec<PressRole> = planned[3..7].iter().map(|p| p.role).collect();
     use PressRole::{Calibrate, Score};
     assert_eq!(roles, [Score, Calibrate, Score, Calibrate]);
-    assert_eq!(planned.iter().filter(|p| p.role == Calibrate).count(), 125);
+    assert_eq!(planned.iter().filter(|p| p.role == Calibrate).count(), 144);
 }
 
 #[test]
