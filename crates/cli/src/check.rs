@@ -63,8 +63,8 @@ pub fn check(args: &ProtocolArgs, json: bool) -> Outcome {
             "plan_sha256": checked.plan.digest(), "summary": summary,
         }));
     } else {
-        println!("{}: ok", args.protocol.display());
-        println!("{summary}");
+        outln!("{}: ok", args.protocol.display());
+        outln!("{summary}");
     }
     Ok(Exit::Ok)
 }
@@ -91,15 +91,15 @@ pub fn plan(args: &PlanArgs, json: bool) -> Outcome {
         }));
         return Ok(Exit::Ok);
     }
-    println!("{summary}");
+    outln!("{summary}");
     if args.steps {
         for (number, step) in checked.plan.steps.iter().enumerate() {
-            println!("{number:>6}  {}", describe_step(step));
+            outln!("{number:>6}  {}", describe_step(step));
         }
     }
-    println!("digest    {}", checked.plan.digest());
+    outln!("digest    {}", checked.plan.digest());
     if let Some(file) = &args.svg {
-        println!("drawn in  {}", file.display());
+        outln!("drawn in  {}", file.display());
     }
     Ok(Exit::Ok)
 }

@@ -60,7 +60,7 @@ pub fn export(args: &ExportArgs, json: bool) -> Outcome {
         crate::print_json(&serde_json::json!({ "written": written }));
     } else {
         for path in &written {
-            println!("{}", path.display());
+            outln!("{}", path.display());
         }
     }
     Ok(Exit::Ok)

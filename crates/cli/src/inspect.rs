@@ -142,15 +142,15 @@ fn document(path: &Path, found: &Inspection) -> Value {
 }
 
 fn print(path: &Path, found: &Inspection, gap_ms: f64) {
-    println!("{}: {}", path.display(), kind_name(found.kind));
+    outln!("{}: {}", path.display(), kind_name(found.kind));
     for (key, value) in &found.header {
-        println!("  {key:<24} {value}");
+        outln!("  {key:<24} {value}");
     }
     if let Some(g) = found.geometry {
-        println!("  {:<24} {} x {}", "sensor", g.width, g.height);
+        outln!("  {:<24} {} x {}", "sensor", g.width, g.height);
     }
     for stream in &found.streams {
-        println!(
+        outln!(
             "{}",
             if stream.name.is_empty() {
                 "events"
@@ -159,26 +159,26 @@ fn print(path: &Path, found: &Inspection, gap_ms: f64) {
             }
         );
         for (name, n) in counts(&stream.stats) {
-            println!("  {n:>14}  {name}");
+            outln!("  {n:>14}  {name}");
         }
         match (stream.first_us, stream.last_us, stream.span_s()) {
             (Some(first), Some(last), Some(span)) => {
-                println!("  {first} to {last} µs on the camera's clock: {span:.6} s");
+                outln!("  {first} to {last} µs on the camera's clock: {span:.6} s");
             }
             (Some(first), Some(last), None) => {
-                println!("  {first} to {last} µs on the camera's clock: time runs backwards");
+                outln!("  {first} to {last} µs on the camera's clock: time runs backwards");
             }
-            _ => println!("  no time"),
+            _ => outln!("  no time"),
         }
         if let Some(offset) = stream.ts_offset_s {
-            println!("  tsOffset {offset} s (camera time = ts - tsOffset)");
+            outln!("  tsOffset {offset} s (camera time = ts - tsOffset)");
         }
         if let Some(rate) = stream.mean_rate_hz() {
-            println!("  {:.1} kev/s on average", rate / 1e3);
+            outln!("  {:.1} kev/s on average", rate / 1e3);
         }
-        println!("  {} silence(s) longer than {gap_ms} ms", stream.gap_count);
+        outln!("  {} silence(s) longer than {gap_ms} ms", stream.gap_count);
         for g in stream.gaps.iter().take(10) {
-            println!(
+            outln!(
                 "    {} to {} µs: {:.3} s",
                 g.from_us,
                 g.to_us,
@@ -186,7 +186,7 @@ fn print(path: &Path, found: &Inspection, gap_ms: f64) {
             );
         }
         for d in stream.discontinuities.iter().take(10) {
-            println!("    time base steps from {} to {} µs", d.from_us, d.to_us);
+            outln!("    time base steps from {} to {} µs", d.from_us, d.to_us);
         }
     }
 }

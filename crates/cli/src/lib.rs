@@ -1,11 +1,8 @@
 //! The `skinrig` command line: arguments, wiring of the crates, terminal output, exit codes.
 //!
 //! The binary is a thin shell over [`main_with`]; whole-system tests use the same modules.
-#![expect(
-    clippy::print_stdout,
-    clippy::print_stderr,
-    reason = "this crate owns the terminal"
-)]
+#[macro_use]
+pub mod terminal;
 
 pub mod args;
 pub mod check;
@@ -52,9 +49,13 @@ pub fn main_with(arguments: impl IntoIterator<Item = OsString>) -> Exit {
         }
     };
     match dispatch(&cli, &arguments) {
+        Ok(_) if terminal::output_failed() => {
+            errln!("error: cannot write to standard output: is the disk full?");
+            Exit::Internal
+        }
         Ok(exit) => exit,
         Err(failure) => {
-            eprintln!("error: {}", failure.message);
+            errln!("error: {}", failure.message);
             failure.exit
         }
     }
@@ -91,7 +92,7 @@ fn command_line(arguments: &[OsString]) -> String {
 /// Prints a JSON value for programs, and its end of line.
 pub(crate) fn print_json(value: &serde_json::Value) {
     // Pretty printing of a `Value` cannot fail.
-    println!(
+    outln!(
         "{}",
         serde_json::to_string_pretty(value).unwrap_or_default()
     );

@@ -72,7 +72,7 @@ impl ProgressView {
                 let reached = done * 10 / planned;
                 if reached > *tenths {
                     *tenths = reached;
-                    eprintln!("{}", line(&self.tracker));
+                    errln!("{}", line(&self.tracker));
                 }
             }
         }

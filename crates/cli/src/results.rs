@@ -174,13 +174,11 @@ pub fn print_results(results: &Results, json: bool, paths: &(PathBuf, PathBuf)) 
         crate::print_json(&document);
     } else {
         let color = std::io::stdout().is_terminal();
-        print!(
-            "{}",
-            skinrig_report::terminal_table(&results.report_input(), color)
-        );
-        println!("\nsession  {}", results.session.display());
-        println!("results  {}", paths.0.display());
-        println!("report   {}", paths.1.display());
+        let table = skinrig_report::terminal_table(&results.report_input(), color);
+        crate::terminal::out(format_args!("{table}"));
+        outln!("\nsession  {}", results.session.display());
+        outln!("results  {}", paths.0.display());
+        outln!("report   {}", paths.1.display());
     }
 }
 
@@ -225,7 +223,7 @@ pub fn report(args: &ReportArgs, json: bool) -> Outcome {
     if json {
         crate::print_json(&serde_json::json!({ "report": paths.1, "results": paths.0 }));
     } else {
-        println!("{}", paths.1.display());
+        outln!("{}", paths.1.display());
     }
     Ok(Exit::Ok)
 }

@@ -69,11 +69,11 @@ pub fn record(
     let operator = control.clone();
     signals::on_ctrl_c(move |times| match times {
         1 => {
-            eprintln!("\nstopping after this press; ctrl-C again retracts and stops now");
+            errln!("\nstopping after this press; ctrl-C again retracts and stops now");
             operator.stop();
         }
         2 => {
-            eprintln!("\nretracting and stopping now");
+            errln!("\nretracting and stopping now");
             operator.abort();
         }
         _ => std::process::exit(i32::from(Exit::Stopped as u8)),
@@ -82,10 +82,10 @@ pub fn record(
 
     let report = execute(plan, header, rig, &control, &mut sink);
     for problem in &report.problems {
-        eprintln!("warning: {problem}");
+        errln!("warning: {problem}");
     }
     if let Err(error) = sink.seal() {
-        eprintln!("warning: {error}");
+        errln!("warning: {error}");
     }
     Ok((path, report))
 }
@@ -166,8 +166,10 @@ pub fn conclude(
     json: bool,
 ) -> Outcome {
     let mut limit = Ok(Exit::Ok);
-    if no_analysis {
-        println!("{}", session.display());
+    if no_analysis && json {
+        crate::print_json(&serde_json::json!({ "files": { "session": session } }));
+    } else if no_analysis {
+        outln!("{}", session.display());
     } else {
         let results = results::analyze_session(session, &[])?;
         let written = results::write_results(&results, None, None)?;
@@ -178,7 +180,7 @@ pub fn conclude(
     match &report.end {
         RunEnd::Completed => limit,
         RunEnd::Stopped(reason) => {
-            eprintln!("stopped: {reason}; {kept}");
+            errln!("stopped: {reason}; {kept}");
             Ok(Exit::Stopped)
         }
         RunEnd::Faulted(reason) => Err(Failure::rig(format!("{reason}\n  {kept}"))),
@@ -203,8 +205,8 @@ fn fresh(
     plan.seed = seed;
     let summary = plan.summary();
     if !json {
-        println!("{summary}");
-        println!("rig       simulated ({level}), seed {seed}\n");
+        outln!("{summary}");
+        outln!("rig       simulated ({level}), seed {seed}\n");
     }
     let rig = rig::simulated(&protocol, level, seed, args.real_time);
     let intent = Intent {

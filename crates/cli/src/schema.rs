@@ -12,6 +12,6 @@ pub fn schema(args: &SchemaArgs) -> Outcome {
         SchemaKind::Protocol => skinrig_protocol::schema_json(),
         SchemaKind::Schedule => skinrig_protocol::schedule_schema_json(),
     };
-    print!("{schema}");
+    crate::terminal::out(format_args!("{schema}"));
     Ok(Exit::Ok)
 }

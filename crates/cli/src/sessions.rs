@@ -21,15 +21,20 @@ pub fn sessions(args: &SessionsArgs, json: bool) -> Outcome {
         return Ok(Exit::Ok);
     }
     if found.is_empty() {
-        println!("no sessions in {}", args.folder.display());
+        outln!("no sessions in {}", args.folder.display());
         return Ok(Exit::Ok);
     }
-    println!(
+    outln!(
         "{:<19}  {:<14}  {:<22}  {:<24}  {:>13}  {:>8}  file",
-        "started (UTC)", "prototype", "protocol", "rig", "valid/planned", "MB"
+        "started (UTC)",
+        "prototype",
+        "protocol",
+        "rig",
+        "valid/planned",
+        "MB"
     );
     for session in &found {
-        println!("{}", line(session));
+        outln!("{}", line(session));
     }
     Ok(Exit::Ok)
 }

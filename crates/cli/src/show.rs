@@ -109,7 +109,7 @@ fn press_rows(reader: &SessionReader) -> Result<Vec<serde_json::Value>, Recorder
 fn print(d: &serde_json::Value) {
     let text = |key: &str| d[key].as_str().unwrap_or("-").to_owned();
     let count = |v: &serde_json::Value| v.as_u64().unwrap_or(0);
-    println!(
+    outln!(
         "session    {}{}",
         text("id"),
         if d["sealed"] == true {
@@ -118,31 +118,31 @@ fn print(d: &serde_json::Value) {
             "  NOT SEALED"
         }
     );
-    println!("started    {}  by {}", text("started_at"), text("operator"));
-    println!("prototype  {}", text("prototype"));
-    println!(
+    outln!("started    {}  by {}", text("started_at"), text("operator"));
+    outln!("prototype  {}", text("prototype"));
+    outln!(
         "protocol   {}  sha256 {}",
         text("protocol"),
         text("protocol_sha256")
     );
     for o in d["overrides"].as_array().into_iter().flatten() {
-        println!("           --set {}", o.as_str().unwrap_or_default());
+        outln!("           --set {}", o.as_str().unwrap_or_default());
     }
-    println!("rig        {}  seed {}", text("rig"), d["seed"]);
-    println!("software   {} on {}", text("software"), text("host"));
+    outln!("rig        {}  seed {}", text("rig"), d["seed"]);
+    outln!("software   {} on {}", text("software"), text("host"));
     let duration = d["duration_s"].as_f64().map_or_else(
         || "-".into(),
         |s| clock_text(skinrig_model::HostDuration::from_secs_f64(s)),
     );
-    println!(
+    outln!(
         "end        {}  after {duration}",
         d["end"].as_str().unwrap_or("not ended")
     );
     if let Some(reason) = d["end_reason"].as_str() {
-        println!("           {reason}");
+        outln!("           {reason}");
     }
     let p = &d["totals"]["presses"];
-    println!(
+    outln!(
         "presses    {} planned = {} valid + {} missed + {} invalid + {} excluded; {} sync",
         p["planned"],
         p["valid"],
@@ -151,10 +151,10 @@ fn print(d: &serde_json::Value) {
         p["excluded"],
         d["totals"]["sync"]["planned"]
     );
-    println!("devices");
+    outln!("devices");
     for device in d["devices"].as_array().into_iter().flatten() {
         let s = |k: &str| device[k].as_str().unwrap_or("-").to_owned();
-        println!(
+        outln!(
             "  {:<12} {}  serial {}  firmware {}",
             s("role"),
             s("model"),
@@ -163,7 +163,7 @@ fn print(d: &serde_json::Value) {
         );
         for row in device["settings"].as_array().into_iter().flatten() {
             let cell = |i: usize| row[i].as_str().unwrap_or("-").to_owned();
-            println!(
+            outln!(
                 "    {:<24} asked {}  read back {}",
                 cell(0),
                 cell(1),
@@ -171,9 +171,9 @@ fn print(d: &serde_json::Value) {
             );
         }
     }
-    println!("streams");
+    outln!("streams");
     for c in d["cameras"].as_array().into_iter().flatten() {
-        println!(
+        outln!(
             "  camera {}  {}  {} events, {} trigger edges, {:.1} MB in {} chunks ({:.1} MB stored), {} bytes lost",
             c["camera"],
             c["format"].as_str().unwrap_or("-"),
@@ -186,7 +186,7 @@ fn print(d: &serde_json::Value) {
         );
     }
     for row in d["interruptions"].as_array().into_iter().flatten() {
-        println!(
+        outln!(
             "{:>9.3} s  {}: {}",
             row[0].as_f64().unwrap_or(0.0),
             row[1].as_str().unwrap_or(""),
@@ -194,16 +194,16 @@ fn print(d: &serde_json::Value) {
         );
     }
     for row in d["notes"].as_array().into_iter().flatten() {
-        println!(
+        outln!(
             "{:>9.3} s  note: {}",
             row[0].as_f64().unwrap_or(0.0),
             row[1].as_str().unwrap_or("")
         );
     }
     if let Some(rows) = d["presses"].as_array() {
-        println!("\n press  role       rep  loc      x      y  depth  verdict");
+        outln!("\n press  role       rep  loc      x      y  depth  verdict");
         for r in rows {
-            println!(
+            outln!(
                 "{:>6}  {:<9} {:>4} {:>4} {:>6.1} {:>6.1} {:>6.2}  {}{}",
                 r["press"],
                 r["role"].as_str().unwrap_or("-"),
@@ -221,6 +221,6 @@ fn print(d: &serde_json::Value) {
         }
     }
     if let Some(protocol) = d["protocol_text"].as_str() {
-        println!("\n{protocol}");
+        outln!("\n{protocol}");
     }
 }

@@ -21,13 +21,13 @@ pub fn verify(args: &SessionArg, json: bool) -> Outcome {
         }));
     } else {
         for problem in &report.problems {
-            println!("{name}: {problem}");
+            outln!("{name}: {problem}");
         }
         if report.more_problems > 0 {
-            println!("{name}: and {} more", report.more_problems);
+            outln!("{name}: and {} more", report.more_problems);
         }
         if let (true, Some(t)) = (report.is_sound(), report.totals) {
-            println!(
+            outln!(
                 "{name}: sound{}; {} presses, {} events, {} chunks, {:.1} MB of camera bytes, {} pose samples",
                 if report.sealed {
                     ", sealed"

@@ -69,7 +69,7 @@ pub fn import(args: &ImportArgs, command_line: &str, json: bool) -> Outcome {
     };
     let last = times.last().map_or(0, |t| t.0);
     if !json {
-        println!(
+        outln!(
             "import  {} presses by schedule, {:.0} s: {} and {}",
             plan.presses.len(),
             last as f64 * 1e-9,
@@ -110,7 +110,7 @@ fn read_positions(path: &Path, schedule: &Schedule) -> Result<Vec<Point2>, Failu
                 table.blank_lines
             )));
         }
-        eprintln!(
+        errln!(
             "note: {}: blank line(s) {:?} are no presses",
             path.display(),
             table.blank_lines
