@@ -61,9 +61,7 @@ fn impossible_random_locations_are_an_error() {
 
 #[test]
 fn depths_run_the_path_once_each() {
-    let text = shipped("demo.yaml")
-        .replace("depth: 2 mm", "depths: [2 mm, 1 mm]")
-        .replace("period: 1.5 s", "period: 3 s");
+    let text = shipped("demo.yaml").replace("depth: 2 mm", "depths: [2 mm, 1 mm]");
     let plan = parse(&text, &[]).unwrap().compile();
     let first: Vec<_> = plan
         .presses
