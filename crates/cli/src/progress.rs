@@ -69,7 +69,9 @@ impl ProgressView {
             }
             Display::Lines { tenths } => {
                 let planned = self.tracker.progress().planned.max(1);
-                let reached = done * 10 / planned;
+                // Presses that are given up at the end are no progress.
+                let made = done - self.tracker.progress().missed;
+                let reached = made * 10 / planned;
                 if reached > *tenths {
                     *tenths = reached;
                     errln!("{}", line(&self.tracker));

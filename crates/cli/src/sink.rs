@@ -54,9 +54,20 @@ impl RecordSink for SessionSink {
                 outcome.verdict = PressVerdict::Excluded(rule.clone());
             }
         }
-        self.view.update(&record);
+        // What is shown as done is on the disk. Bulk data, whose copy would cost, are only counted.
+        let shown = match &record {
+            Record::Chunk(_) | Record::Poses(_) => {
+                self.view.update(&record);
+                None
+            }
+            other => Some(other.clone()),
+        };
         self.writer
             .accept(record)
-            .map_err(|e| SinkFault(e.to_string()))
+            .map_err(|e| SinkFault(e.to_string()))?;
+        if let Some(record) = shown {
+            self.view.update(&record);
+        }
+        Ok(())
     }
 }
