@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use chrono::Utc;
+use chrono::{DateTime, Utc};
 use skinrig_controller::{ControlHandle, RunReport, execute};
 use skinrig_device::Rig;
 use skinrig_model::{
@@ -10,7 +10,7 @@ use skinrig_model::{
     SimLevel,
 };
 use skinrig_protocol::Plan;
-use skinrig_recorder::{SessionReader, SessionWriter};
+use skinrig_recorder::{RecorderError, SessionReader, SessionWriter};
 
 use crate::args::RunArgs;
 use crate::check;
@@ -60,8 +60,7 @@ pub fn record(
 ) -> Result<(PathBuf, RunReport), Failure> {
     let started = Utc::now();
     let header = header(intent, plan, &rig, &started.to_rfc3339())?;
-    let path = paths::new_session(folder, started, intent.name, intent.prototype)?;
-    let writer = SessionWriter::create(&path).map_err(Failure::internal)?;
+    let (path, writer) = new_session(intent, started, folder)?;
     let view = ProgressView::new(plan.presses.len(), intent.expected);
     let mut sink = SessionSink::new(writer, view, intent.known.clone());
 
@@ -80,14 +79,47 @@ pub fn record(
     })
     .map_err(Failure::internal)?;
 
-    let report = execute(plan, header, rig, &control, &mut sink);
-    for problem in &report.problems {
-        errln!("warning: {problem}");
-    }
+    let mut report = execute(plan, header, rig, &control, &mut sink);
     if let Err(error) = sink.seal() {
-        errln!("warning: {error}");
+        let error = error.to_string();
+        match &report.end {
+            RunEnd::Completed => report.end = RunEnd::Faulted(format!("recorder: {error}")),
+            RunEnd::Faulted(reason) if reason.contains(&error) => {}
+            _ => report.problems.push(error),
+        }
+    }
+    for problem in &report.problems {
+        if !matches!(&report.end, RunEnd::Faulted(reason) if reason == problem) {
+            errln!("warning: {problem}");
+        }
     }
     Ok((path, report))
+}
+
+/// A new session file under a name that nobody else took meanwhile.
+fn new_session(
+    intent: &Intent<'_>,
+    started: DateTime<Utc>,
+    folder: &Path,
+) -> Result<(PathBuf, SessionWriter), Failure> {
+    loop {
+        let path = paths::new_session(folder, started, intent.name, intent.prototype)?;
+        match SessionWriter::create(&path) {
+            Ok(writer) => return Ok((path, writer)),
+            Err(RecorderError::Exists { .. }) => {}
+            Err(error) => {
+                // A session without so much as a header is no session: nothing is lost with it.
+                for ending in ["", "-wal", "-shm"] {
+                    let mut file = path.clone().into_os_string();
+                    file.push(ending);
+                    let _ = std::fs::remove_file(file);
+                }
+                return Err(Failure::internal(format!(
+                    "{error}\n  next: free space there, or choose another folder with --sessions"
+                )));
+            }
+        }
+    }
 }
 
 fn header(
@@ -183,7 +215,10 @@ pub fn conclude(
             errln!("stopped: {reason}; {kept}");
             Ok(Exit::Stopped)
         }
-        RunEnd::Faulted(reason) => Err(Failure::rig(format!("{reason}\n  {kept}"))),
+        RunEnd::Faulted(reason) => Err(Failure::rig(format!(
+            "{reason}\n  {kept}\n  next: put right what is named above (device, cable, file, disk space) and run \
+             again; `skinrig show` lists what was kept"
+        ))),
     }
 }
 
