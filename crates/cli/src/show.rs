@@ -205,10 +205,10 @@ fn print(d: &serde_json::Value) {
         for r in rows {
             outln!(
                 "{:>6}  {:<9} {:>4} {:>4} {:>6.1} {:>6.1} {:>6.2}  {}{}",
-                r["press"],
+                count(&r["press"]),
                 r["role"].as_str().unwrap_or("-"),
-                r["repetition"],
-                r["location"],
+                count(&r["repetition"]),
+                count(&r["location"]),
                 r["x_mm"].as_f64().unwrap_or(f64::NAN),
                 r["y_mm"].as_f64().unwrap_or(f64::NAN),
                 r["depth_mm"].as_f64().unwrap_or(f64::NAN),
