@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
+use skinrig_formats::Decoder;
 use skinrig_formats::hdf5::EventWriter;
 use skinrig_formats::raw::{RawMetadata, RawWriter};
-use skinrig_formats::{Decoder, FormatsError};
 use skinrig_model::{CameraId, DeviceRole, HostTime, PoseSample, RunHeader};
 use skinrig_recorder::SessionReader;
 
@@ -66,7 +66,7 @@ pub fn export(args: &ExportArgs, json: bool) -> Outcome {
     Ok(Exit::Ok)
 }
 
-fn failed(path: &Path) -> impl Fn(FormatsError) -> Failure + '_ {
+fn failed<E: std::fmt::Display>(path: &Path) -> impl Fn(E) -> Failure + '_ {
     move |e| {
         Failure::internal(format!(
             "{}: {e}\n  next: move an older export away, or choose another folder with --out",
@@ -152,7 +152,7 @@ fn hdf5(
 fn csv_file(path: &Path) -> Result<csv::Writer<std::fs::File>, Failure> {
     std::fs::File::create_new(path)
         .map(csv::Writer::from_writer)
-        .map_err(|e| Failure::internal(format!("{}: cannot make it: {e}", path.display())))
+        .map_err(failed(path))
 }
 
 fn seconds(t: Option<HostTime>) -> String {
