@@ -87,6 +87,14 @@ pub enum Command {
     Schema(SchemaArgs),
 }
 
+/// A limit that something can be above or below.
+fn limit_mm(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(mm) if mm > 0.0 && mm.is_finite() => Ok(mm),
+        _ => Err(format!("expected a number of mm above 0, found {text}")),
+    }
+}
+
 /// A protocol with overrides.
 #[derive(Debug, Args)]
 pub struct ProtocolArgs {
@@ -150,7 +158,7 @@ pub struct RunArgs {
     pub no_analysis: bool,
 
     /// Fail (exit code 4) when the scored RMSE is above this, in mm.
-    #[arg(long, value_name = "MM")]
+    #[arg(long, value_name = "MM", value_parser = limit_mm)]
     pub max_rmse: Option<f64>,
 }
 
@@ -203,7 +211,7 @@ pub struct AnalyzeArgs {
     pub out: Option<PathBuf>,
 
     /// Fail (exit code 4) when the scored RMSE is above this, in mm.
-    #[arg(long, value_name = "MM")]
+    #[arg(long, value_name = "MM", value_parser = limit_mm)]
     pub max_rmse: Option<f64>,
 }
 
