@@ -1,6 +1,6 @@
 //! `skinrig verify`.
 
-use skinrig_recorder::verify as recheck;
+use skinrig_recorder::{RecorderError, SessionReader, verify as recheck};
 
 use crate::args::SessionArg;
 use crate::exit::{Exit, Failure, Outcome};
@@ -11,6 +11,9 @@ use crate::source::Rescan;
 /// # Errors
 /// [`Failure::input`] for a file that is no session; [`Failure::limit`] when something does not match.
 pub fn verify(args: &SessionArg, json: bool) -> Outcome {
+    if let Err(e @ RecorderError::NotASession { .. }) = SessionReader::open(&args.session) {
+        return Err(Failure::input(e));
+    }
     let report = recheck(&args.session, &mut Rescan::default()).map_err(Failure::input)?;
     let name = args.session.display();
     if json {
@@ -21,6 +24,10 @@ pub fn verify(args: &SessionArg, json: bool) -> Outcome {
         }));
     } else {
         for problem in &report.problems {
+            // Some problems name the file themselves.
+            let problem = problem
+                .strip_prefix(&format!("{name}: "))
+                .unwrap_or(problem);
             outln!("{name}: {problem}");
         }
         if report.more_problems > 0 {
