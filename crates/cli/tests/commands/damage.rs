@@ -1,0 +1,109 @@
+//! Damaged session files are noticed, never trusted, and never make the program panic.
+
+use std::path::{Path, PathBuf};
+
+use crate::support::{Dice, Lab, text};
+use crate::support::{Said, skinrig};
+
+/// A small sealed session and its bytes.
+fn sealed(lab: &Lab) -> (PathBuf, Vec<u8>) {
+    let session = lab.record(
+        "s",
+        &[
+            "--set",
+            "path.points=[[10 mm, 2 mm], [-10 mm, 18 mm]]",
+            "--set",
+            "repetitions.count=1",
+            "--set",
+            "evaluation.score=[1]",
+        ],
+    );
+    let bytes = std::fs::read(&session).unwrap();
+    (session, bytes)
+}
+
+/// Lets every reading command read `file`: each must end with one of its codes, without a panic.
+fn read_by_all(lab: &Lab, file: &Path) -> Said {
+    let file = text(file);
+    let out = lab.text("other.json");
+    for arguments in [
+        vec!["show", &file, "--presses"],
+        vec!["analyze", &file, "--out", &out],
+    ] {
+        let said = skinrig(&arguments);
+        assert!(matches!(said.code, Some(0 | 2)), "{arguments:?}: {said:#?}");
+        assert!(!said.err.contains("panicked"), "{arguments:?}: {said:#?}");
+    }
+    skinrig(&["verify", &file])
+}
+
+#[test]
+fn flipped_bytes_are_found() {
+    let lab = Lab::new();
+    let (_, good) = sealed(&lab);
+    let file = lab.path("damaged.session.sqlite");
+    std::fs::write(&file, &good).unwrap();
+    skinrig(&["verify", &text(&file)]).code(0);
+    let mut dice = Dice(20);
+    for round in 0..24 {
+        let mut bytes = good.clone();
+        // Every third time in the first pages, where headers and small tables lie.
+        let reach = if round % 3 == 0 {
+            65_536
+        } else {
+            bytes.len() as u64
+        };
+        let at = dice.below(reach) as usize;
+        let flip = 1 + dice.below(255) as u8;
+        bytes[at] ^= flip;
+        std::fs::write(&file, &bytes).unwrap();
+        let said = read_by_all(&lab, &file);
+        assert!(
+            !said.err.contains("panicked"),
+            "byte {at} ^ {flip:#04x}: {said:#?}"
+        );
+        assert!(
+            matches!(said.code, Some(2 | 4)),
+            "byte {at} ^ {flip:#04x}: {said:#?}"
+        );
+        assert!(said.err.contains("damaged.session.sqlite"), "{said:#?}");
+    }
+}
+
+#[test]
+fn a_torn_session_is_found() {
+    let lab = Lab::new();
+    let (_, good) = sealed(&lab);
+    let file = lab.path("torn.session.sqlite");
+    for length in [0, 50, 100, 4_096, good.len() / 2, good.len() - 1] {
+        std::fs::write(&file, &good[..length]).unwrap();
+        let said = read_by_all(&lab, &file);
+        assert!(!said.err.contains("panicked"), "{length} bytes: {said:#?}");
+        assert!(
+            matches!(said.code, Some(2 | 4)),
+            "{length} bytes: {said:#?}"
+        );
+    }
+    // The list of a folder goes on past a broken file and names it.
+    let listed = skinrig(&["sessions", &text(lab.path("").as_path())])
+        .code(0)
+        .out;
+    assert!(listed.contains("torn.session.sqlite"), "{listed}");
+}
+
+#[test]
+fn a_changed_row_is_found_and_its_table_named() {
+    let lab = Lab::new();
+    let (_, good) = sealed(&lab);
+    // The operator's name, in the session's header row.
+    let at = good.windows(9).position(|w| w == b"test skin").unwrap();
+    let mut bytes = good;
+    bytes[at] = b'b';
+    let file = lab.path("forged.session.sqlite");
+    std::fs::write(&file, &bytes).unwrap();
+    let said = skinrig(&["verify", &text(&file)]).code(4);
+    assert!(said.out.contains("session"), "{said:#?}");
+    let json = skinrig(&["verify", "--json", &text(&file)]).code(4).json();
+    assert_eq!(json["sound"], false);
+    assert!(!json["problems"].as_array().unwrap().is_empty());
+}

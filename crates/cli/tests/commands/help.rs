@@ -1,0 +1,101 @@
+//! Help, bad command lines, shipped protocols.
+
+use crate::support::{ROOT, skinrig};
+
+const COMMANDS: [&str; 12] = [
+    "check", "plan", "run", "sessions", "show", "analyze", "report", "verify", "import", "export",
+    "inspect", "schema",
+];
+
+#[test]
+fn every_command_has_help_with_an_example() {
+    let all = skinrig(&["--help"]).code(0).out;
+    assert!(all.contains("Exit codes"), "{all}");
+    for name in COMMANDS {
+        assert!(all.contains(name), "{name} is missing from --help");
+        let help = skinrig(&[name, "--help"]).code(0).out;
+        assert!(
+            help.contains("Example") && help.contains(&format!("skinrig {name}")),
+            "{help}"
+        );
+    }
+}
+
+#[test]
+fn bad_input_ends_with_code_2_and_says_what_to_do() {
+    skinrig(&["no-such-command"]).code(2);
+    for (arguments, parts) in [
+        (
+            vec!["check", "no/such/file.yaml"],
+            vec!["no/such/file.yaml", "cannot read"],
+        ),
+        (
+            vec!["show", "no/such.session.sqlite"],
+            vec!["skinrig sessions"],
+        ),
+        (
+            vec!["analyze", "README.md"],
+            vec!["README.md", "expected a skinrig session"],
+        ),
+        (
+            vec!["report", "README.md"],
+            vec!["expected a skinrig session"],
+        ),
+        (
+            vec!["export", "README.md", "--to", "raw"],
+            vec!["expected a skinrig session"],
+        ),
+        (
+            vec!["verify", "Cargo.toml"],
+            vec!["Cargo.toml", "expected a skinrig session"],
+        ),
+        (
+            vec!["run", "--replay", "Cargo.toml"],
+            vec!["expected a skinrig session"],
+        ),
+        (vec!["inspect", "no/such.raw"], vec!["no/such.raw"]),
+        (vec!["inspect", "Cargo.toml"], vec!["Cargo.toml"]),
+        (vec!["inspect", "Cargo.toml", "--gap=-1"], vec!["--gap"]),
+        (vec!["sessions", "no/such/folder"], vec!["no/such/folder"]),
+        (vec!["run"], vec!["<PROTOCOL>", "--help"]),
+        (
+            vec!["run", "protocols/demo.yaml", "--level", "perfect"],
+            vec!["--level", "perfect", "geometric"],
+        ),
+    ] {
+        skinrig(&arguments)
+            .code(2)
+            .complains(&["error"])
+            .complains(&parts);
+    }
+}
+
+#[test]
+fn shipped_protocols_pass_their_own_check() {
+    let mut seen = 0;
+    for entry in std::fs::read_dir(format!("{ROOT}/protocols")).unwrap() {
+        let path = entry.unwrap().path();
+        let name = path.file_name().unwrap().to_string_lossy().into_owned();
+        if name.ends_with(".yaml") && !name.ends_with(".schedule.yaml") {
+            let said = skinrig(&["check", path.to_str().unwrap()]).code(0);
+            assert!(said.out.contains(": ok"), "{said:?}");
+            seen += 1;
+        }
+    }
+    assert!(seen >= 5, "expected the shipped protocols, found {seen}");
+}
+
+#[test]
+fn the_shipped_schemas_are_those_that_the_program_prints() {
+    for (kind, file) in [
+        ("protocol", "skinrig.schema.json"),
+        ("schedule", "skinrig-schedule.schema.json"),
+    ] {
+        let printed = skinrig(&["schema", kind]).code(0).json();
+        let shipped = std::fs::read_to_string(format!("{ROOT}/protocols/{file}")).unwrap();
+        assert_eq!(
+            serde_json::from_str::<serde_json::Value>(&shipped).unwrap(),
+            printed
+        );
+    }
+}

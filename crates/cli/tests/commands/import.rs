@@ -1,0 +1,178 @@
+//! Recordings made without skinrig become sessions.
+
+use std::path::Path;
+
+use skinrig_formats::Decoder;
+use skinrig_model::{CameraId, StreamFormat};
+
+use crate::dataset::{DRIFT_PPM, Dataset, OFFSET_US, PRESSES, events, positions};
+use crate::replay::assert_replays;
+/// The event rates are looked at in bins of 10 ms.
+const WITHIN_US: f64 = 25_000.0;
+
+use crate::support::{Lab, ROOT, chunks, only, read_json, show, skinrig, text};
+
+#[test]
+fn a_dataset_is_imported_its_clocks_aligned_and_its_presses_located() {
+    let lab = Lab::new();
+    let data = Dataset::new(&lab);
+    let said = skinrig(&data.arguments(&lab.path("s"))).code(0);
+    assert!(said.err.contains("blank line(s) [14]"), "{said:?}");
+
+    let session = only(&lab.path("s"), ".session.sqlite");
+    let results = read_json(&only(&lab.path("s"), ".results.json"));
+    let analysis = &results["analysis"];
+    // The middle of the recording, where offset and drift cannot make up for each other's error.
+    let middle_us = 12e6;
+    for (k, clock) in analysis["clocks"].as_array().unwrap().iter().enumerate() {
+        assert_eq!(clock["method"], "event_rates");
+        let at = |offset: f64, drift: f64| offset + middle_us * drift * 1e-6;
+        let found = at(
+            clock["offset_us"].as_f64().unwrap(),
+            clock["drift_ppm"].as_f64().unwrap(),
+        );
+        let planted = at(OFFSET_US[k], DRIFT_PPM[k]);
+        assert!(
+            (found - planted).abs() < WITHIN_US,
+            "clock {}: {found} {planted} µs",
+            k + 1
+        );
+    }
+    assert_eq!(analysis["counts"]["planned"], PRESSES);
+    assert_eq!(analysis["counts"]["valid"], PRESSES);
+    let presses = analysis["presses"].as_array().unwrap();
+    let located: Vec<_> = presses
+        .iter()
+        .filter(|p| p["role"] == "score")
+        .map(|p| &p["location_outcome"])
+        .collect();
+    for (outcome, at) in located.iter().zip(positions()) {
+        assert_eq!(outcome["status"], "located", "{at:?}");
+        let off = [("x_mm", at.x_mm), ("y_mm", at.y_mm)]
+            .map(|(key, wanted)| (outcome["at"][key].as_f64().unwrap() - wanted).abs());
+        assert!(off.iter().all(|d| *d < 1.0), "{at:?}: {outcome}");
+    }
+    assert_eq!(located.len(), PRESSES);
+
+    // Nothing was measured, and everything says so.
+    let shown = show(&session);
+    assert_eq!(shown["rig_kind"], "imported");
+    assert_eq!(shown["end"], "completed");
+    assert!(said.out.contains("not from a measurement"), "{said:?}");
+    // Every event of the files is in the session, in order.
+    for camera in CameraId::ALL {
+        let mut decoder = Decoder::new(StreamFormat::Evt2);
+        let mut stored = Vec::new();
+        for chunk in chunks(&session, camera) {
+            decoder.for_each_slice(&chunk, |e| stored.extend_from_slice(e));
+        }
+        assert!(stored == events(camera), "{camera}");
+    }
+    skinrig(&["verify", &text(&session)]).code(0);
+}
+
+#[test]
+fn an_imported_session_replays_and_reads_like_any_other() {
+    let lab = Lab::new();
+    let data = Dataset::new(&lab);
+    let mut arguments = data.arguments(&lab.path("s"));
+    arguments.push("--no-analysis".into());
+    skinrig(&arguments).code(0);
+    let session = only(&lab.path("s"), ".session.sqlite");
+    assert_replays(&lab, &session, "r");
+    skinrig(&[
+        "export",
+        &text(&session),
+        "--to",
+        "all",
+        "--out",
+        &lab.text("e"),
+    ])
+    .code(0);
+    skinrig(&["inspect", &text(&session)]).code(0);
+    skinrig(&[
+        "analyze",
+        &text(&session),
+        "--set",
+        "analysis.centroid=all_clusters",
+    ])
+    .code(0);
+}
+
+#[test]
+fn recordings_as_raw_files_are_imported_byte_for_byte() {
+    let lab = Lab::new();
+    let data = Dataset::new(&lab);
+    let mut arguments = data.arguments(&lab.path("s"));
+    arguments.push("--no-analysis".into());
+    skinrig(&arguments).code(0);
+    let first = only(&lab.path("s"), ".session.sqlite");
+    skinrig(&[
+        "export",
+        &text(&first),
+        "--to",
+        "raw",
+        "--out",
+        &lab.text("e"),
+    ])
+    .code(0);
+    let raw = Dataset {
+        cameras: [1, 2].map(|n| only(&lab.path("e"), &format!(".camera{n}.raw"))),
+        ..data
+    };
+    skinrig(&raw.arguments(&lab.path("t"))).code(0);
+    let second = only(&lab.path("t"), ".session.sqlite");
+    for camera in CameraId::ALL {
+        assert!(
+            chunks(&first, camera).concat() == chunks(&second, camera).concat(),
+            "{camera}"
+        );
+    }
+}
+
+/// Imports a sample of the published layout that lies beside the workspace; `None` when it is not there.
+fn sample(name: &str, schedule: &str) -> Option<(Lab, serde_json::Value)> {
+    let folder = format!("{ROOT}/../shared/data/{name}");
+    if !Path::new(&folder).exists() {
+        eprintln!("skipped: {folder} is not there");
+        return None;
+    }
+    let lab = Lab::new();
+    let file = |name: &str| format!("{folder}/{name}");
+    let said = skinrig(&[
+        "import",
+        "--camera1",
+        &file("grid_path2_v2_camera1.hdf5"),
+        "--camera2",
+        &file("grid_path2_v2_camera2.hdf5"),
+        "--presses",
+        &file("snake_grid_press_positions.csv"),
+        "--schedule",
+        &format!("protocols/{schedule}"),
+        "--sessions",
+        &lab.text("s"),
+    ])
+    .code(0);
+    assert!(said.out.contains("RMSE"), "{said:?}");
+    let results = read_json(&only(&lab.path("s"), ".results.json"));
+    skinrig(&["verify", &text(&only(&lab.path("s"), ".session.sqlite"))]).code(0);
+    Some((lab, results))
+}
+
+#[test]
+fn the_short_sample_is_imported() {
+    if let Some((_lab, results)) = sample("sample-dense", "ten-presses.schedule.yaml") {
+        assert_eq!(results["analysis"]["counts"]["planned"], 10);
+    }
+}
+
+#[test]
+fn the_sample_of_one_repetition_is_imported() {
+    if let Some((_lab, results)) = sample("sample-grid", "single-repetition.schedule.yaml") {
+        let counts = &results["analysis"]["counts"];
+        assert_eq!(counts["planned"], 289);
+        // The last 39 are recorded and not used.
+        assert!(counts["excluded"].as_u64().unwrap() >= 39, "{counts}");
+        assert_eq!(results["analysis"]["clocks"][0]["method"], "event_rates");
+    }
+}

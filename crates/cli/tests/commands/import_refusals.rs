@@ -1,0 +1,202 @@
+//! Files that are not what they should be are refused by name and row, and leave no session that claims to be whole.
+
+use std::path::Path;
+
+use crate::dataset::{Dataset, csv, events, positions};
+use crate::support::{Lab, Said, files, show, skinrig, text};
+use skinrig_model::CameraId;
+
+/// Runs the import and asserts its exit code, that it says all of `parts`, and that nothing looks completed.
+#[track_caller]
+fn refused(lab: &Lab, data: &Dataset, code: i32, parts: &[&str]) -> Said {
+    let folder = lab.path("s");
+    let said = skinrig(&data.arguments(&folder))
+        .code(code)
+        .complains(parts);
+    for session in files(&folder, ".session.sqlite") {
+        assert_ne!(show(&session)["end"], "completed", "{said:?}");
+    }
+    said
+}
+
+/// Replaces the only occurrence of `old` in a file by as many bytes.
+#[track_caller]
+fn patch(path: &Path, old: &[u8], new: &[u8]) {
+    let mut bytes = std::fs::read(path).unwrap();
+    let places: Vec<usize> = (0..=bytes.len() - old.len())
+        .filter(|k| bytes[*k..].starts_with(old))
+        .collect();
+    assert_eq!(
+        places.len(),
+        1,
+        "expected one place to patch in {}",
+        path.display()
+    );
+    bytes[places[0]..places[0] + old.len()].copy_from_slice(new);
+    std::fs::write(path, bytes).unwrap();
+}
+
+/// The time in row `row` of camera 2 as the file has it.
+fn stored_time(row: usize) -> [u8; 8] {
+    (events(CameraId::Two)[row].t_us as f64 / 1e6).to_le_bytes()
+}
+
+#[test]
+fn files_of_another_kind() {
+    let lab = Lab::new();
+    let data = Dataset::new(&lab);
+    let text_file = Dataset {
+        cameras: [data.presses.clone(), data.cameras[1].clone()],
+        ..Dataset::new(&Lab::new())
+    };
+    let text_file = Dataset {
+        presses: data.presses.clone(),
+        schedule: data.schedule.clone(),
+        ..text_file
+    };
+    refused(
+        &lab,
+        &text_file,
+        2,
+        &["presses.csv", "expected bimvee HDF5 or Prophesee RAW"],
+    );
+    let absent = Dataset {
+        cameras: [lab.path("none.hdf5"), data.cameras[1].clone()],
+        presses: data.presses.clone(),
+        schedule: data.schedule.clone(),
+    };
+    refused(&lab, &absent, 2, &["none.hdf5"]);
+    assert!(
+        files(&lab.path("s"), ".sqlite").is_empty(),
+        "nothing was to be made"
+    );
+}
+
+#[test]
+fn a_truncated_container() {
+    let lab = Lab::new();
+    let data = Dataset::new(&lab);
+    let bytes = std::fs::read(&data.cameras[0]).unwrap();
+    for share in [1, 40, 70, 99] {
+        std::fs::write(&data.cameras[0], &bytes[..bytes.len() * share / 100]).unwrap();
+        let said = skinrig(&data.arguments(&lab.path("s"))).complains(&["camera1.hdf5"]);
+        assert!(matches!(said.code, Some(2 | 3)), "{share} %: {said:?}");
+    }
+    for session in files(&lab.path("s"), ".session.sqlite") {
+        assert_ne!(show(&session)["end"], "completed");
+    }
+}
+
+#[test]
+fn a_missing_dataset() {
+    let lab = Lab::new();
+    let data = Dataset::new(&lab);
+    patch(&data.cameras[0], b"\"pol\"", b"\"pal\"");
+    refused(&lab, &data, 2, &["camera1.hdf5", "pol"]);
+    assert!(
+        files(&lab.path("s"), ".sqlite").is_empty(),
+        "nothing was to be made"
+    );
+}
+
+#[test]
+fn a_time_that_is_no_number_and_one_that_goes_back() {
+    let lab = Lab::new();
+    let data = Dataset::new(&lab);
+    patch(
+        &data.cameras[1],
+        &stored_time(9_000),
+        &f64::NAN.to_le_bytes(),
+    );
+    refused(&lab, &data, 3, &["camera2.hdf5", "ts", "row 9000", "NaN"]);
+
+    let lab = Lab::new();
+    let data = Dataset::new(&lab);
+    patch(
+        &data.cameras[1],
+        &stored_time(9_000),
+        &1.0_f64.to_le_bytes(),
+    );
+    let said = refused(&lab, &data, 3, &["camera2.hdf5", "ts", "row 9000"]);
+    assert!(
+        said.err.contains("kept"),
+        "says that a part is kept: {said:?}"
+    );
+    // What came before is kept, and called what it is.
+    let sessions = files(&lab.path("s"), ".session.sqlite");
+    assert_eq!(sessions.len(), 1);
+    let shown = show(&sessions[0]);
+    assert_eq!(shown["end"], "faulted");
+    assert!(shown["end_reason"].as_str().unwrap().contains("row 9000"));
+    skinrig(&["verify", &text(&sessions[0])]).code(0);
+}
+
+#[test]
+fn positions_that_do_not_fit() {
+    let lab = Lab::new();
+    let data = Dataset::new(&lab);
+    let write = |content: &str| std::fs::write(&data.presses, content).unwrap();
+    write(&csv(&positions()[1..]));
+    refused(&lab, &data, 2, &["expected 12 press positions", "found 11"]);
+    write(&csv(&positions()).replacen("0.0\n", "0.0,7,8,9\n", 1));
+    refused(&lab, &data, 2, &["presses.csv:2"]);
+    write(&csv(&positions()).replacen("-0.01,", "left,", 1));
+    refused(&lab, &data, 2, &["presses.csv:2", "left"]);
+    write(&csv(&positions()).replacen("-0.01,", "nan,", 1));
+    refused(&lab, &data, 2, &["presses.csv:2", "nan"]);
+    write(&csv(&positions()).replacen("x,y", "a,b", 1));
+    refused(&lab, &data, 2, &["presses.csv", "`x`"]);
+    write("");
+    refused(&lab, &data, 2, &["presses.csv"]);
+    assert!(
+        files(&lab.path("s"), ".sqlite").is_empty(),
+        "nothing was to be made"
+    );
+}
+
+#[test]
+fn schedules_that_do_not_hold() {
+    let lab = Lab::new();
+    let data = Dataset::new(&lab);
+    let good = std::fs::read_to_string(&data.schedule).unwrap();
+    for (old, new, parts) in [
+        ("period: 1.5 s", "period: 1.5", vec![":6:9", "period"]),
+        (
+            "period: 1.5 s",
+            "periode: 1.5 s",
+            vec!["did you mean `period`"],
+        ),
+        ("depth: 2 mm", "depth: -2 mm", vec![":8:8", "depth"]),
+        (
+            "skip_blank_rows: true",
+            "skip_blank_rows: false",
+            vec!["14", "blank"],
+        ),
+        (
+            "at_depth: -100 ms",
+            "at_depth: 100 ms",
+            vec!["phases.retract"],
+        ),
+        ("skinrig_schedule: 1", "skinrig_schedule: 9", vec![":1:19"]),
+    ] {
+        std::fs::write(&data.schedule, good.replacen(old, new, 1)).unwrap();
+        refused(&lab, &data, 2, &parts);
+    }
+    std::fs::write(&data.schedule, "skinrig_schedule: [1").unwrap();
+    refused(&lab, &data, 2, &["made.schedule.yaml:1:"]);
+    std::fs::write(&data.schedule, &good).unwrap();
+    let mut arguments = data.arguments(&lab.path("s"));
+    arguments.extend(["--set".into(), "sync.intervall=2 s".into()]);
+    skinrig(&arguments)
+        .code(2)
+        .complains(&["did you mean `interval`"]);
+    arguments.truncate(arguments.len() - 2);
+    arguments.extend(["--stream1".into(), "data/left".into()]);
+    skinrig(&arguments)
+        .code(2)
+        .complains(&["camera1.hdf5", "data/left"]);
+    assert!(
+        files(&lab.path("s"), ".sqlite").is_empty(),
+        "nothing was to be made"
+    );
+}

@@ -1,0 +1,282 @@
+//! Runs that are cut short: by the operator, by the system, by the power, by a full disk.
+#![cfg(unix)]
+
+use std::io::{BufRead, BufReader};
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStderr, Command, Stdio};
+
+use serde_json::Value;
+
+use crate::support::{Lab, ROOT, SMALL, files, only, program, said, show, skinrig, text};
+
+/// A run in real time, after its first press.
+struct Underway {
+    child: Child,
+    lines: BufReader<ChildStderr>,
+}
+
+impl Underway {
+    fn new(folder: &Path) -> Self {
+        let folder = text(folder);
+        let mut command = program(&["run", SMALL, "--real-time", "--sessions", &folder]);
+        let mut child = command
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let lines = BufReader::new(child.stderr.take().unwrap());
+        let mut underway = Self { child, lines };
+        underway.wait_for("press ");
+        underway
+    }
+
+    /// Reads messages up to one that contains `word`.
+    #[track_caller]
+    fn wait_for(&mut self, word: &str) {
+        let mut line = String::new();
+        while !line.contains(word) {
+            line.clear();
+            let n = self.lines.read_line(&mut line).unwrap();
+            assert!(n > 0, "the program ended before it said {word:?}");
+        }
+    }
+
+    fn signal(&self, name: &str) {
+        let pid = self.child.id().to_string();
+        let sent = Command::new("kill")
+            .args([format!("-{name}"), pid])
+            .status()
+            .unwrap();
+        assert!(sent.success());
+    }
+
+    /// Waits for the end; the exit code, none for a process that was killed, and the rest of the messages.
+    fn end(mut self) -> (Option<i32>, String) {
+        let mut rest = String::new();
+        while self.lines.read_line(&mut rest).unwrap() > 0 {}
+        (self.child.wait().unwrap().code(), rest)
+    }
+}
+
+fn count(shown: &Value, verdict: &str) -> u64 {
+    shown["presses"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .filter(|p| p["verdict"] == verdict)
+        .count() as u64
+}
+
+/// A session that ended early in the proper way: sealed, sound, every press with a verdict.
+#[track_caller]
+fn assert_ended_early(folder: &Path, word: &str) -> PathBuf {
+    let session = only(folder, ".session.sqlite");
+    let shown = show(&session);
+    assert_eq!(shown["end"], "stopped", "{shown}");
+    assert!(
+        shown["end_reason"].as_str().unwrap().contains(word),
+        "{shown}"
+    );
+    assert_eq!(shown["sealed"], true);
+    assert!(count(&shown, "valid") >= 1, "{shown}");
+    assert!(count(&shown, "missed") >= 1, "{shown}");
+    assert_eq!(
+        count(&shown, "valid") + count(&shown, "missed") + count(&shown, "invalid"),
+        10,
+        "{shown}"
+    );
+    assert!(!shown["interruptions"].as_array().unwrap().is_empty());
+    let verified = skinrig(&["verify", &text(&session)]).code(0).out;
+    assert!(verified.contains("sound, sealed"), "{verified}");
+    let listed = skinrig(&["sessions", &text(folder)]).code(0).out;
+    assert!(listed.contains("(stopped)"), "{listed}");
+    session
+}
+
+#[test]
+fn ctrl_c_ends_the_run_after_the_press_with_a_sealed_session() {
+    let lab = Lab::new();
+    let run = Underway::new(&lab.path("s"));
+    run.signal("INT");
+    let (code, messages) = run.end();
+    assert_eq!(code, Some(5), "{messages}");
+    assert!(messages.contains("stopping after this press"), "{messages}");
+    assert!(messages.contains("kept"), "{messages}");
+    let repeated = messages.lines().filter(|l| l.starts_with("press ")).count();
+    assert!(
+        repeated <= 1,
+        "presses that were not made are no progress: {messages}"
+    );
+    let session = assert_ended_early(&lab.path("s"), "stop");
+    // The part that was recorded is a session like any other.
+    skinrig(&["analyze", &text(&session)]).code(0);
+    skinrig(&[
+        "run",
+        "--replay",
+        &text(&session),
+        "--sessions",
+        &lab.text("r"),
+        "--no-analysis",
+    ]);
+}
+
+#[test]
+fn ctrl_c_twice_retracts_and_stops_at_once() {
+    let lab = Lab::new();
+    let mut run = Underway::new(&lab.path("s"));
+    run.signal("INT");
+    run.wait_for("stopping after this press");
+    run.signal("INT");
+    let (code, messages) = run.end();
+    assert_eq!(code, Some(5), "{messages}");
+    assert_ended_early(&lab.path("s"), "");
+}
+
+#[test]
+fn a_polite_end_by_the_system_stops_as_ctrl_c_does() {
+    for signal in ["TERM", "HUP"] {
+        let lab = Lab::new();
+        let run = Underway::new(&lab.path("s"));
+        run.signal(signal);
+        let (code, messages) = run.end();
+        assert_eq!(code, Some(5), "{signal}: {messages}");
+        assert_ended_early(&lab.path("s"), "");
+    }
+}
+
+#[test]
+fn a_killed_run_leaves_a_session_that_opens() {
+    let lab = Lab::new();
+    // Its first press is shown as done, so it is on the disk.
+    let run = Underway::new(&lab.path("s"));
+    run.signal("KILL");
+    let (code, _) = run.end();
+    assert_eq!(code, None);
+    let session = only(&lab.path("s"), ".session.sqlite");
+    let shown = show(&session);
+    assert_eq!(shown["end"], Value::Null);
+    assert_eq!(shown["sealed"], false);
+    assert!(
+        count(&shown, "valid") >= 1,
+        "the first press was committed: {shown}"
+    );
+    assert!(shown["totals"]["cd_events"].as_u64().unwrap() > 0);
+    let words = skinrig(&["show", &text(&session)]).code(0).out;
+    assert!(
+        words.contains("not ended") && words.contains("NOT SEALED"),
+        "{words}"
+    );
+    let verified = skinrig(&["verify", &text(&session)]).code(0).out;
+    assert!(verified.contains("sound, not sealed"), "{verified}");
+    let listed = skinrig(&["sessions", &lab.text("s")]).code(0).out;
+    assert!(listed.contains("cut off"), "{listed}");
+    skinrig(&["analyze", &text(&session)]).code(0);
+    skinrig(&[
+        "export",
+        &text(&session),
+        "--to",
+        "all",
+        "--out",
+        &lab.text("e"),
+    ])
+    .code(0);
+}
+
+/// The campaign with every file limited to `blocks` of 512 bytes: what a full disk does.
+fn on_a_full_disk(folder: &str, blocks: u32) -> crate::support::Said {
+    let mut command = Command::new("sh");
+    command.current_dir(ROOT).args([
+        "-c",
+        &format!(
+            "trap '' XFSZ; ulimit -f {blocks}; exec '{}' run {SMALL} --no-analysis --sessions '{folder}'",
+            env!("CARGO_BIN_EXE_skinrig")
+        ),
+    ]);
+    said(command)
+}
+
+#[test]
+fn a_disk_that_fills_up_stops_the_run_and_keeps_what_was_written() {
+    let lab = Lab::new();
+    on_a_full_disk(&lab.text("s"), 3_000)
+        .code(3)
+        .complains(&["recorder", "kept", "next:"]);
+    let session = only(&lab.path("s"), ".session.sqlite");
+    let shown = show(&session);
+    assert_ne!(shown["end"], "completed");
+    assert!(
+        shown["totals"]["cd_events"].as_u64().unwrap() > 0,
+        "{shown}"
+    );
+    let verified = skinrig(&["verify", &text(&session)]).code(0).out;
+    assert!(verified.contains("not sealed"), "{verified}");
+}
+
+#[test]
+fn a_disk_that_is_full_from_the_start_ends_with_code_1_and_a_next_step() {
+    let lab = Lab::new();
+    on_a_full_disk(&lab.text("s"), 100)
+        .code(1)
+        .complains(&["next:"]);
+    // Whatever is left is no session that claims anything.
+    let left = files(&lab.path("s"), "");
+    assert!(left.is_empty(), "{left:?}");
+}
+
+#[test]
+fn a_reader_that_goes_away_stops_no_run() {
+    let lab = Lab::new();
+    let folder = lab.text("s");
+    // `skinrig run ... 2>&1 | head -1`: both outputs closed after the first line.
+    let mut command = program(&["run", SMALL, "--sessions", &folder]);
+    let mut child = command
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut line = String::new();
+    BufReader::new(child.stdout.take().unwrap())
+        .read_line(&mut line)
+        .unwrap();
+    assert!(line.starts_with("plan"), "{line}");
+    drop(child.stderr.take());
+    assert_eq!(child.wait().unwrap().code(), Some(0));
+    let shown = show(&only(&lab.path("s"), ".session.sqlite"));
+    assert_eq!(
+        (&shown["end"], &shown["sealed"]),
+        (&"completed".into(), &true.into())
+    );
+
+    // `skinrig show ... | head -1` is no error.
+    let session = text(&only(&lab.path("s"), ".session.sqlite"));
+    let mut command = program(&["show", &session, "--presses"]);
+    let mut child = command
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop(child.stdout.take());
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{output:?}");
+}
+
+#[test]
+fn output_that_cannot_be_written_is_an_error() {
+    let Ok(full) = std::fs::File::create("/dev/full") else {
+        eprintln!("skipped: this system has no /dev/full");
+        return;
+    };
+    let mut command = program(&["plan", SMALL, "--steps"]);
+    let output = command
+        .stdout(full)
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap()
+        .wait_with_output()
+        .unwrap();
+    assert_eq!(output.status.code(), Some(1), "{output:?}");
+    assert!(
+        String::from_utf8_lossy(&output.stderr).contains("standard output"),
+        "{output:?}"
+    );
+}

@@ -1,0 +1,141 @@
+//! What programs read: JSON with stable keys, and output without control characters.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use serde_json::Value;
+
+use crate::dataset::Dataset;
+use crate::support::{Lab, SMALL, only, skinrig, text};
+
+/// Every path of keys in `value` with the kinds of value found there; lists are merged into `[]`.
+fn shape(value: &Value) -> String {
+    fn walk(value: &Value, path: &str, found: &mut BTreeMap<String, BTreeSet<&'static str>>) {
+        let kind = match value {
+            Value::Null => "null",
+            Value::Bool(_) => "bool",
+            Value::Number(_) => "number",
+            Value::String(_) => "text",
+            Value::Array(items) => {
+                for item in items {
+                    walk(item, &format!("{path}[]"), found);
+                }
+                "list"
+            }
+            Value::Object(members) => {
+                for (key, member) in members {
+                    walk(member, &format!("{path}.{key}"), found);
+                }
+                "map"
+            }
+        };
+        found.entry(path.to_owned()).or_default().insert(kind);
+    }
+    let mut found = BTreeMap::new();
+    walk(value, "", &mut found);
+    let mut text = String::new();
+    for (path, kinds) in found {
+        let kinds: Vec<_> = kinds.into_iter().collect();
+        text += &format!("{path}: {}\n", kinds.join(" or "));
+    }
+    text
+}
+
+#[test]
+fn json_keys_are_stable() {
+    let lab = Lab::new();
+    let s = lab.text("s");
+    let json = |arguments: &[&str]| {
+        let mut all = vec!["--json"];
+        all.extend_from_slice(arguments);
+        skinrig(&all).code(0).json()
+    };
+    let run = json(&["run", SMALL, "--sessions", &s]);
+    let session = text(&only(&lab.path("s"), ".session.sqlite"));
+    assert_eq!(run["files"]["session"], session.as_str());
+    let analyze = json(&["analyze", &session]);
+    // A run ends with what analysing its session gives.
+    assert_eq!(shape(&run), shape(&analyze));
+    insta::assert_snapshot!("run", shape(&run));
+    insta::assert_snapshot!("check", shape(&json(&["check", SMALL])));
+    insta::assert_snapshot!("plan", shape(&json(&["plan", SMALL])));
+    insta::assert_snapshot!("sessions", shape(&json(&["sessions", &s])));
+    insta::assert_snapshot!(
+        "show",
+        shape(&json(&["show", &session, "--presses", "--protocol"]))
+    );
+    insta::assert_snapshot!("report", shape(&json(&["report", &session])));
+    insta::assert_snapshot!("verify", shape(&json(&["verify", &session])));
+    let export = json(&["export", &session, "--to", "all", "--out", &lab.text("e")]);
+    insta::assert_snapshot!("export", shape(&export));
+    insta::assert_snapshot!("inspect_session", shape(&json(&["inspect", &session])));
+    let raw = text(&only(&lab.path("e"), ".camera1.raw"));
+    insta::assert_snapshot!("inspect_raw", shape(&json(&["inspect", &raw])));
+    let hdf5 = text(&only(&lab.path("e"), ".camera1.hdf5"));
+    insta::assert_snapshot!("inspect_hdf5", shape(&json(&["inspect", &hdf5])));
+    let data = Dataset::new(&lab);
+    let arguments = data.arguments(&lab.path("i"));
+    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    insta::assert_snapshot!("import", shape(&json(&arguments)));
+    // A schema is JSON already.
+    assert_eq!(json(&["schema"]), skinrig(&["schema"]).code(0).json());
+    let recorded = json(&["run", SMALL, "--sessions", &lab.text("n"), "--no-analysis"]);
+    insta::assert_snapshot!("run_no_analysis", shape(&recorded));
+}
+
+#[test]
+fn without_a_terminal_output_is_plain_lines() {
+    let lab = Lab::new();
+    let s = lab.text("s");
+    let run = skinrig(&["run", SMALL, "--sessions", &s]).code(0);
+    let session = text(&only(&lab.path("s"), ".session.sqlite"));
+    let progress: Vec<&str> = run
+        .err
+        .lines()
+        .filter(|l| l.starts_with("press "))
+        .collect();
+    assert!(
+        (2..=11).contains(&progress.len()),
+        "a line each tenth: {}",
+        run.err
+    );
+    for part in ["press 10/10", "rep 2", "mm", "kev/s", "seen", "eta"] {
+        assert!(
+            progress.last().unwrap().contains(part),
+            "{part}: {progress:#?}"
+        );
+    }
+    let distinct: BTreeSet<&&str> = progress.iter().collect();
+    assert_eq!(
+        distinct.len(),
+        progress.len(),
+        "no line twice: {progress:#?}"
+    );
+    let mut all = vec![run];
+    for arguments in [
+        vec!["--help"],
+        vec!["check", SMALL],
+        vec!["check", SMALL, "--set", "dept=1 mm"],
+        vec!["plan", SMALL, "--steps"],
+        vec!["sessions", &s],
+        vec!["show", &session, "--presses", "--protocol"],
+        vec!["analyze", &session],
+        vec!["report", &session],
+        vec!["verify", &session],
+        vec!["inspect", &session],
+        vec!["export", &session, "--to", "all", "--out", &lab.text("e")],
+        vec!["schema"],
+        vec!["no-such-command"],
+    ] {
+        all.push(skinrig(&arguments));
+    }
+    for said in all {
+        for (name, text) in [
+            ("standard output", &said.out),
+            ("standard error", &said.err),
+        ] {
+            let control = text.chars().find(|c| c.is_control() && *c != '\n');
+            assert_eq!(control, None, "{name}: {text:?}");
+            assert!(text.is_empty() || text.ends_with('\n'), "{name}: {text:?}");
+        }
+    }
+}

@@ -1,0 +1,16 @@
+//! The `skinrig` program as a laboratory meets it: the built binary, its files, its output and its exit codes.
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on must fail")]
+#![expect(clippy::print_stderr, reason = "a test that is skipped says why")]
+
+mod damage;
+mod dataset;
+mod help;
+mod import;
+mod import_refusals;
+mod interrupt;
+mod json;
+mod options;
+mod pipeline;
+mod replay;
+mod streams;
+mod support;

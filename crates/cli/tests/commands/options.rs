@@ -1,0 +1,210 @@
+//! Overrides, limits, folders that cannot be written, names that are taken.
+
+use std::collections::BTreeSet;
+use std::process::Stdio;
+
+use crate::support::{
+    Lab, ROOT, SMALL, files, only, program, read_json, sha256, show, skinrig, text,
+};
+
+#[test]
+fn an_override_changes_the_plan_and_is_stored_with_the_base_text() {
+    let lab = Lab::new();
+    let base = lab.record("a", &[]);
+    let other = lab.record(
+        "b",
+        &[
+            "--set",
+            "depth=1 mm",
+            "--set",
+            "repetitions.count=1",
+            "--set",
+            "evaluation.score=[1]",
+        ],
+    );
+    let (base, other) = (show(&base), show(&other));
+    assert_ne!(base["plan_sha256"], other["plan_sha256"]);
+    assert_eq!(base["protocol_sha256"], other["protocol_sha256"]);
+    let text_of_file = std::fs::read(format!("{ROOT}/{SMALL}")).unwrap();
+    assert_eq!(other["protocol_sha256"], sha256(&text_of_file).as_str());
+    assert_eq!(base["overrides"], serde_json::json!([]));
+    assert_eq!(
+        other["overrides"],
+        serde_json::json!(["depth=1 mm", "repetitions.count=1", "evaluation.score=[1]"])
+    );
+    assert_eq!(other["totals"]["presses"]["planned"], 4);
+    assert!(
+        other["presses"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .all(|p| p["depth_mm"] == 1.0)
+    );
+    let shown = skinrig(&[
+        "show",
+        "--protocol",
+        &text(&only(&lab.path("b"), ".session.sqlite")),
+    ])
+    .code(0)
+    .out;
+    assert!(
+        shown.contains("--set depth=1 mm") && shown.contains("depth: 1.5 mm"),
+        "{shown}"
+    );
+    // The plan that ran is the plan that was shown before.
+    let planned = skinrig(&["plan", "--json", SMALL]).code(0).json();
+    assert_eq!(planned["sha256"], base["plan_sha256"]);
+}
+
+#[test]
+fn a_wrong_override_is_refused_with_a_suggestion() {
+    let lab = Lab::new();
+    for (change, parts) in [
+        (
+            "motion.perid=2 s",
+            vec!["motion.perid", "did you mean `period`"],
+        ),
+        ("dept=1 mm", vec!["did you mean `depth`"]),
+        ("depth=1", vec!["depth", "mm"]),
+        ("depth=1 s", vec!["depth", "1 s"]),
+        ("depth=9 mm", vec!["depth"]),
+        ("depth", vec!["depth"]),
+    ] {
+        skinrig(&["run", SMALL, "--set", change, "--sessions", &lab.text("s")])
+            .code(2)
+            .complains(&["--set"])
+            .complains(&parts);
+    }
+    assert!(!lab.path("s").exists(), "nothing was to be made");
+}
+
+#[test]
+fn all_errors_of_a_protocol_are_reported_at_once() {
+    let lab = Lab::new();
+    let good = std::fs::read_to_string(format!("{ROOT}/{SMALL}")).unwrap();
+    let bad = good
+        .replacen("depth: 1.5 mm", "depth: 1.5", 1)
+        .replacen("operator:", "operater:", 1)
+        .replacen("max_force: 4 N", "max_force: 4 mm", 1);
+    let file = lab.text("bad.yaml");
+    std::fs::write(&file, bad).unwrap();
+    skinrig(&["check", &file]).code(2).complains(&[
+        "bad.yaml:4:1",
+        "did you mean `operator`",
+        "bad.yaml:30:8",
+        "bad.yaml:39:14",
+        "4 mm",
+        "^^^",
+    ]);
+}
+
+#[test]
+fn the_plan_is_drawn_and_printed_step_by_step() {
+    let lab = Lab::new();
+    let svg = lab.text("path.svg");
+    let said = skinrig(&["plan", SMALL, "--steps", "--svg", &svg]).code(0);
+    let steps = said.out.lines().filter(|l| l.contains("  press ")).count();
+    assert_eq!(steps, 10, "{}", said.out);
+    let drawn = std::fs::read_to_string(&svg).unwrap();
+    assert!(
+        drawn.starts_with("<svg") || drawn.starts_with("<?xml"),
+        "{drawn}"
+    );
+    // Numbered: the last of four places carries its number.
+    assert!(drawn.contains(">4<"), "{drawn}");
+    skinrig(&["plan", SMALL, "--svg", &lab.text("no/such/folder.svg")])
+        .code(1)
+        .complains(&["folder.svg"]);
+}
+
+#[test]
+fn a_limit_that_is_not_met_ends_with_code_4_and_keeps_the_results() {
+    let lab = Lab::new();
+    skinrig(&[
+        "run",
+        SMALL,
+        "--sessions",
+        &lab.text("s"),
+        "--max-rmse",
+        "0.1",
+    ])
+    .code(4)
+    .complains(&["RMSE", "at most 0.1 mm", "found"]);
+    let session = text(&only(&lab.path("s"), ".session.sqlite"));
+    let rmse =
+        read_json(&only(&lab.path("s"), ".results.json"))["analysis"]["scored"]["rmse_mm"]["value"]
+            .as_f64()
+            .unwrap();
+    only(&lab.path("s"), ".report.html");
+    let above = (rmse + 0.01).to_string();
+    skinrig(&["analyze", &session, "--max-rmse", &above]).code(0);
+    let below = (rmse - 0.01).to_string();
+    skinrig(&["analyze", &session, "--max-rmse", &below]).code(4);
+    for nonsense in ["NaN", "-1", "two"] {
+        skinrig(&["analyze", &session, &format!("--max-rmse={nonsense}")])
+            .code(2)
+            .complains(&["--max-rmse"]);
+    }
+    // Nothing located is not a limit that was met.
+    skinrig(&[
+        "run",
+        SMALL,
+        "--level",
+        "kinematic",
+        "--sessions",
+        &lab.text("k"),
+        "--max-rmse",
+        "100",
+    ])
+    .code(4)
+    .complains(&["no scored press was located"]);
+}
+
+#[test]
+fn a_folder_that_cannot_be_written_ends_with_code_1_and_a_next_step() {
+    let lab = Lab::new();
+    let file = lab.path("a-file");
+    std::fs::write(&file, "").unwrap();
+    for folder in [text(&file), format!("{}/below", text(&file))] {
+        skinrig(&["run", SMALL, "--sessions", &folder])
+            .code(1)
+            .complains(&["next:", "--sessions"]);
+    }
+    let locked = lab.path("locked");
+    std::fs::create_dir(&locked).unwrap();
+    let mut permissions = std::fs::metadata(&locked).unwrap().permissions();
+    permissions.set_readonly(true);
+    std::fs::set_permissions(&locked, permissions).unwrap();
+    if std::fs::write(locked.join("probe"), "").is_ok() {
+        eprintln!("skipped: this user may write into read-only folders");
+        return;
+    }
+    skinrig(&["run", SMALL, "--sessions", &text(&locked)])
+        .code(1)
+        .complains(&["next:", "--sessions"]);
+}
+
+#[test]
+fn sessions_that_start_in_the_same_second_get_files_of_their_own() {
+    let lab = Lab::new();
+    let sessions = lab.text("s");
+    let arguments = ["run", SMALL, "--sessions", &sessions, "--no-analysis"];
+    let children: Vec<_> = (0..6)
+        .map(|_| {
+            let mut command = program(&arguments);
+            command.stdout(Stdio::piped()).stderr(Stdio::piped());
+            command.spawn().unwrap()
+        })
+        .collect();
+    for child in children {
+        let output = child.wait_with_output().unwrap();
+        assert!(output.status.success(), "{output:?}");
+    }
+    let found = files(&lab.path("s"), ".session.sqlite");
+    assert_eq!(found.len(), 6, "{found:?}");
+    let ids: BTreeSet<String> = found.iter().map(|s| show(s)["id"].to_string()).collect();
+    assert_eq!(ids.len(), 6);
+    for session in found {
+        skinrig(&["verify", &text(&session)]).code(0);
+    }
+}
