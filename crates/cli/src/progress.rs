@@ -34,7 +34,9 @@ impl ProgressView {
                 ProgressDrawTarget::stderr_with_hz(10),
             );
             // The template is a constant; should it ever be wrong, the default style still counts presses.
-            if let Ok(style) = ProgressStyle::with_template("{bar:28.cyan/blue} {msg}") {
+            if let Ok(style) =
+                ProgressStyle::with_template("{bar:20.cyan/blue} {prefix}\n{wide_msg}")
+            {
                 bar.set_style(style.progress_chars("━━╌"));
             }
             Display::Bar(bar)
@@ -63,7 +65,8 @@ impl ProgressView {
                 let due = self.drawn.is_none_or(|at| at.elapsed() >= REDRAW_EVERY);
                 if due {
                     bar.set_position(done as u64);
-                    bar.set_message(line(&self.tracker));
+                    bar.set_prefix(where_and_when(&self.tracker));
+                    bar.set_message(streams(&self.tracker));
                     self.drawn = Some(Instant::now());
                 }
             }
@@ -74,7 +77,7 @@ impl ProgressView {
                 let reached = made * 10 / planned;
                 if reached > *tenths {
                     *tenths = reached;
-                    errln!("{}", line(&self.tracker));
+                    errln!("{}  {}", where_and_when(&self.tracker), streams(&self.tracker));
                 }
             }
         }
@@ -88,8 +91,8 @@ impl ProgressView {
     }
 }
 
-/// `press 12/246  rep 2  (10.0, 2.0) mm  cam1 31.2 cam2 28.0 kev/s  trigger 24 sent 24+24 seen  eta 0:03:12`
-fn line(tracker: &ProgressTracker) -> String {
+/// `press 12/246  rep 2  (10.0, 2.0) mm  eta 0:03:12`
+fn where_and_when(tracker: &ProgressTracker) -> String {
     let p = tracker.progress();
     let press = p.press.map_or_else(String::new, |press| {
         let block = match press.role {
@@ -98,6 +101,14 @@ fn line(tracker: &ProgressTracker) -> String {
         };
         format!("  {block}  ({:.1}, {:.1}) mm", press.at.x_mm, press.at.y_mm)
     });
+    let paused = if p.paused { "  PAUSED" } else { "" };
+    let eta = p.eta.map_or_else(|| "-".into(), clock_text);
+    format!("press {}{press}{paused}  eta {eta}", tracker.press_label())
+}
+
+/// `camera 1 31.2, camera 2 28.0 kev/s  trigger 24 sent, 24+24 seen`
+fn streams(tracker: &ProgressTracker) -> String {
+    let p = tracker.progress();
     let rate = |camera| {
         tracker
             .events_per_s(camera)
@@ -109,21 +120,18 @@ fn line(tracker: &ProgressTracker) -> String {
     } else {
         String::new()
     };
-    let paused = if p.paused { "  PAUSED" } else { "" };
     let invalid = if p.invalid > 0 {
         format!("  {} invalid", p.invalid)
     } else {
         String::new()
     };
     format!(
-        "press {}{press}  cam1 {} cam2 {} kev/s  trigger {} sent, {}+{} seen{invalid}{lost}{paused}  eta {}",
-        tracker.press_label(),
+        "camera 1 {}, camera 2 {} kev/s  trigger {} sent, {}+{} seen{invalid}{lost}",
         rate(CameraId::One),
         rate(CameraId::Two),
         p.marks_sent,
         p.cameras[0].marks_seen,
         p.cameras[1].marks_seen,
-        p.eta.map_or_else(|| "-".into(), clock_text),
     )
 }
 

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use chrono::{DateTime, Utc};
+use chrono::{DateTime, SecondsFormat, Utc};
 use skinrig_controller::{ControlHandle, RunReport, execute};
 use skinrig_device::Rig;
 use skinrig_model::{
@@ -59,7 +59,8 @@ pub fn record(
     folder: &Path,
 ) -> Result<(PathBuf, RunReport), Failure> {
     let started = Utc::now();
-    let header = header(intent, plan, &rig, &started.to_rfc3339())?;
+    let started_at = started.to_rfc3339_opts(SecondsFormat::Secs, true);
+    let header = header(intent, plan, &rig, &started_at)?;
     let (path, writer) = new_session(intent, started, folder)?;
     let view = ProgressView::new(plan.presses.len(), intent.expected);
     let mut sink = SessionSink::new(writer, view, intent.known.clone());

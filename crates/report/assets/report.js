@@ -184,7 +184,9 @@
         g.append(line, tick);
       }
     }
-    $('#zoom-range').textContent = `${a.toFixed(Math.max(1, digits))} s to ${b.toFixed(Math.max(1, digits))} s`;
+    const decimals = Math.max(1, digits);
+    const seconds = t => `${(Math.abs(t) < 0.5 * 10 ** -decimals ? 0 : t).toFixed(decimals)} s`; // never "-0.0 s"
+    $('#zoom-range').textContent = `${seconds(a)} to ${seconds(b)}`;
   };
   const zoomTo = (a, b) => {
     const span = Math.min(Math.max(b - a, Math.min(0.2, t1 - t0)), t1 - t0);
