@@ -1,1 +1,98 @@
-//! Shared helpers of the whole-system tests.
+//! Shared helpers of the whole-system tests: a protocol, run on any rig into a session file.
+
+use std::error::Error;
+use std::path::Path;
+
+use skinrig::results::RigDocument;
+use skinrig_controller::{ControlHandle, RecordSink, RunReport, SinkFault, execute};
+use skinrig_device::Rig;
+use skinrig_model::{CameraId, Record, RunHeader};
+use skinrig_protocol::{Plan, Protocol};
+use skinrig_recorder::SessionWriter;
+
+/// What a helper fails with: a test only shows it.
+pub type Fault = Box<dyn Error>;
+
+/// A protocol from its text, and its plan.
+///
+/// # Errors
+/// Every finding, when the text is no protocol.
+pub fn planned(text: &str) -> Result<(Protocol, Plan), Fault> {
+    let no_files = |path: &Path| Err(std::io::Error::other(path.display().to_string()));
+    let protocol = Protocol::parse("test.yaml", text.as_bytes(), &[], &no_files)
+        .map_err(|found| found.render(false))?;
+    let plan = protocol.compile();
+    Ok((protocol, plan))
+}
+
+/// The header of a run of `plan` on `rig`.
+///
+/// # Errors
+/// When something cannot be written as JSON.
+pub fn header(protocol: &Protocol, plan: &Plan, rig: &Rig) -> Result<RunHeader, Fault> {
+    let document = RigDocument {
+        geometry: rig.geometry,
+        analysis: protocol.analysis.clone(),
+        rig: serde_json::from_str(&rig.description_json)?,
+    };
+    Ok(RunHeader {
+        protocol_text: protocol.text.clone(),
+        protocol_name: protocol.file_name.clone(),
+        protocol_sha256: protocol.sha256.clone(),
+        overrides: Vec::new(),
+        plan_json: serde_json::to_string(plan)?,
+        plan_sha256: plan.digest(),
+        seed: protocol.seed,
+        rig_kind: rig.kind.clone(),
+        rig_name: rig.name.clone(),
+        rig_json: serde_json::to_string(&document)?,
+        robot_from_skin: rig.robot_from_skin,
+        stream_formats: CameraId::ALL.map(|c| rig.cameras[c.index()].capabilities().format),
+        prototype: protocol.prototype.id.clone(),
+        operator: protocol.operator.clone(),
+        started_at: "2026-01-01T00:00:00Z".into(),
+        host: "test".into(),
+        software: "skinrig tests".into(),
+        command_line: String::new(),
+        presses: plan.presses.clone(),
+    })
+}
+
+/// Runs `plan` on `rig` into a new session at `path`. `watch` sees each record before it is written, and may
+/// stop the run.
+///
+/// # Errors
+/// When the session cannot be made or sealed. How the run ended is in the report.
+pub fn record(
+    protocol: &Protocol,
+    plan: &Plan,
+    rig: Rig,
+    path: &Path,
+    watch: impl FnMut(&Record, &ControlHandle),
+) -> Result<RunReport, Fault> {
+    let header = header(protocol, plan, &rig)?;
+    let control = ControlHandle::new();
+    let mut sink = Watched {
+        writer: SessionWriter::create(path)?,
+        control: control.clone(),
+        watch,
+    };
+    let report = execute(plan, header, rig, &control, &mut sink);
+    sink.writer.finish()?;
+    Ok(report)
+}
+
+struct Watched<W> {
+    writer: SessionWriter,
+    control: ControlHandle,
+    watch: W,
+}
+
+impl<W: FnMut(&Record, &ControlHandle)> RecordSink for Watched<W> {
+    fn accept(&mut self, record: Record) -> Result<(), SinkFault> {
+        (self.watch)(&record, &self.control);
+        self.writer
+            .accept(record)
+            .map_err(|e| SinkFault(e.to_string()))
+    }
+}

@@ -1,5 +1,8 @@
 //! Holds the house in order: which crate may use which, and under which licences we stand.
-#![expect(clippy::unwrap_used, reason = "a test that cannot read the workspace must fail")]
+#![expect(
+    clippy::unwrap_used,
+    reason = "a test that cannot read the workspace must fail"
+)]
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::process::Command;
@@ -12,8 +15,14 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("skinrig-formats", &["skinrig-model"]),
     ("skinrig-protocol", &["skinrig-model"]),
     ("skinrig-device", &["skinrig-model"]),
-    ("skinrig-sim", &["skinrig-device", "skinrig-model", "skinrig-formats"]),
-    ("skinrig-controller", &["skinrig-protocol", "skinrig-device", "skinrig-model"]),
+    (
+        "skinrig-sim",
+        &["skinrig-device", "skinrig-model", "skinrig-formats"],
+    ),
+    (
+        "skinrig-controller",
+        &["skinrig-protocol", "skinrig-device", "skinrig-model"],
+    ),
     ("skinrig-recorder", &["skinrig-model"]),
     ("skinrig-analysis", &["skinrig-model"]),
     ("skinrig-report", &["skinrig-analysis", "skinrig-model"]),
@@ -74,15 +83,26 @@ fn metadata() -> Value {
         .current_dir(env!("CARGO_MANIFEST_DIR"))
         .output()
         .unwrap();
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
     serde_json::from_slice(&output.stdout).unwrap()
 }
 
 fn members(metadata: &Value) -> Vec<&Value> {
-    let ids: BTreeSet<&str> =
-        metadata["workspace_members"].as_array().unwrap().iter().map(|v| v.as_str().unwrap()).collect();
+    let ids: BTreeSet<&str> = metadata["workspace_members"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|v| v.as_str().unwrap())
+        .collect();
     let packages = metadata["packages"].as_array().unwrap();
-    packages.iter().filter(|p| ids.contains(p["id"].as_str().unwrap())).collect()
+    packages
+        .iter()
+        .filter(|p| ids.contains(p["id"].as_str().unwrap()))
+        .collect()
 }
 
 #[test]
@@ -129,9 +149,11 @@ fn every_dependency_has_a_licence_we_accept() {
         };
         // `A OR B AND C`, old style `A/B`: one of the alternatives must be all acceptable.
         let flat = expression.replace(['(', ')'], "").replace('/', " OR ");
-        let acceptable = flat
-            .split(" OR ")
-            .any(|alternative| alternative.split(" AND ").all(|l| LICENCES.contains(&l.trim())));
+        let acceptable = flat.split(" OR ").any(|alternative| {
+            alternative
+                .split(" AND ")
+                .all(|l| LICENCES.contains(&l.trim()))
+        });
         if !acceptable {
             faults.push(format!("{name}: {expression}"));
         }
@@ -141,7 +163,8 @@ fn every_dependency_has_a_licence_we_accept() {
 
 #[test]
 fn only_the_published_registry_is_used() {
-    let lock = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../Cargo.lock")).unwrap();
+    let lock =
+        std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../Cargo.lock")).unwrap();
     let foreign: Vec<&str> = lock
         .lines()
         .filter(|l| l.starts_with("source = "))
