@@ -49,6 +49,7 @@ pub fn import(args: &ImportArgs, command_line: &str, json: bool) -> Outcome {
     };
     let plan = plan::compile(&schedule, presses, &times);
 
+    refuse_one_file_twice(args)?;
     let clock = SimClock::new();
     let one = open(CameraId::One, &args.camera1, args.stream1.clone(), &clock)?;
     let two = open(CameraId::Two, &args.camera2, args.stream2.clone(), &clock)?;
@@ -123,6 +124,23 @@ fn read_positions(path: &Path, schedule: &Schedule) -> Result<Vec<Point2>, Failu
         .collect())
 }
 
+/// Both cameras from one file is a slip of the keyboard, unless two streams of it are named.
+fn refuse_one_file_twice(args: &ImportArgs) -> Result<(), Failure> {
+    let same = match (args.camera1.canonicalize(), args.camera2.canonicalize()) {
+        (Ok(one), Ok(two)) => one == two,
+        // Opening it says what is wrong.
+        _ => false,
+    };
+    if same && args.stream1 == args.stream2 {
+        return Err(Failure::input(format!(
+            "{}: expected a recording of each camera, found the same one for both\n  \
+             next: correct --camera1 or --camera2, or name two streams of the file with --stream1 and --stream2",
+            args.camera1.display()
+        )));
+    }
+    Ok(())
+}
+
 /// Opens one camera's file and starts reading it.
 fn open(
     camera: CameraId,
@@ -171,6 +189,9 @@ fn read_hdf5(path: &Path, stream: Option<&str>, feed: &mut ChunkFeed) -> Result<
     let mut events = container
         .events(stream, Geometry::EVK1)
         .map_err(|e| e.to_string())?;
+    if events.rows() == 0 {
+        return Err(format!("{}: expected events, found none", path.display()));
+    }
     loop {
         let batch = events.next_batch().map_err(|e| e.to_string())?;
         if batch.is_empty() || feed.events(batch).is_err() {
@@ -181,10 +202,31 @@ fn read_hdf5(path: &Path, stream: Option<&str>, feed: &mut ChunkFeed) -> Result<
 
 fn read_raw(path: &Path, feed: &mut ChunkFeed) -> Result<(), String> {
     let mut reader = RawReader::open(path).map_err(|e| e.to_string())?;
+    let word = match reader.header().format {
+        StreamFormat::Evt2 => 4,
+        StreamFormat::Evt21 | StreamFormat::Evt21Legacy => 8,
+        StreamFormat::Evt3 => 2,
+    };
+    let mut total = 0;
     loop {
         let bytes = reader.next_chunk().map_err(|e| e.to_string())?;
-        if bytes.is_empty() || feed.raw(bytes).is_err() {
+        total += bytes.len();
+        if bytes.is_empty() {
+            break;
+        }
+        if feed.raw(bytes).is_err() {
             return Ok(());
         }
+    }
+    match (total, total % word) {
+        (0, _) => Err(format!(
+            "{}: expected events, found nothing after the header",
+            path.display()
+        )),
+        (_, 0) => Ok(()),
+        (_, rest) => Err(format!(
+            "{}: expected whole words of {word} bytes, found {rest} bytes after the last one: the file is cut off",
+            path.display()
+        )),
     }
 }

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::dataset::{Dataset, csv, events, positions};
-use crate::support::{Lab, Said, files, show, skinrig, text};
+use crate::support::{Lab, Said, files, only, show, skinrig, text};
 use skinrig_model::CameraId;
 
 /// Runs the import and asserts its exit code, that it says all of `parts`, and that nothing looks completed.
@@ -198,5 +198,51 @@ fn schedules_that_do_not_hold() {
     assert!(
         files(&lab.path("s"), ".sqlite").is_empty(),
         "nothing was to be made"
+    );
+}
+
+#[test]
+fn one_file_for_both_cameras() {
+    let lab = Lab::new();
+    let mut data = Dataset::new(&lab);
+    data.cameras[1] = data.cameras[0].clone();
+    refused(
+        &lab,
+        &data,
+        2,
+        &["camera1.hdf5", "the same one for both", "--stream1"],
+    );
+    assert!(
+        files(&lab.path("s"), ".sqlite").is_empty(),
+        "nothing was to be made"
+    );
+}
+
+#[test]
+fn raw_files_that_are_cut_off_or_empty() {
+    let lab = Lab::new();
+    let mut data = Dataset::new(&lab);
+    let mut arguments = data.arguments(&lab.path("whole"));
+    arguments.push("--no-analysis".into());
+    skinrig(&arguments).code(0);
+    let session = text(&only(&lab.path("whole"), ".session.sqlite"));
+    skinrig(&["export", &session, "--to", "raw", "--out", &lab.text("e")]).code(0);
+    let raw = only(&lab.path("e"), ".camera2.raw");
+    let bytes = std::fs::read(&raw).unwrap();
+    data.cameras[1] = raw.clone();
+    std::fs::write(&raw, &bytes[..bytes.len() - 3]).unwrap();
+    refused(
+        &lab,
+        &data,
+        3,
+        &[".camera2.raw", "found 1 bytes after the last one"],
+    );
+    let body = bytes.windows(6).position(|w| w == b"% end\n").unwrap() + 6;
+    std::fs::write(&raw, &bytes[..body]).unwrap();
+    refused(
+        &lab,
+        &data,
+        3,
+        &[".camera2.raw", "found nothing after the header"],
     );
 }
