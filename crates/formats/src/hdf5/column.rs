@@ -40,11 +40,12 @@ macro_rules! buffers {
                         let mut beyond = 0;
                         for (out, value) in out.iter_mut().zip(&*values) {
                             *out = *value as u16;
-                            beyond |= *value ^ *out as $int;
+                            // 0 for every value that a u16 holds; the sign extends.
+                            beyond |= *value as u64 >> 16;
                         }
                         if beyond != 0 {
                             for (out, value) in out.iter_mut().zip(&*values) {
-                                if *out as $int != *value {
+                                if *value as u64 >> 16 != 0 {
                                     *out = u16::MAX;
                                 }
                             }

@@ -21,5 +21,6 @@ pub use read::EventReader;
 pub use tree::{Container, DvsEntry};
 pub use write::EventWriter;
 
-/// Rows that are read at once: a batch stays in the second-level cache, and is one chunk of a file written here.
+/// Rows that are delivered or written at once: a batch stays in the second-level cache, and is one chunk of a
+/// file written here.
 const BATCH_ROWS: usize = 16_384;

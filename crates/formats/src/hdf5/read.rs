@@ -14,6 +14,12 @@ use crate::stream::Geometry;
 /// The largest time that is accepted: ten years, s. Larger values are not seconds.
 const MAX_TS_S: f64 = 315_360_000.0;
 
+/// Rows that are read from the file at once: reading costs some time per call, in a chunked file more the more
+/// chunks it has.
+const SLAB_ROWS: usize = 4 * BATCH_ROWS;
+/// `2^52`: the sum of this and a number from 0 to `2^52` has the number, rounded, in its lower 52 bits.
+const ROUNDING: f64 = 4_503_599_627_370_496.0;
+
 /// Reads the events of one sensor. Every value is checked before it is delivered.
 pub struct EventReader {
     path: PathBuf,
@@ -23,6 +29,8 @@ pub struct EventReader {
     geometry: Geometry,
     rows: usize,
     next_row: usize,
+    slab_start: usize,
+    slab_end: usize,
     last_ts_s: f64,
     ts_s: Vec<f64>,
     x: Vec<u16>,
@@ -58,6 +66,8 @@ impl EventReader {
             geometry,
             rows: usize::try_from(entry.events).unwrap_or(usize::MAX),
             next_row: 0,
+            slab_start: 0,
+            slab_end: 0,
             last_ts_s: 0.0,
             ts_s: Vec::new(),
             x: Vec::new(),
@@ -68,18 +78,39 @@ impl EventReader {
         })
     }
 
-    /// The next events, in time order; an empty slice at the end.
+    /// The next events, in time order; an empty slice at the end. Times are rounded to the nearest µs, and to an
+    /// even one from the middle between two.
     ///
     /// # Errors
     /// [`FormatsError::Row`] for a time that is NaN, infinite, negative or before its predecessor, for a pixel
     /// outside the sensor and for a polarity that is not 0 or 1; [`FormatsError::Dataset`] for rows that the
-    /// file does not have, as when it is truncated. No event of that batch is delivered.
+    /// file does not have, as when it is truncated. No event of the rows that were read together is delivered.
     pub fn next_batch(&mut self) -> Result<&[CdEvent], FormatsError> {
-        let start = self.next_row;
-        let rows = BATCH_ROWS.min(self.rows - start);
         self.events.clear();
+        if self.next_row == self.slab_end {
+            self.read_slab()?;
+        }
+        let start = self.next_row - self.slab_start;
+        let rows = start..(start + BATCH_ROWS).min(self.slab_end - self.slab_start);
+        let pixels = self.x[rows.clone()].iter().zip(&self.y[rows.clone()]);
+        let values = pixels.zip(&self.pol[rows.clone()]).zip(&self.ts_s[rows.clone()]);
+        self.events.extend(values.map(|(((x, y), pol), ts)| CdEvent {
+            // Checked: not negative, and below 2^52 µs.
+            t_us: (ts * 1e6 + ROUNDING).to_bits() & ((1 << 52) - 1),
+            x: *x,
+            y: *y,
+            polarity: Polarity::from_bit(*pol == 1),
+        }));
+        self.next_row += rows.len();
+        Ok(&self.events)
+    }
+
+    /// Reads and checks the next rows.
+    fn read_slab(&mut self) -> Result<(), FormatsError> {
+        let start = self.next_row;
+        let rows = SLAB_ROWS.min(self.rows - start);
         if rows == 0 {
-            return Ok(&self.events);
+            return Ok(());
         }
         self.ts_s.resize(rows, 0.0);
         self.ts
@@ -91,22 +122,9 @@ impl EventReader {
             column.read(start, out, &self.path)?;
         }
         self.check(start)?;
-        let pixels = self.x.iter().zip(&self.y).zip(&self.pol);
-        self.events.extend(
-            self.ts_s
-                .iter()
-                .zip(pixels)
-                .map(|(ts, ((x, y), pol))| CdEvent {
-                    // Not negative and below 2^53 µs, so adding a half and cutting off is rounding.
-                    t_us: (ts * 1e6 + 0.5) as i64 as u64,
-                    x: *x,
-                    y: *y,
-                    polarity: Polarity::from_bit(*pol == 1),
-                }),
-        );
-        self.next_row += rows;
         self.last_ts_s = self.ts_s[rows - 1];
-        Ok(&self.events)
+        (self.slab_start, self.slab_end) = (start, start + rows);
+        Ok(())
     }
 
     /// Rows delivered so far.
@@ -121,21 +139,18 @@ impl EventReader {
         self.rows as u64
     }
 
-    /// Checks the batch that begins at row `start`. All values are looked at without branches; only a bad batch
-    /// is searched for its first bad row.
+    /// Checks the rows from `start` on. All values are looked at without branches; only bad rows are searched for
+    /// the first of them.
     fn check(&self, start: usize) -> Result<(), FormatsError> {
         let Geometry { width, height } = self.geometry;
-        let below =
-            |values: &[u16], limit: u16| values.iter().fold(0_u16, |max, v| max.max(*v)) < limit;
-        let ordered = self.ts_s[0] >= self.last_ts_s
-            && self.ts_s[self.ts_s.len() - 1] <= MAX_TS_S
-            && self
-                .ts_s
-                .windows(2)
-                .fold(true, |all, pair| all & (pair[0] <= pair[1]));
-        if !ordered {
+        let ts = &self.ts_s;
+        let backward = ts
+            .iter()
+            .zip(&ts[1..])
+            .fold(0, |bad, (a, b)| bad | u64::from(!(a <= b)));
+        if backward != 0 || !(ts[0] >= self.last_ts_s && ts[ts.len() - 1] <= MAX_TS_S) {
             let mut previous = self.last_ts_s;
-            for (row, ts) in self.ts_s.iter().enumerate() {
+            for (row, ts) in ts.iter().enumerate() {
                 if !(*ts >= previous && *ts <= MAX_TS_S) {
                     return Err(FormatsError::Row {
                         path: self.path.clone(),
@@ -150,14 +165,12 @@ impl EventReader {
                 previous = *ts;
             }
         }
-        let limits = [width, height, 2];
-        for ((column, values), limit) in self
-            .columns
-            .iter()
-            .zip([&self.x, &self.y, &self.pol])
-            .zip(limits)
-        {
-            if !below(values, limit)
+        let columns = [(&self.x, width), (&self.y, height), (&self.pol, 2)];
+        for (column, (values, limit)) in self.columns.iter().zip(columns) {
+            let outside = values
+                .iter()
+                .fold(0, |bad, v| bad | u16::from(*v >= limit));
+            if outside != 0
                 && let Some(row) = values.iter().position(|v| *v >= limit)
             {
                 let expected = format!("0..={}", limit - 1);

@@ -18,19 +18,25 @@ pub const TIME_HIGH_BITS: u32 = 28;
 /// Range of the stream's time, µs.
 pub const RANGE_US: u64 = 1 << 34;
 
-/// CD words that are handled at once.
-const GROUP: usize = 8;
+/// Words that are looked at together, as bytes.
+type Group = [[u8; 4]; GROUP];
+const GROUP: usize = 16;
+/// Words that are looked at in one step. Groups are surveyed lane by lane, which compiles to vector instructions.
+const LANES: usize = 4;
+/// Set in a time base word and in no CD word.
+const TIME_HIGH_FLAG: u32 = 1 << 31;
+/// Steps of the time base below this, in its unit, are progress beyond doubt.
+const SURE_STEP: u32 = TimeBase::<TIME_HIGH_BITS, 6>::HALF;
 
-/// True for a CD word of a pixel of the sensor.
-#[inline]
-fn is_cd_within(w: u32, (width, height): (u16, u16)) -> bool {
-    (w >> 29 == 0) & ((w >> 11 & 0x7ff) < u32::from(width)) & ((w & 0x7ff) < u32::from(height))
-}
-
-/// A run of plain words, on its way through the fast loop.
+/// A run of plain words on its way through the fast loop: CD events on the sensor and ordinary progress of the
+/// time base, which is nearly everything that a camera sends.
+///
+/// A group of words is checked and counted without a branch that depends on a single word: events and time
+/// base words alternate at random in a quiet stream, and a wrong guess of the processor costs more than a word.
 struct Run {
+    width: u32,
+    height: u32,
     epoch_us: u64,
-    base_us: u64,
     high: u32,
     events: usize,
     on: u64,
@@ -38,51 +44,145 @@ struct Run {
 
 impl Run {
     #[inline]
-    fn event(&self, w: u32) -> CdEvent {
+    fn base_us(&self) -> u64 {
+        self.epoch_us + (u64::from(self.high) << 6)
+    }
+
+    #[inline]
+    fn event(w: u32, base_us: u64) -> CdEvent {
         CdEvent {
-            t_us: self.base_us + u64::from(w >> 22 & 0x3f),
+            t_us: base_us + u64::from(w >> 22 & 0x3f),
             x: (w >> 11 & 0x7ff) as u16,
             y: (w & 0x7ff) as u16,
             polarity: Polarity::from_bit(w >> 28 & 1 == 1),
         }
     }
 
-    /// Takes CD words of one time base.
+    /// Bits that no plain word has: not 0 for a word of another type, or of a pixel outside the sensor.
     #[inline]
-    fn group<const KEEP: bool>(&mut self, group: &[u32; GROUP], buffer: &mut [CdEvent; BLOCK]) {
-        if KEEP && let Some(out) = buffer[self.events..].first_chunk_mut::<GROUP>() {
-            for (out, w) in out.iter_mut().zip(group) {
-                *out = self.event(*w);
+    fn foreign_bits(&self, w: u32) -> u32 {
+        // The highest bit is set when x < width and y < height.
+        let inside =
+            (w >> 11 & 0x7ff).wrapping_sub(self.width) & (w & 0x7ff).wrapping_sub(self.height);
+        (!(inside | w) & 0x8000_0000) | (w & 0x6000_0000) | (w & w >> 3 & 0x1000_0000)
+    }
+
+    /// Takes a group if it is plain; its events go to `out`.
+    #[inline]
+    fn group<const KEEP: bool>(&mut self, group: &Group, out: &mut [CdEvent; GROUP]) -> bool {
+        let (mut foreign, mut any, mut all) = ([0; LANES], [0; LANES], [u32::MAX; LANES]);
+        for words in group.as_chunks::<LANES>().0 {
+            for k in 0..LANES {
+                let w = u32::from_le_bytes(words[k]);
+                foreign[k] |= self.foreign_bits(w);
+                any[k] |= w;
+                all[k] &= w;
             }
         }
-        self.on += u64::from(group.iter().map(|w| w >> 28).sum::<u32>());
+        let or = |lanes: [u32; LANES]| lanes.iter().fold(0, |a, b| a | b);
+        if or(foreign) != 0 {
+            return false;
+        }
+        if or(any) & TIME_HIGH_FLAG == 0 {
+            self.events_only::<KEEP>(group, out);
+            true
+        } else if all.iter().fold(u32::MAX, |a, b| a & b) & TIME_HIGH_FLAG != 0 {
+            self.time_only(group)
+        } else {
+            self.mixed::<KEEP>(group, out)
+        }
+    }
+
+    #[inline]
+    fn events_only<const KEEP: bool>(&mut self, group: &Group, out: &mut [CdEvent; GROUP]) {
+        if KEEP {
+            let base_us = self.base_us();
+            for (out, w) in out.iter_mut().zip(group) {
+                *out = Self::event(u32::from_le_bytes(*w), base_us);
+            }
+        }
         self.events += GROUP;
+        self.count_on(group);
+    }
+
+    /// Takes a group of time base words if they are in order.
+    #[inline]
+    fn time_only(&mut self, group: &Group) -> bool {
+        let high = |k: usize| u32::from_le_bytes(group[k]) ^ TIME_HIGH_FLAG;
+        let mut steps = [high(0).wrapping_sub(self.high), 0, 0, 0];
+        // The last step overlaps the one before it.
+        for first in [1, 5, 9, GROUP - LANES] {
+            for (k, step) in steps.iter_mut().enumerate() {
+                *step |= high(first + k).wrapping_sub(high(first + k - 1));
+            }
+        }
+        let in_order = steps.iter().fold(0, |a, b| a | b) < SURE_STEP;
+        if in_order {
+            self.high = high(GROUP - 1);
+        }
+        in_order
+    }
+
+    /// Takes a group of both kinds if its time base words are in order.
+    #[inline]
+    fn mixed<const KEEP: bool>(&mut self, group: &Group, out: &mut [CdEvent; GROUP]) -> bool {
+        let (mut high, mut steps, mut events) = (self.high, 0, 0);
+        for w in group {
+            let w = u32::from_le_bytes(*w);
+            let previous = high;
+            high = if w & TIME_HIGH_FLAG != 0 {
+                w ^ TIME_HIGH_FLAG
+            } else {
+                previous
+            };
+            steps |= high.wrapping_sub(previous);
+            if KEEP {
+                // A time base word is written too, and overwritten by the next event. The remainder changes
+                // nothing, as there are at most GROUP - 1 events before the last word.
+                let base_us = self.epoch_us + (u64::from(high) << 6);
+                out[events % GROUP] = Self::event(w, base_us);
+            }
+            events += (!w >> 31) as usize;
+        }
+        let in_order = steps < SURE_STEP;
+        if in_order {
+            self.high = high;
+            self.events += events;
+            self.count_on(group);
+        }
+        in_order
+    }
+
+    #[inline]
+    fn count_on(&mut self, group: &Group) {
+        let mut on = [0; LANES];
+        for words in group.as_chunks::<LANES>().0 {
+            for k in 0..LANES {
+                on[k] += u32::from_le_bytes(words[k]) >> 28 & 1;
+            }
+        }
+        self.on += u64::from(on.iter().sum::<u32>());
     }
 
     /// Takes one word if it is plain.
-    #[inline]
-    fn word<const KEEP: bool>(
-        &mut self,
-        w: u32,
-        limits: (u16, u16),
-        buffer: &mut [CdEvent; BLOCK],
-    ) -> bool {
-        if is_cd_within(w, limits) {
-            if KEEP {
-                buffer[self.events] = self.event(w);
+    fn word<const KEEP: bool>(&mut self, w: u32, buffer: &mut [CdEvent; BLOCK]) -> bool {
+        if self.foreign_bits(w) != 0 {
+            return false;
+        }
+        if w & TIME_HIGH_FLAG != 0 {
+            let high = w ^ TIME_HIGH_FLAG;
+            let progress = high.wrapping_sub(self.high) < SURE_STEP;
+            if progress {
+                self.high = high;
             }
-            self.events += 1;
-            self.on += u64::from(w >> 28);
-            return true;
+            return progress;
         }
-        let high = w & 0x0fff_ffff;
-        let progress = high.wrapping_sub(self.high) <= TimeBase::<TIME_HIGH_BITS, 6>::HALF;
-        if w >> 28 == 8 && progress {
-            self.high = high;
-            self.base_us = self.epoch_us + (u64::from(high) << 6);
-            return true;
+        if KEEP {
+            buffer[self.events] = Self::event(w, self.base_us());
         }
-        false
+        self.events += 1;
+        self.on += u64::from(w >> 28);
+        true
     }
 }
 
@@ -105,9 +205,9 @@ impl Words {
         while !bytes.is_empty() {
             output.flush(sink);
             if self.base.known() {
-                let used = self.plain_words::<KEEP>(bytes, output);
+                let (used, full) = self.plain_words::<KEEP>(bytes, output);
                 bytes = &bytes[used..];
-                if used == BLOCK * 4 {
+                if full {
                     continue;
                 }
             }
@@ -120,57 +220,46 @@ impl Words {
         }
     }
 
-    /// Decodes a run of at most [`BLOCK`] plain words into the empty buffer and returns the bytes used.
-    ///
-    /// Plain are CD events on the sensor and ordinary progress of the time base: nearly everything a camera
-    /// sends. Eight CD events in a row, the usual case, are checked at once and written without a branch.
-    fn plain_words<const KEEP: bool>(&mut self, bytes: &[u8], output: &mut Output) -> usize {
-        let bytes = &bytes[..bytes.len().min(BLOCK * 4)];
-        let limits = (output.geometry.width, output.geometry.height);
+    /// Decodes plain words into the empty buffer, and returns the bytes used and whether they ended
+    /// because the buffer is full.
+    fn plain_words<const KEEP: bool>(
+        &mut self,
+        bytes: &[u8],
+        output: &mut Output,
+    ) -> (usize, bool) {
         let mut run = Run {
+            width: output.geometry.width.into(),
+            height: output.geometry.height.into(),
             epoch_us: self.base.epoch_us(),
-            base_us: self.base.base_us(),
             high: self.base.high(),
             events: 0,
             on: 0,
         };
-        let (groups, _) = bytes.as_chunks::<{ 4 * GROUP }>();
-        let mut words = 0;
-        'groups: for group in groups {
-            let group: [u32; GROUP] = std::array::from_fn(|k| {
-                u32::from_le_bytes([
-                    group[4 * k],
-                    group[4 * k + 1],
-                    group[4 * k + 2],
-                    group[4 * k + 3],
-                ])
-            });
-            if group
-                .iter()
-                .fold(true, |all, w| all & is_cd_within(*w, limits))
-            {
-                run.group::<KEEP>(&group, &mut output.buffer);
-                words += GROUP;
-                continue;
+        let buffer = &mut output.buffer;
+        let (all, _) = bytes.as_chunks();
+        let (mut words, mut full) = (0, false);
+        for group in all.as_chunks::<GROUP>().0 {
+            let place = if KEEP { run.events } else { 0 };
+            let Some(out) = buffer.get_mut(place..).and_then(<[_]>::first_chunk_mut) else {
+                full = true;
+                break;
+            };
+            if !run.group::<KEEP>(group, out) {
+                break;
             }
-            for w in group {
-                if !run.word::<KEEP>(w, limits, &mut output.buffer) {
-                    break 'groups;
-                }
-                words += 1;
-            }
+            words += GROUP;
         }
-        if words == groups.len() * GROUP {
-            let (rest, _) = bytes[words * 4..].as_chunks();
-            for word in rest {
-                if !run.word::<KEEP>(u32::from_le_bytes(*word), limits, &mut output.buffer) {
+        if !full {
+            // Fewer words than a group, or what precedes a word that is not plain: they fit.
+            for word in &all[words..] {
+                if !run.word::<KEEP>(u32::from_le_bytes(*word), buffer) {
                     break;
                 }
                 words += 1;
             }
         }
         self.finish_run::<KEEP>(&bytes[..words * 4], &run, output);
-        words * 4
+        (words * 4, full)
     }
 
     /// Books a run that used `bytes`.
@@ -187,7 +276,7 @@ impl Words {
             }
         };
         output.timed(time_of(first, self.base.base_us()));
-        output.timed(time_of(last, run.base_us));
+        output.timed(time_of(last, run.base_us()));
         self.base.advance(run.high);
         self.other = None;
         if KEEP {
