@@ -77,7 +77,11 @@ impl ProgressView {
                 let reached = made * 10 / planned;
                 if reached > *tenths {
                     *tenths = reached;
-                    errln!("{}  {}", where_and_when(&self.tracker), streams(&self.tracker));
+                    errln!(
+                        "{}  {}",
+                        where_and_when(&self.tracker),
+                        streams(&self.tracker)
+                    );
                 }
             }
         }

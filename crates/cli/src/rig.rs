@@ -2,8 +2,9 @@
 
 use std::path::Path;
 
-use skinrig_device::{CameraSettings, Rig, Roi};
-use skinrig_model::{RunHeader, SimLevel};
+use skinrig_controller::ControlHandle;
+use skinrig_device::{CameraSettings, Clock, Rig, Roi};
+use skinrig_model::{HostTime, InterruptionKind, RunHeader, SimLevel};
 use skinrig_protocol::{CameraRequest, Protocol};
 use skinrig_sim::replay::{RecordedRig, replayed_rig};
 use skinrig_sim::{SimConfig, in_real_time, simulated_rig};
@@ -49,4 +50,34 @@ pub fn replayed(path: &Path, header: &RunHeader, document: &RigDocument) -> Resu
         description_json: document.rig.to_string(),
     };
     Ok(replayed_rig(recorded, Box::new(recording)))
+}
+
+/// The operator of a recorded run, repeated: a clock that asks for the recorded stop or abort when its time comes.
+pub struct RepeatedOperator {
+    /// The replayed clock.
+    pub clock: Box<dyn Clock>,
+    /// When the recorded run was interrupted.
+    pub at: HostTime,
+    /// How.
+    pub kind: InterruptionKind,
+    /// Where requests go.
+    pub control: ControlHandle,
+}
+
+impl Clock for RepeatedOperator {
+    fn now(&self) -> HostTime {
+        self.clock.now()
+    }
+
+    fn wait_until(&mut self, t: HostTime) {
+        self.clock.wait_until(t);
+        if self.clock.now() >= self.at {
+            match self.kind {
+                InterruptionKind::Stop => self.control.stop(),
+                InterruptionKind::Abort => self.control.abort(),
+                InterruptionKind::Pause | InterruptionKind::Resume | InterruptionKind::Fault => {}
+            }
+            self.at = HostTime(i64::MAX);
+        }
+    }
 }

@@ -6,7 +6,7 @@ use chrono::{DateTime, SecondsFormat, Utc};
 use skinrig_controller::{ControlHandle, RunReport, execute};
 use skinrig_device::Rig;
 use skinrig_model::{
-    AnalysisSettings, CameraId, HostDuration, PressOutcome, PressVerdict, RunEnd, RunHeader,
+    AnalysisSettings, CameraId, HostDuration, InterruptionKind, PressVerdict, RunEnd, RunHeader,
     SimLevel,
 };
 use skinrig_protocol::Plan;
@@ -17,8 +17,9 @@ use crate::check;
 use crate::exit::{Exit, Failure, Outcome};
 use crate::progress::ProgressView;
 use crate::results::{self, RigDocument};
+use crate::rig::{self, RepeatedOperator};
 use crate::sink::{Foreknowledge, SessionSink};
-use crate::{paths, rig, signals};
+use crate::{paths, signals};
 
 /// What is to be recorded, before the rig adds what it knows.
 pub struct Intent<'a> {
@@ -55,7 +56,7 @@ pub struct Intent<'a> {
 pub fn record(
     intent: &Intent<'_>,
     plan: &Plan,
-    rig: Rig,
+    mut rig: Rig,
     folder: &Path,
 ) -> Result<(PathBuf, RunReport), Failure> {
     let started = Utc::now();
@@ -66,6 +67,14 @@ pub fn record(
     let mut sink = SessionSink::new(writer, view, intent.known.clone());
 
     let control = ControlHandle::new();
+    if let Some((at, kind)) = intent.known.interruption {
+        rig.clock = Box::new(RepeatedOperator {
+            clock: rig.clock,
+            at,
+            kind,
+            control: control.clone(),
+        });
+    }
     let operator = control.clone();
     signals::on_ctrl_c(move |times| match times {
         1 => {
@@ -299,21 +308,27 @@ fn replay(
         analysis: &document.analysis,
         command_line,
         expected,
-        known: foreknowledge(&reader.last_outcomes().map_err(Failure::input)?),
+        known: foreknowledge(&reader).map_err(Failure::input)?,
     };
     let rig = rig::replayed(recording, &header, &document)?;
     record(&intent, &plan, rig, folder)
 }
 
-/// What the recording says about its presses that no device can: schedule and exclusions.
-fn foreknowledge(outcomes: &[Option<PressOutcome>]) -> Foreknowledge {
+/// What the recording says that no device can: schedule, exclusions, and what the operator did.
+fn foreknowledge(reader: &SessionReader) -> Result<Foreknowledge, RecorderError> {
+    let outcomes = reader.last_outcomes()?;
     let outcomes = || outcomes.iter().flatten();
     let excluded = outcomes().filter_map(|o| match &o.verdict {
         PressVerdict::Excluded(rule) => Some((o.attempt.press, rule.clone())),
         _ => None,
     });
-    Foreknowledge {
+    let interruptions = reader.interruptions()?;
+    let ending = interruptions
+        .last()
+        .filter(|i| matches!(i.kind, InterruptionKind::Stop | InterruptionKind::Abort));
+    Ok(Foreknowledge {
         scheduled: outcomes().any(|o| o.scheduled),
         excluded: excluded.collect(),
-    }
+        interruption: ending.map(|i| (i.t, i.kind)),
+    })
 }

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use skinrig_controller::{RecordSink, SinkFault};
-use skinrig_model::{PressId, PressVerdict, Record};
+use skinrig_model::{HostTime, InterruptionKind, PressId, PressVerdict, Record};
 use skinrig_recorder::{RecorderError, Sealed, SessionWriter};
 
 use crate::progress::ProgressView;
@@ -15,6 +15,8 @@ pub struct Foreknowledge {
     pub scheduled: bool,
     /// Presses that are left out, with the rule that says so.
     pub excluded: BTreeMap<PressId, String>,
+    /// When and how the operator ended the recorded run.
+    pub interruption: Option<(HostTime, InterruptionKind)>,
 }
 
 /// Writes every record to the session file and shows it.

@@ -46,6 +46,7 @@ pub fn import(args: &ImportArgs, command_line: &str, json: bool) -> Outcome {
     let known = Foreknowledge {
         scheduled: true,
         excluded: excluded.collect(),
+        interruption: None,
     };
     let plan = plan::compile(&schedule, presses, &times);
 

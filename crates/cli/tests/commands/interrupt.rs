@@ -7,6 +7,7 @@ use std::process::{Child, ChildStderr, Command, Stdio};
 
 use serde_json::Value;
 
+use crate::replay::assert_replays;
 use crate::support::{Lab, ROOT, SMALL, files, only, program, said, show, skinrig, text};
 
 /// A run in real time, after its first press.
@@ -108,16 +109,8 @@ fn ctrl_c_ends_the_run_after_the_press_with_a_sealed_session() {
         "presses that were not made are no progress: {messages}"
     );
     let session = assert_ended_early(&lab.path("s"), "stop");
-    // The part that was recorded is a session like any other.
-    skinrig(&["analyze", &text(&session)]).code(0);
-    skinrig(&[
-        "run",
-        "--replay",
-        &text(&session),
-        "--sessions",
-        &lab.text("r"),
-        "--no-analysis",
-    ]);
+    // The part that was recorded is a session like any other, and its replay stops where it did.
+    assert_replays(&lab, &session, "r");
 }
 
 #[test]
@@ -129,7 +122,8 @@ fn ctrl_c_twice_retracts_and_stops_at_once() {
     run.signal("INT");
     let (code, messages) = run.end();
     assert_eq!(code, Some(5), "{messages}");
-    assert_ended_early(&lab.path("s"), "");
+    let session = assert_ended_early(&lab.path("s"), "");
+    assert_replays(&lab, &session, "r");
 }
 
 #[test]
