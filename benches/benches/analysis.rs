@@ -130,7 +130,7 @@ fn whole() {
         return;
     };
     let set = CalibrationSet::from_presses(&done.presses);
-    let scores = ScoreSet::from_presses(&done.presses);
+    let scores = ScoreSet::from_presses(&done.presses, &input.outcomes);
     let mut rates = RateHistogram::new(10_000);
     source.0[0].iter().for_each(|e| rates.add(e.t_us));
     let spans: Vec<PressSpan> = done

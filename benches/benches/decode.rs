@@ -217,6 +217,58 @@ fn decode_table(title: &str, format: StreamFormat, bytes: &[u8], events: usize) 
     println!("{}", table.run(7));
 }
 
+/// What most of a recording is: a camera that sees little or nothing, so that time base words are the bulk.
+fn idle_table() {
+    for (title, per_time_high, events) in [
+        (
+            "a skin at rest, 2.5 kev/s (1 event per 25 time words)",
+            0.04,
+            500_000,
+        ),
+        (
+            "darkness, 60 ev/s (1 event per 1000 time words)",
+            0.001,
+            12_500,
+        ),
+    ] {
+        let bytes = evt2(events, per_time_high);
+        let gigabytes = bytes.len() as f64 / 1e9;
+        let mut table = Table::new(
+            &format!("EVT2, {title}: {:.1} MB", 1e3 * gigabytes),
+            "GB",
+            "one core, bytes in memory, chunks of 128 KiB",
+        );
+        table.baseline("straightforward decoder", gigabytes, || {
+            let mut count = 0;
+            plain_evt2(&bytes, |e| count += usize::from(black_box(e).x < 640));
+            assert_eq!(count, events);
+        });
+        table.row("for_each_slice (slices to a callback)", gigabytes, || {
+            let mut decoder = Decoder::new(StreamFormat::Evt2);
+            let mut count = 0;
+            for chunk in bytes.chunks(CHUNK) {
+                decoder.for_each_slice(chunk, |slice| count += black_box(slice).len());
+            }
+            assert_eq!(count, events);
+        });
+        table.row("Scanner (counts only)", gigabytes, || {
+            let mut scanner = Scanner::new(StreamFormat::Evt2);
+            let mut count = 0;
+            for chunk in bytes.chunks(CHUNK) {
+                count += scanner.push(chunk).0.cd_events;
+            }
+            assert_eq!(count, events as u64);
+        });
+        let mut copy = vec![0; bytes.len()];
+        let source = &bytes;
+        table.row("memory copy of the same bytes", gigabytes, move || {
+            copy.copy_from_slice(source);
+            black_box(&copy);
+        });
+        println!("{}", table.run(7));
+    }
+}
+
 fn encode_table() {
     const IDLE_US: u64 = 1_000_000_000;
     let gigabytes = IDLE_US as f64 / 16.0 * 4.0 / 1e9;
@@ -255,6 +307,7 @@ fn main() {
         let bytes = evt2(10_000_000, per_time_high);
         decode_table(title, StreamFormat::Evt2, &bytes, 10_000_000);
     }
+    idle_table();
     let (bytes, events) = evt3(1_000_000, 10, false);
     decode_table(
         "EVT3, single events (10 per TIME_LOW)",

@@ -222,6 +222,45 @@ proptest! {
     }
 
     #[test]
+    fn evt2_words_in_groups_decode_as_one_by_one(
+        words in prop::collection::vec((0_u32..40, any::<u32>()), 0..3000),
+        quiet in 0_u32..36,
+    ) {
+        // Mostly events and progress of the time base in some proportion, and now and then what is neither:
+        // another type, a pixel outside, a step back, a step of half of the range or more.
+        let mut high = 0x0fff_ff00_u32;
+        let bytes: Vec<u8> = words
+            .into_iter()
+            .flat_map(|(kind, any)| {
+                let step = match kind {
+                    0 => [1 << 27, (1 << 27) - 1, 0_u32.wrapping_sub(1), any][any as usize % 4],
+                    _ => any % 3,
+                };
+                match kind {
+                    39 => any,
+                    38 => any & 0x1fff_ffff,
+                    k if k <= quiet => {
+                        high = high.wrapping_add(step) & 0x0fff_ffff;
+                        0x8000_0000 | high
+                    }
+                    _ => any & 0x1fc0_0000 | any % 640 << 11 | any % 480,
+                }
+                .to_le_bytes()
+            })
+            .collect();
+        let singly: Vec<&[u8]> = bytes.chunks(4).collect();
+        let (whole, decoder) = decode(StreamFormat::Evt2, &[&bytes]);
+        let (split, other) = decode(StreamFormat::Evt2, &singly);
+        prop_assert_eq!(&whole, &split);
+        prop_assert_eq!(decoder.stats(), other.stats());
+        prop_assert_eq!(decoder.last_us(), other.last_us());
+        let mut scanner = Scanner::new(StreamFormat::Evt2);
+        let (facts, _) = scanner.push(&bytes);
+        prop_assert_eq!(scanner.stats(), decoder.stats());
+        prop_assert_eq!((facts.first_us, facts.last_us), (decoder.first_us(), decoder.last_us()));
+    }
+
+    #[test]
     fn every_evt2_word_is_counted_once(words in prop::collection::vec(any::<u32>(), 0..3000)) {
         // Few type codes and small steps, so that runs, wraps and jumps all occur.
         let bytes: Vec<u8> = words

@@ -93,14 +93,17 @@ impl EventReader {
         let start = self.next_row - self.slab_start;
         let rows = start..(start + BATCH_ROWS).min(self.slab_end - self.slab_start);
         let pixels = self.x[rows.clone()].iter().zip(&self.y[rows.clone()]);
-        let values = pixels.zip(&self.pol[rows.clone()]).zip(&self.ts_s[rows.clone()]);
-        self.events.extend(values.map(|(((x, y), pol), ts)| CdEvent {
-            // Checked: not negative, and below 2^52 µs.
-            t_us: (ts * 1e6 + ROUNDING).to_bits() & ((1 << 52) - 1),
-            x: *x,
-            y: *y,
-            polarity: Polarity::from_bit(*pol == 1),
-        }));
+        let values = pixels
+            .zip(&self.pol[rows.clone()])
+            .zip(&self.ts_s[rows.clone()]);
+        self.events
+            .extend(values.map(|(((x, y), pol), ts)| CdEvent {
+                // Checked: not negative, and below 2^52 µs.
+                t_us: (ts * 1e6 + ROUNDING).to_bits() & ((1 << 52) - 1),
+                x: *x,
+                y: *y,
+                polarity: Polarity::from_bit(*pol == 1),
+            }));
         self.next_row += rows.len();
         Ok(&self.events)
     }
@@ -167,9 +170,7 @@ impl EventReader {
         }
         let columns = [(&self.x, width), (&self.y, height), (&self.pol, 2)];
         for (column, (values, limit)) in self.columns.iter().zip(columns) {
-            let outside = values
-                .iter()
-                .fold(0, |bad, v| bad | u16::from(*v >= limit));
+            let outside = values.iter().fold(0, |bad, v| bad | u16::from(*v >= limit));
             if outside != 0
                 && let Some(row) = values.iter().position(|v| *v >= limit)
             {
