@@ -158,6 +158,9 @@ pub fn fold(raw: &[u8]) -> Option<Vec<u8>> {
         }
         i += 1;
     }
+    if kept == 0 {
+        return None; // no run: nothing to copy
+    }
     out.extend_from_slice(words[kept..].as_flattened());
     (out.len() < raw.len()).then_some(out)
 }

@@ -1,16 +1,16 @@
 //! Records become rows: the statements of the one writer, and when they are committed.
 
 use std::path::PathBuf;
+use std::time::Instant;
 
 use sha2::{Digest, Sha256};
 use skinrig_model::{
-    HostTime, PlannedPress, PoseSample, PressOutcome, PressVerdict, RawChunk, Record, RunEnd,
-    RunHeader, StreamFormat,
+    HostTime, PlannedPress, PoseSample, PressOutcome, PressVerdict, Record, RunEnd, RunHeader,
 };
 use sqlx::sqlite::SqliteConnection;
 
-use crate::codec::{self, Codec};
 use crate::pose;
+use crate::prepare::{PreparedChunk, Ready};
 use crate::query::Fault;
 use crate::rows::SessionTotals;
 
@@ -25,11 +25,9 @@ const BLOCK_SAMPLES: usize = 4096;
 pub struct Journal {
     pub path: PathBuf,
     pub conn: SqliteConnection,
-    formats: [StreamFormat; 2],
-    next_seq: [u64; 2],
     poses: Vec<u8>,
     pose_span: Option<(HostTime, HostTime)>,
-    open: bool,
+    opened: Option<Instant>,
     pending_bytes: usize,
     pending_records: usize,
 }
@@ -39,19 +37,17 @@ impl Journal {
         Self {
             path,
             conn,
-            formats: [StreamFormat::Evt2; 2],
-            next_seq: [0; 2],
             poses: Vec::new(),
             pose_span: None,
-            open: false,
+            opened: None,
             pending_bytes: 0,
             pending_records: 0,
         }
     }
 
-    /// True when something was written since the last commit.
-    pub const fn pending(&self) -> bool {
-        self.open
+    /// When the transaction under way was opened; `None` when nothing was written since the last commit.
+    pub const fn opened(&self) -> Option<Instant> {
+        self.opened
     }
 
     /// True when so much was written since the last commit that one is due.
@@ -62,9 +58,9 @@ impl Journal {
     /// Makes everything written so far durable.
     pub async fn commit(&mut self) -> Result<(), Fault> {
         self.flush_poses().await?;
-        if self.open {
+        if self.opened.is_some() {
             sqlx::query("COMMIT").execute(&mut self.conn).await?;
-            self.open = false;
+            self.opened = None;
         }
         self.pending_bytes = 0;
         self.pending_records = 0;
@@ -72,15 +68,19 @@ impl Journal {
     }
 
     /// Writes one record into the transaction under way.
-    pub async fn write(&mut self, record: Record, bytes: usize) -> Result<(), Fault> {
-        if !self.open {
+    pub async fn write(&mut self, ready: Ready, bytes: usize) -> Result<(), Fault> {
+        if self.opened.is_none() {
             sqlx::query("BEGIN IMMEDIATE")
                 .execute(&mut self.conn)
                 .await?;
-            self.open = true;
+            self.opened = Some(Instant::now());
         }
         self.pending_bytes += bytes;
         self.pending_records += 1;
+        let record = match ready {
+            Ready::Chunk(chunk) => return self.chunk(*chunk).await,
+            Ready::Record(record) => record,
+        };
         match record {
             Record::Started(header) => self.started(&header).await,
             Record::Device {
@@ -155,7 +155,10 @@ impl Journal {
                 .await?;
                 Ok(())
             }
-            Record::Chunk(chunk) => self.chunk(chunk).await,
+            Record::Chunk(chunk) => {
+                let place = format!("{} chunk {}", chunk.camera, chunk.seq);
+                Err(Fault::bad(place, "a prepared chunk", "one as it came"))
+            }
             Record::Outcome(outcome) => self.outcome(&outcome).await,
             Record::Missed(attempt, reason) => {
                 sqlx::query(
@@ -204,7 +207,6 @@ impl Journal {
     }
 
     async fn started(&mut self, header: &RunHeader) -> Result<(), Fault> {
-        self.formats = header.stream_formats;
         let overrides = serde_json::to_string(&header.overrides)
             .map_err(|e| Fault::bad("overrides", "text", e))?;
         sqlx::query(
@@ -383,76 +385,39 @@ impl Journal {
         Ok(())
     }
 
-    async fn chunk(&mut self, chunk: RawChunk) -> Result<(), Fault> {
-        let camera = chunk.camera.index();
-        let place = format!("{} chunk {}", chunk.camera, chunk.seq);
-        if chunk.seq != self.next_seq[camera] {
-            return Err(Fault::bad(
-                place,
-                format!("chunk {}", self.next_seq[camera]),
-                chunk.seq,
-            ));
-        }
-        if chunk.bytes.len() > codec::MAX_CHUNK_BYTES {
-            let most = format!("at most {} bytes", codec::MAX_CHUNK_BYTES);
-            return Err(Fault::bad(place, most, chunk.bytes.len()));
-        }
-        if chunk.facts.trigger_edges != chunk.triggers.len() as u64 {
-            let counted = format!("{} trigger edges as counted", chunk.facts.trigger_edges);
-            return Err(Fault::bad(place, counted, chunk.triggers.len()));
-        }
-        self.next_seq[camera] += 1;
-        let raw_bytes = chunk.bytes.len();
-        let crc = crc32fast::hash(&chunk.bytes);
-        let folded = match self.formats[camera] {
-            StreamFormat::Evt2 => codec::fold(&chunk.bytes),
-            _ => None,
-        };
-        let (codec, stored) = match folded {
-            Some(folded) => (Codec::TimeHighRuns, folded),
-            None => (Codec::None, chunk.bytes),
-        };
-        let signed = |value: u64| {
-            i64::try_from(value).map_err(|_| Fault::bad(&place, "a number below 2^63", value))
-        };
-        let facts = chunk.facts;
+    async fn chunk(&mut self, chunk: PreparedChunk) -> Result<(), Fault> {
+        let camera = chunk.camera;
         sqlx::query(
             "INSERT INTO chunk (camera, seq, host_ns, lost_before, codec, raw_bytes, raw_crc32,
                stored_sha256, first_us, last_us, cd_events, on_events, trigger_edges, stored)
              VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
         )
-        .bind(chunk.camera.number())
-        .bind(signed(chunk.seq)?)
+        .bind(camera.number())
+        .bind(chunk.seq)
         .bind(chunk.host_time.0)
-        .bind(signed(chunk.lost_before)?)
-        .bind(codec.name())
-        .bind(raw_bytes as i64)
-        .bind(crc)
-        .bind(Sha256::digest(&stored).as_slice())
-        .bind(facts.first_us.map(signed).transpose()?)
-        .bind(facts.last_us.map(signed).transpose()?)
-        .bind(signed(facts.cd_events)?)
-        .bind(signed(facts.on_events)?)
-        .bind(signed(facts.trigger_edges)?)
-        .bind(stored)
+        .bind(chunk.lost_before)
+        .bind(chunk.codec.name())
+        .bind(chunk.raw_bytes)
+        .bind(chunk.raw_crc32)
+        .bind(chunk.stored_sha256.as_slice())
+        .bind(chunk.first_us)
+        .bind(chunk.last_us)
+        .bind(chunk.cd_events)
+        .bind(chunk.on_events)
+        .bind(chunk.trigger_edges)
+        .bind(chunk.stored)
         .execute(&mut self.conn)
         .await?;
-        if chunk.triggers.is_empty() {
+        let Some(edges) = chunk.edges_json else {
             return Ok(());
-        }
+        };
         // One statement for all edges: a statement per edge would cost more than all the rest.
-        let edges: Vec<_> = chunk
-            .triggers
-            .iter()
-            .map(|e| (e.t_us, e.channel, u8::from(e.rising)))
-            .collect();
-        let edges = serde_json::to_string(&edges).map_err(|e| Fault::bad(&place, "edges", e))?;
         sqlx::query(
             "INSERT INTO trigger_edge (camera, seq, position, t_us, channel, rising)
              SELECT ?, ?, key, value ->> 0, value ->> 1, value ->> 2 FROM json_each(?)",
         )
-        .bind(chunk.camera.number())
-        .bind(signed(chunk.seq)?)
+        .bind(camera.number())
+        .bind(chunk.seq)
         .bind(edges)
         .execute(&mut self.conn)
         .await?;

@@ -21,9 +21,12 @@ pub mod writer;
 mod from_row;
 mod insert;
 mod pose;
+mod prepare;
 mod query;
+mod queue;
 mod schema;
 mod seal;
+mod worker;
 
 pub use catalogue::{SESSION_SUFFIX, SessionState, SessionSummary, list};
 pub use codec::Codec;

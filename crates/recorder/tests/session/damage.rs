@@ -6,6 +6,9 @@ use crate::common::{Evt2, sealed};
 use skinrig_model::{CameraId, HostTime};
 use skinrig_recorder::{SessionReader, list, verify};
 
+/// Bytes of a page of a session file.
+const PAGE: usize = 65536;
+
 /// Reads all that a reader can read; errors are fine.
 fn read_all(path: &Path) {
     let Ok(reader) = SessionReader::open(path) else {
@@ -55,14 +58,15 @@ fn any_flipped_byte_is_found() {
     sealed(&path, 3);
     let original = std::fs::read(&path).unwrap();
     let n = original.len();
+    assert_eq!(original[16..18], [0, 1], "pages of 64 KiB");
     // Offsets of a fixed multiplicative walk over the file, then the whole file header and the ends of pages.
     let walk = (0..250u64).map(|k| (k.wrapping_mul(0x9E37_79B9_7F4A_7C15) % n as u64) as usize);
     check(&original, walk, |offset| 1 << (offset % 8));
     check(&original, 0..112, |_| 0x01);
-    check(&original, (0..n / 16384).map(|page| page * 16384), |_| 0x40);
+    check(&original, (0..n / PAGE).map(|page| page * PAGE), |_| 0x40);
     check(
         &original,
-        (0..n / 16384).map(|page| page * 16384 + 16383),
+        (0..n / PAGE).map(|page| page * PAGE + PAGE - 1),
         |_| 0x80,
     );
 }
@@ -87,7 +91,7 @@ fn cut_and_extended_files_are_found() {
     sealed(&path, 3);
     let original = std::fs::read(&path).unwrap();
     let changed = folder.path().join("x.session.sqlite");
-    for keep in [0, 50, 100, 16384, original.len() / 2, original.len() - 1] {
+    for keep in [0, 50, 100, PAGE, original.len() / 2, original.len() - 1] {
         std::fs::write(&changed, &original[..keep]).unwrap();
         assert!(
             !verify(&changed, &mut Evt2::default()).unwrap().is_sound(),

@@ -2,6 +2,7 @@
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 mod common;
+mod crash;
 mod damage;
 mod python;
 mod round_trip;

@@ -1,0 +1,147 @@
+//! Work on records that needs no file: camera bytes are checked, hashed and folded while SQLite writes those before.
+
+use std::sync::Arc;
+
+use sha2::{Digest, Sha256};
+use skinrig_model::{CameraId, HostTime, RawChunk, Record, StreamFormat};
+
+use crate::codec::{self, Codec};
+use crate::query::Fault;
+use crate::queue::{self, Prepared, Shared};
+
+/// A record that can be written.
+#[derive(Debug)]
+pub enum Ready {
+    /// Camera bytes.
+    Chunk(Box<PreparedChunk>),
+    /// Anything else, as it came.
+    Record(Record),
+}
+
+impl Ready {
+    /// Whether it must be on the disk before the caller goes on.
+    pub fn is_durable(&self) -> bool {
+        matches!(self, Self::Record(record) if queue::is_durable(record))
+    }
+}
+
+/// A row of `chunk`, and the rows of `trigger_edge` that belong to it.
+#[derive(Debug)]
+pub struct PreparedChunk {
+    pub camera: CameraId,
+    pub seq: i64,
+    pub host_time: HostTime,
+    pub lost_before: i64,
+    pub codec: Codec,
+    pub raw_bytes: i64,
+    pub raw_crc32: u32,
+    pub stored_sha256: [u8; 32],
+    pub first_us: Option<i64>,
+    pub last_us: Option<i64>,
+    pub cd_events: i64,
+    pub on_events: i64,
+    pub trigger_edges: i64,
+    pub stored: Vec<u8>,
+    /// `[[t_us, channel, rising], ...]`; `None` without edges.
+    pub edges_json: Option<String>,
+}
+
+/// Tells waiting callers when the thread ends by a panic.
+struct Farewell(Arc<Shared>);
+
+impl Drop for Farewell {
+    fn drop(&mut self) {
+        if std::thread::panicking() {
+            self.0
+                .fail("the recorder's preparing thread ended".to_owned());
+        }
+    }
+}
+
+/// Prepares records in their order until there are no more.
+pub fn run(shared: &Arc<Shared>) {
+    let _farewell = Farewell(Arc::clone(shared));
+    let mut preparer = Preparer::default();
+    while let Some((record, bytes)) = shared.next_to_prepare() {
+        shared.prepared(preparer.prepare(record), bytes);
+    }
+}
+
+/// What is remembered from record to record.
+#[derive(Default)]
+struct Preparer {
+    formats: Option<[StreamFormat; 2]>,
+    next_seq: [u64; 2],
+}
+
+impl Preparer {
+    fn prepare(&mut self, record: Record) -> Prepared {
+        match record {
+            Record::Chunk(chunk) => Ok(Ready::Chunk(Box::new(self.chunk(chunk)?))),
+            other => {
+                if let Record::Started(header) = &other {
+                    self.formats = Some(header.stream_formats);
+                }
+                Ok(Ready::Record(other))
+            }
+        }
+    }
+
+    fn chunk(&mut self, chunk: RawChunk) -> Result<PreparedChunk, Fault> {
+        let camera = chunk.camera.index();
+        let place = format!("{} chunk {}", chunk.camera, chunk.seq);
+        let next = self.next_seq[camera];
+        if chunk.seq != next {
+            return Err(Fault::bad(place, format!("chunk {next}"), chunk.seq));
+        }
+        if chunk.bytes.len() > codec::MAX_CHUNK_BYTES {
+            let most = format!("at most {} bytes", codec::MAX_CHUNK_BYTES);
+            return Err(Fault::bad(place, most, chunk.bytes.len()));
+        }
+        let facts = chunk.facts;
+        if facts.trigger_edges != chunk.triggers.len() as u64 {
+            let counted = format!("{} trigger edges as counted", facts.trigger_edges);
+            return Err(Fault::bad(place, counted, chunk.triggers.len()));
+        }
+        self.next_seq[camera] += 1;
+        let edges: Vec<_> = chunk
+            .triggers
+            .iter()
+            .map(|e| (e.t_us, e.channel, u8::from(e.rising)))
+            .collect();
+        let edges_json = (!edges.is_empty())
+            .then(|| serde_json::to_string(&edges))
+            .transpose()
+            .map_err(|e| Fault::bad(&place, "edges", e))?;
+        let signed = |value: u64| {
+            i64::try_from(value).map_err(|_| Fault::bad(&place, "a number below 2^63", value))
+        };
+        let raw_bytes = signed(chunk.bytes.len() as u64)?;
+        let raw_crc32 = crc32fast::hash(&chunk.bytes);
+        let folded = match self.formats.map(|formats| formats[camera]) {
+            Some(StreamFormat::Evt2) => codec::fold(&chunk.bytes),
+            _ => None,
+        };
+        let (codec, stored) = match folded {
+            Some(folded) => (Codec::TimeHighRuns, folded),
+            None => (Codec::None, chunk.bytes),
+        };
+        Ok(PreparedChunk {
+            camera: chunk.camera,
+            seq: signed(chunk.seq)?,
+            host_time: chunk.host_time,
+            lost_before: signed(chunk.lost_before)?,
+            codec,
+            raw_bytes,
+            raw_crc32,
+            stored_sha256: Sha256::digest(&stored).into(),
+            first_us: facts.first_us.map(signed).transpose()?,
+            last_us: facts.last_us.map(signed).transpose()?,
+            cd_events: signed(facts.cd_events)?,
+            on_events: signed(facts.on_events)?,
+            trigger_edges: signed(facts.trigger_edges)?,
+            stored,
+            edges_json,
+        })
+    }
+}

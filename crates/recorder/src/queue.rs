@@ -1,0 +1,205 @@
+//! The way of a record: accepted, prepared, written, durable; in order, in bounded memory.
+
+use std::collections::VecDeque;
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
+
+use skinrig_model::Record;
+
+use crate::prepare::Ready;
+use crate::query::Fault;
+
+/// Bytes of records that may wait to be written; beyond, [`accept`](crate::SessionWriter::accept) waits.
+const QUEUE_BYTES: usize = 64 << 20;
+
+/// A record that can be written, or why it cannot. It keeps its place in the order either way.
+pub type Prepared = Result<Ready, Fault>;
+
+/// What the caller, the preparing and the writing thread share.
+#[derive(Debug, Default)]
+pub struct Shared {
+    queue: Mutex<Queue>,
+    changed: Condvar,
+}
+
+#[derive(Debug, Default)]
+struct Queue {
+    accepted: VecDeque<(Record, usize)>,
+    /// One record is neither in `accepted` nor in `prepared`: it is being prepared.
+    preparing: bool,
+    prepared: VecDeque<(Prepared, usize)>,
+    /// Bytes accepted and not yet written.
+    bytes: usize,
+    /// Records accepted, and how many of them are durable, since the beginning.
+    taken: u64,
+    durable: u64,
+    failed: Option<String>,
+    closed: Option<Close>,
+}
+
+/// How a session is left.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Close {
+    /// Committed, readable, not sealed.
+    AsItIs,
+    /// Sealed.
+    Seal,
+}
+
+/// What the writing thread does next.
+pub enum Next {
+    /// Writes these, each with its bytes in the queue.
+    Write(VecDeque<(Prepared, usize)>),
+    /// Commits: nothing came in time.
+    Commit,
+    /// Ends: everything is written.
+    Close(Close),
+}
+
+impl Shared {
+    fn lock(&self) -> MutexGuard<'_, Queue> {
+        self.queue.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn wait<'a>(&self, queue: MutexGuard<'a, Queue>) -> MutexGuard<'a, Queue> {
+        self.changed
+            .wait(queue)
+            .unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Takes a record when there is room for it, and returns when it is durable if it has to be; or says why
+    /// nothing is written any more.
+    pub fn accept(&self, record: Record) -> Result<(), String> {
+        let (bytes, durable) = (size_of(&record), is_durable(&record));
+        let mut queue = self.lock();
+        while queue.failed.is_none() && queue.bytes > 0 && queue.bytes + bytes > QUEUE_BYTES {
+            queue = self.wait(queue);
+        }
+        if let Some(detail) = &queue.failed {
+            return Err(detail.clone());
+        }
+        queue.accepted.push_back((record, bytes));
+        queue.bytes += bytes;
+        queue.taken += 1;
+        let mine = queue.taken;
+        self.changed.notify_all();
+        while durable && queue.durable < mine {
+            if let Some(detail) = &queue.failed {
+                return Err(detail.clone());
+            }
+            queue = self.wait(queue);
+        }
+        Ok(())
+    }
+
+    /// The next record to prepare, with its bytes; `None` when there will be no more.
+    pub fn next_to_prepare(&self) -> Option<(Record, usize)> {
+        let mut queue = self.lock();
+        loop {
+            if let Some(next) = queue.accepted.pop_front() {
+                queue.preparing = true;
+                return Some(next);
+            }
+            if queue.closed.is_some() {
+                return None;
+            }
+            queue = self.wait(queue);
+        }
+    }
+
+    /// Hands on what [`next_to_prepare`](Self::next_to_prepare) gave out.
+    pub fn prepared(&self, prepared: Prepared, bytes: usize) {
+        let mut queue = self.lock();
+        queue.preparing = false;
+        if queue.failed.is_none() {
+            queue.prepared.push_back((prepared, bytes));
+        }
+        self.changed.notify_all();
+    }
+
+    /// What the writing thread does next; it has something to commit at `commit_at`.
+    pub fn next(&self, commit_at: Option<Instant>) -> Next {
+        let mut queue = self.lock();
+        loop {
+            if !queue.prepared.is_empty() {
+                return Next::Write(std::mem::take(&mut queue.prepared));
+            }
+            if let Some(close) = queue.closed
+                && queue.accepted.is_empty()
+                && !queue.preparing
+            {
+                return Next::Close(close);
+            }
+            match commit_at.filter(|_| queue.failed.is_none()) {
+                None => queue = self.wait(queue),
+                Some(at) => {
+                    let left = at.saturating_duration_since(Instant::now());
+                    if left.is_zero() {
+                        return Next::Commit;
+                    }
+                    queue = self
+                        .changed
+                        .wait_timeout(queue, left)
+                        .unwrap_or_else(PoisonError::into_inner)
+                        .0;
+                }
+            }
+        }
+    }
+
+    /// Makes room: a record of so many bytes was written.
+    pub fn written(&self, bytes: usize) {
+        let mut queue = self.lock();
+        queue.bytes = queue.bytes.saturating_sub(bytes);
+        self.changed.notify_all();
+    }
+
+    /// The first `records` records are on the disk.
+    pub fn durable(&self, records: u64) {
+        self.lock().durable = records;
+        self.changed.notify_all();
+    }
+
+    /// Nothing is written any more. The first reason stays.
+    pub fn fail(&self, detail: String) {
+        let mut queue = self.lock();
+        queue.failed.get_or_insert(detail);
+        queue.accepted.clear();
+        queue.prepared.clear();
+        queue.bytes = 0;
+        self.changed.notify_all();
+    }
+
+    /// Why nothing is written any more.
+    pub fn failure(&self) -> Option<String> {
+        self.lock().failed.clone()
+    }
+
+    /// No record follows.
+    pub fn close(&self, how: Close) {
+        self.lock().closed = Some(how);
+        self.changed.notify_all();
+    }
+}
+
+/// Whether a record must be on the disk before the caller goes on.
+pub fn is_durable(record: &Record) -> bool {
+    matches!(
+        record,
+        Record::Started(_) | Record::Intent { .. } | Record::Outcome(_) | Record::Ended { .. }
+    )
+}
+
+/// About how much memory a record takes.
+fn size_of(record: &Record) -> usize {
+    const SMALL: usize = 256;
+    SMALL
+        + match record {
+            Record::Started(h) => {
+                h.protocol_text.len() + h.plan_json.len() + h.rig_json.len() + 64 * h.presses.len()
+            }
+            Record::Chunk(chunk) => chunk.bytes.len() + 24 * chunk.triggers.len(),
+            Record::Poses(samples) => 64 * samples.len(),
+            _ => 0,
+        }
+}

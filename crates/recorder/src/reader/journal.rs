@@ -1,0 +1,157 @@
+//! What happened: presses and their attempts, commands, marks, remarks, the end.
+
+use skinrig_model::{
+    HostTime, InterruptionKind, Mark, MarkKind, MotionCommand, PlannedPress, Point3, PressId,
+    PressOutcome, RunEnd, SentMark,
+};
+
+use super::SessionReader;
+use crate::error::RecorderError;
+use crate::from_row::{attempt_from, planned_from};
+use crate::query::{Fault, int, named, num, opt_text, real, text};
+use crate::rows::{AttemptRow, CommandRow, InterruptionRow, NoteRow};
+
+impl SessionReader {
+    /// Every planned press in plan order, each with its attempts in order.
+    ///
+    /// # Errors
+    /// When the file is damaged.
+    pub fn presses(&self) -> Result<Vec<(PlannedPress, Vec<AttemptRow>)>, RecorderError> {
+        const DOING: &str = "reading presses";
+        let mut presses: Vec<(PlannedPress, Vec<AttemptRow>)> =
+            self.all(DOING, "SELECT * FROM press ORDER BY id", |row| {
+                Ok((planned_from(row)?, Vec::new()))
+            })?;
+        let attempts = self.all(
+            DOING,
+            "SELECT * FROM attempt ORDER BY press, number",
+            attempt_from,
+        )?;
+        for attempt in attempts {
+            match presses.binary_search_by_key(&attempt.id.press, |(planned, _)| planned.id) {
+                Ok(at) => presses[at].1.push(attempt),
+                Err(_) => {
+                    let place = attempt.id.to_string();
+                    return Err(self.damaged(place, "a planned press", "none".into()));
+                }
+            }
+        }
+        Ok(presses)
+    }
+
+    /// The outcome of the last attempt at each planned press, in plan order; `None` without a verdict. A press
+    /// that was recorded as missed has an outcome with that verdict.
+    ///
+    /// # Errors
+    /// When the file is damaged.
+    pub fn last_outcomes(&self) -> Result<Vec<Option<PressOutcome>>, RecorderError> {
+        let presses = self.presses()?;
+        Ok(presses
+            .into_iter()
+            .map(|(_, mut attempts)| attempts.pop()?.outcome)
+            .collect())
+    }
+
+    /// Every motion command, in order.
+    ///
+    /// # Errors
+    /// When the file is damaged.
+    pub fn commands(&self) -> Result<Vec<CommandRow>, RecorderError> {
+        self.all(
+            "reading commands",
+            "SELECT * FROM command ORDER BY id",
+            |row| {
+                Ok(CommandRow {
+                    t: HostTime(int(row, "t_ns")?),
+                    command: MotionCommand {
+                        target: Point3::new(
+                            real(row, "x_mm")?,
+                            real(row, "y_mm")?,
+                            real(row, "z_mm")?,
+                        ),
+                        speed_mm_s: real(row, "speed_mm_s")?,
+                    },
+                })
+            },
+        )
+    }
+
+    /// The marks that the trigger box sent, in order.
+    ///
+    /// # Errors
+    /// When the file is damaged.
+    pub fn marks_sent(&self) -> Result<Vec<SentMark>, RecorderError> {
+        self.all("reading marks", "SELECT * FROM mark ORDER BY id", |row| {
+            Ok(SentMark {
+                mark: Mark {
+                    kind: named(row, "kind", &MarkKind::ALL, MarkKind::name)?,
+                    press: PressId(num(row, "press")?),
+                },
+                t: HostTime(int(row, "t_ns")?),
+                uncertainty_ns: int(row, "uncertainty_ns")?,
+            })
+        })
+    }
+
+    /// Everything that broke the normal course, in order.
+    ///
+    /// # Errors
+    /// When the file is damaged.
+    pub fn interruptions(&self) -> Result<Vec<InterruptionRow>, RecorderError> {
+        const KINDS: [InterruptionKind; 5] = [
+            InterruptionKind::Pause,
+            InterruptionKind::Resume,
+            InterruptionKind::Stop,
+            InterruptionKind::Abort,
+            InterruptionKind::Fault,
+        ];
+        self.all(
+            "reading interruptions",
+            "SELECT * FROM interruption ORDER BY id",
+            |row| {
+                Ok(InterruptionRow {
+                    t: HostTime(int(row, "t_ns")?),
+                    kind: named(row, "kind", &KINDS, InterruptionKind::name)?,
+                    reason: text(row, "reason")?,
+                })
+            },
+        )
+    }
+
+    /// Every remark, in order.
+    ///
+    /// # Errors
+    /// When the file is damaged.
+    pub fn notes(&self) -> Result<Vec<NoteRow>, RecorderError> {
+        self.all("reading notes", "SELECT * FROM note ORDER BY id", |row| {
+            Ok(NoteRow {
+                t: HostTime(int(row, "t_ns")?),
+                text: text(row, "text")?,
+            })
+        })
+    }
+
+    /// When and how the run ended; `None` for a run under way or cut off.
+    ///
+    /// # Errors
+    /// When the file is damaged.
+    pub fn end(&self) -> Result<Option<(HostTime, RunEnd)>, RecorderError> {
+        let ends = self.all("reading its end", "SELECT * FROM run_end", |row| {
+            let reason = opt_text(row, "reason")?.unwrap_or_default();
+            let end = match text(row, "status")?.as_str() {
+                "completed" => RunEnd::Completed,
+                "stopped" => RunEnd::Stopped(reason),
+                "faulted" => RunEnd::Faulted(reason),
+                other => {
+                    return Err(Fault::bad(
+                        "run_end",
+                        "completed, stopped or faulted",
+                        other,
+                    ));
+                }
+            };
+            Ok((HostTime(int(row, "t_ns")?), end))
+        })?;
+        Ok(ends.into_iter().next())
+    }
+}

@@ -1,0 +1,162 @@
+//! Camera bytes, chunk by chunk, and what is known about them.
+
+use skinrig_model::{CameraId, TriggerEdge};
+
+use super::SessionReader;
+use crate::codec::{self, Codec};
+use crate::error::RecorderError;
+use crate::from_row::chunk_from;
+use crate::query::{blob, each_row, int, num};
+use crate::rows::ChunkMeta;
+
+const CHUNK_COLUMNS: &str = "camera, seq, host_ns, lost_before, codec, raw_bytes, raw_crc32, first_us, \
+    last_us, cd_events, on_events, trigger_edges, length(stored) AS stored_bytes";
+
+impl SessionReader {
+    /// Every chunk of `camera` without its bytes, in stream order.
+    ///
+    /// # Errors
+    /// When the file is damaged.
+    pub fn chunk_index(&self, camera: CameraId) -> Result<Vec<ChunkMeta>, RecorderError> {
+        self.ask("reading the chunk index", async |conn| {
+            let sql = format!("SELECT {CHUNK_COLUMNS} FROM chunk WHERE camera = ? ORDER BY seq");
+            let query = sqlx::query(sqlx::AssertSqlSafe(sql)).bind(camera.number());
+            let mut index = Vec::new();
+            each_row(query, conn, |row| {
+                index.push(chunk_from(row)?);
+                Ok(())
+            })
+            .await?;
+            Ok(index)
+        })
+    }
+
+    /// The bytes of one chunk as they came, checked against their checksum.
+    ///
+    /// # Errors
+    /// [`RecorderError::NotThere`] for a number beyond the last chunk; [`RecorderError::Damaged`].
+    pub fn chunk_bytes(&self, camera: CameraId, seq: u64) -> Result<Vec<u8>, RecorderError> {
+        match self.chunk_at_or_after(camera, seq)? {
+            Some((meta, bytes)) if meta.seq == seq => Ok(bytes),
+            _ => Err(RecorderError::NotThere {
+                path: self.path.clone(),
+                wanted: format!("{camera} chunk {seq}"),
+            }),
+        }
+    }
+
+    /// The first chunk from `seq` on, with its bytes as they came, checked.
+    pub(crate) fn chunk_at_or_after(
+        &self,
+        camera: CameraId,
+        seq: u64,
+    ) -> Result<Option<(ChunkMeta, Vec<u8>)>, RecorderError> {
+        let Ok(from) = i64::try_from(seq) else {
+            return Ok(None);
+        };
+        let found = self.ask("reading a chunk", async |conn| {
+            let sql = format!(
+                "SELECT {CHUNK_COLUMNS}, stored FROM chunk WHERE camera = ? AND seq >= ? ORDER BY seq LIMIT 1"
+            );
+            let query = sqlx::query(sqlx::AssertSqlSafe(sql)).bind(camera.number()).bind(from);
+            let row = query.fetch_optional(conn).await?;
+            row.map(|row| Ok((chunk_from(&row)?, blob(&row, "stored")?))).transpose()
+        })?;
+        let Some((meta, stored)) = found else {
+            return Ok(None);
+        };
+        let place = || format!("{camera} chunk {}", meta.seq);
+        let bytes = match meta.codec {
+            Codec::None => stored,
+            Codec::TimeHighRuns => codec::unfold(&stored, meta.raw_bytes as usize)
+                .map_err(|e| self.damaged(place(), "bytes that unfold", e.to_string()))?,
+        };
+        if bytes.len() as u64 != meta.raw_bytes {
+            let expected = format!("{} bytes", meta.raw_bytes);
+            return Err(self.damaged(place(), &expected, bytes.len().to_string()));
+        }
+        let crc = crc32fast::hash(&bytes);
+        if crc != meta.raw_crc32 {
+            let expected = format!("CRC-32 {:#010x}", meta.raw_crc32);
+            return Err(self.damaged(place(), &expected, format!("{crc:#010x}")));
+        }
+        Ok(Some((meta, bytes)))
+    }
+
+    /// Calls `each` with every chunk of `camera` from number `from_seq` on, in stream order, with its bytes as
+    /// they came. One chunk is in memory at a time; `each` may use this reader.
+    ///
+    /// # Errors
+    /// At the first damaged chunk; those before it have been handed over.
+    pub fn for_each_chunk(
+        &self,
+        camera: CameraId,
+        from_seq: u64,
+        mut each: impl FnMut(ChunkMeta, &[u8]),
+    ) -> Result<(), RecorderError> {
+        let mut next = from_seq;
+        while let Some((meta, bytes)) = self.chunk_at_or_after(camera, next)? {
+            each(meta, &bytes);
+            next = meta.seq + 1;
+        }
+        Ok(())
+    }
+
+    /// Camera-time intervals `(from_us, to_us)` in which bytes of `camera` were lost: from the last time seen
+    /// before a loss to the first time seen after it; 0 and `u64::MAX` where there is none.
+    ///
+    /// # Errors
+    /// When the file is damaged.
+    pub fn gaps(&self, camera: CameraId) -> Result<Vec<(u64, u64)>, RecorderError> {
+        let mut gaps = Vec::new();
+        let (mut last_us, mut lost) = (0, false);
+        for chunk in self.chunk_index(camera)? {
+            lost |= chunk.lost_before > 0;
+            if let (Some(first), Some(last)) = (chunk.facts.first_us, chunk.facts.last_us) {
+                if lost {
+                    gaps.push((last_us, first));
+                }
+                (last_us, lost) = (last, false);
+            }
+        }
+        if lost {
+            gaps.push((last_us, u64::MAX));
+        }
+        Ok(gaps)
+    }
+
+    /// The trigger edges of `camera`, in stream order, all channels.
+    ///
+    /// # Errors
+    /// When the file is damaged.
+    pub fn trigger_edges(&self, camera: CameraId) -> Result<Vec<TriggerEdge>, RecorderError> {
+        self.edges(camera, 0, i64::MAX)
+    }
+
+    /// The trigger edges of one chunk.
+    pub(crate) fn edges(
+        &self,
+        camera: CameraId,
+        from_seq: i64,
+        to_seq: i64,
+    ) -> Result<Vec<TriggerEdge>, RecorderError> {
+        self.ask("reading trigger edges", async |conn| {
+            let query = sqlx::query(
+                "SELECT t_us, channel, rising FROM trigger_edge
+                 WHERE camera = ? AND seq BETWEEN ? AND ? ORDER BY seq, position",
+            );
+            let mut edges = Vec::new();
+            let query = query.bind(camera.number()).bind(from_seq).bind(to_seq);
+            each_row(query, conn, |row| {
+                edges.push(TriggerEdge {
+                    t_us: num(row, "t_us")?,
+                    channel: num(row, "channel")?,
+                    rising: int(row, "rising")? != 0,
+                });
+                Ok(())
+            })
+            .await?;
+            Ok(edges)
+        })
+    }
+}

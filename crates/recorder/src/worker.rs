@@ -1,0 +1,183 @@
+//! The thread that owns the session file: writes what is prepared, commits, seals.
+
+use std::collections::VecDeque;
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Duration;
+
+use sqlx::Connection;
+use tokio::runtime::Runtime;
+
+use crate::error::RecorderError;
+use crate::insert::Journal;
+use crate::query::Fault;
+use crate::queue::{Close, Next, Prepared, Shared};
+use crate::seal;
+use crate::writer::Sealed;
+
+/// What is not committed by a durable record or by its size is committed after this time.
+const COMMIT_AFTER: Duration = Duration::from_millis(500);
+
+/// Writes prepared records into the session file.
+pub struct Worker {
+    pub runtime: Runtime,
+    pub journal: Journal,
+    pub shared: Arc<Shared>,
+}
+
+/// Tells waiting callers when the thread ends, however it ends.
+struct Farewell(Arc<Shared>);
+
+impl Drop for Farewell {
+    fn drop(&mut self) {
+        self.0.fail("the recorder thread ended".to_owned());
+    }
+}
+
+/// A fault of the writing side in words: a record that cannot be kept is no damage to the file.
+fn told(fault: Fault, path: &Path, doing: &'static str) -> String {
+    match fault {
+        Fault::Bad {
+            place,
+            expected,
+            found,
+        } => {
+            format!(
+                "{}: {place}: expected {expected}, found {found}",
+                path.display()
+            )
+        }
+        sql @ Fault::Sql(_) => sql.at(path, doing).to_string(),
+    }
+}
+
+impl Worker {
+    /// Writes until the session is closed, then leaves it as it was asked to.
+    pub fn run(mut self) -> Option<Result<Sealed, RecorderError>> {
+        let farewell = Farewell(Arc::clone(&self.shared));
+        let path = self.journal.path.clone();
+        let mut written = 0;
+        let close = loop {
+            let commit_at = self.journal.opened().map(|t| t + COMMIT_AFTER);
+            let step = match self.shared.next(commit_at) {
+                Next::Write(records) => self.write_all(records, &mut written),
+                Next::Commit => self.commit(written),
+                Next::Close(close) => break close,
+            };
+            if let Err(fault) = step {
+                self.shared.fail(told(fault, &path, "writing a record"));
+            }
+        };
+        if self.shared.failure().is_none()
+            && let Err(fault) = self.commit(written)
+        {
+            self.shared
+                .fail(told(fault, &path, "committing the last records"));
+        }
+        let failed = self.shared.failure().is_some();
+        let Self {
+            runtime, journal, ..
+        } = self;
+        let result = if close == Close::Seal && !failed {
+            Some(runtime.block_on(seal_session(journal)))
+        } else {
+            // Nothing can be done about a failing close: what was committed is safe.
+            let _ = runtime.block_on(journal.conn.close());
+            None
+        };
+        drop(farewell);
+        result
+    }
+
+    fn write_all(
+        &mut self,
+        records: VecDeque<(Prepared, usize)>,
+        written: &mut u64,
+    ) -> Result<(), Fault> {
+        let mut durable = false;
+        for (record, bytes) in records {
+            let record = record?;
+            durable |= record.is_durable();
+            self.runtime.block_on(self.journal.write(record, bytes))?;
+            *written += 1;
+            self.shared.written(bytes);
+            if self.journal.commit_due() {
+                self.commit(*written)?;
+                durable = false;
+            }
+        }
+        // A steady trickle of small records must not put the commit off for ever.
+        let late = self
+            .journal
+            .opened()
+            .is_some_and(|t| t.elapsed() >= COMMIT_AFTER);
+        if durable || late {
+            self.commit(*written)
+        } else {
+            Ok(())
+        }
+    }
+
+    fn commit(&mut self, written: u64) -> Result<(), Fault> {
+        self.runtime.block_on(self.journal.commit())?;
+        self.shared.durable(written);
+        Ok(())
+    }
+}
+
+async fn seal_session(mut journal: Journal) -> Result<Sealed, RecorderError> {
+    let path = journal.path.clone();
+    let sql = |fault: Fault| fault.at(&path, "sealing");
+    let totals = match journal.sealable().await.map_err(sql)? {
+        Ok(totals) => totals,
+        Err((expected, found)) => {
+            let _ = journal.conn.close().await;
+            return Err(RecorderError::Unsealable {
+                path,
+                expected,
+                found,
+            });
+        }
+    };
+    let mut conn = journal.conn;
+    // Out of the log first, while no seal exists: should this fail, the session is plainly unsealed.
+    let unsealable = |found: String| RecorderError::Unsealable {
+        path: path.clone(),
+        expected: "that no other program has the session open".into(),
+        found,
+    };
+    conn.clear_cached_statements()
+        .await
+        .map_err(|e| sql(e.into()))?;
+    let mode: String = sqlx::query_scalar("PRAGMA journal_mode = DELETE")
+        .fetch_one(&mut conn)
+        .await
+        .map_err(|e| unsealable(e.to_string()))?;
+    if mode != "delete" {
+        return Err(unsealable(format!("journal mode {mode}")));
+    }
+    let (tree_sha256, placeholder) = seal::write_rows(&mut conn, &totals).await.map_err(sql)?;
+    let page = seal::seal_page(&mut conn).await.map_err(sql)?;
+    conn.close().await.map_err(|e| sql(e.into()))?;
+    let io = |doing| {
+        let path = path.clone();
+        move |source| RecorderError::Io {
+            path,
+            doing,
+            source,
+        }
+    };
+    let file_sha256 =
+        seal::stamp(&path, page, &placeholder).map_err(io("writing the file hash"))?;
+    let metadata = std::fs::metadata(&path).map_err(io("reading its size"))?;
+    let mut permissions = metadata.permissions();
+    permissions.set_readonly(true);
+    std::fs::set_permissions(&path, permissions).map_err(io("making it read-only"))?;
+    Ok(Sealed {
+        path,
+        bytes: metadata.len(),
+        totals,
+        tree_sha256,
+        file_sha256,
+    })
+}
