@@ -165,6 +165,7 @@ impl Shared {
         let mut queue = self.lock();
         queue.failed.get_or_insert(detail);
         queue.accepted.clear();
+        queue.preparing = false; // what still comes is dropped, and nobody waits for it
         queue.prepared.clear();
         queue.bytes = 0;
         self.changed.notify_all();

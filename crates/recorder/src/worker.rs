@@ -96,7 +96,14 @@ impl Worker {
     ) -> Result<(), Fault> {
         let mut durable = false;
         for (record, bytes) in records {
-            let record = record?;
+            let record = match record {
+                Ok(record) => record,
+                Err(fault) => {
+                    // Nothing of it was written; what came before it is sound.
+                    self.commit(*written)?;
+                    return Err(fault);
+                }
+            };
             durable |= record.is_durable();
             self.runtime.block_on(self.journal.write(record, bytes))?;
             *written += 1;

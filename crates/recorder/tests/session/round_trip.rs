@@ -261,8 +261,12 @@ fn lost_chunks_and_nan_positions_are_never_taken() {
         },
     ] {
         let folder = tempfile::tempdir().unwrap();
-        let mut writer = SessionWriter::create(folder.path().join("a")).unwrap();
+        let path = folder.path().join("a");
+        let mut writer = SessionWriter::create(&path).unwrap();
+        let is_chunk = matches!(record, Record::Chunk(_));
         writer.accept(Record::Started(Box::new(header(3)))).unwrap();
+        let (t, text) = (HostTime(0), "before".to_owned());
+        writer.accept(Record::Note { t, text }).unwrap();
         writer.accept(record).unwrap();
         let id = AttemptId {
             press: PressId(0),
@@ -276,6 +280,11 @@ fn lost_chunks_and_nan_positions_are_never_taken() {
             writer.accept(intent),
             Err(RecorderError::Failed(_))
         ));
+        drop(writer);
+        if is_chunk {
+            let notes = SessionReader::open(&path).unwrap().notes().unwrap();
+            assert_eq!(notes.len(), 1, "what came before it is kept");
+        }
     }
 }
 
