@@ -83,10 +83,10 @@ fn raw(
     path: &Path,
 ) -> Result<(), Failure> {
     let devices = reader.devices().map_err(Failure::input)?;
-    let serial = devices
+    let device = devices
         .iter()
-        .find(|d| d.role == DeviceRole::of_camera(camera))
-        .map_or("unknown", |d| d.identity.serial.as_str());
+        .find(|d| d.role == DeviceRole::of_camera(camera));
+    let serial = device.map_or("unknown", |d| d.identity.serial.as_str());
     // RAW headers carry a civil date without a zone; the session's start is UTC.
     let date = header
         .started_at
@@ -95,7 +95,14 @@ fn raw(
         .collect::<String>()
         .replace('T', " ");
     let format = header.stream_formats[camera.index()];
+    let model = device.map_or("", |d| d.identity.model.as_str());
+    let more = if model.contains("re-encoded") {
+        vec![("skinrig_source".to_owned(), model.to_owned())]
+    } else {
+        Vec::new()
+    };
     let metadata = RawMetadata {
+        more,
         format,
         ..RawMetadata::evk1(&date, serial)
     };

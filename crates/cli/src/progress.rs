@@ -15,6 +15,7 @@ pub struct ProgressView {
     tracker: ProgressTracker,
     display: Display,
     drawn: Option<Instant>,
+    began: Instant,
 }
 
 enum Display {
@@ -47,6 +48,7 @@ impl ProgressView {
             tracker: ProgressTracker::new(Some(expected)),
             display,
             drawn: None,
+            began: Instant::now(),
         }
     }
 
@@ -60,12 +62,13 @@ impl ProgressView {
     pub fn update(&mut self, record: &Record) {
         self.tracker.update(record);
         let done = self.tracker.progress().done;
+        let waited = self.began.elapsed();
         match &mut self.display {
             Display::Bar(bar) => {
                 let due = self.drawn.is_none_or(|at| at.elapsed() >= REDRAW_EVERY);
                 if due {
                     bar.set_position(done as u64);
-                    bar.set_prefix(where_and_when(&self.tracker));
+                    bar.set_prefix(where_and_when(&self.tracker, waited));
                     bar.set_message(streams(&self.tracker));
                     self.drawn = Some(Instant::now());
                 }
@@ -79,7 +82,7 @@ impl ProgressView {
                     *tenths = reached;
                     errln!(
                         "{}  {}",
-                        where_and_when(&self.tracker),
+                        where_and_when(&self.tracker, waited),
                         streams(&self.tracker)
                     );
                 }
@@ -95,8 +98,8 @@ impl ProgressView {
     }
 }
 
-/// `press 12/246  rep 2  (10.0, 2.0) mm  eta 0:03:12`
-fn where_and_when(tracker: &ProgressTracker) -> String {
+/// `press 12/246  rep 2  (10.0, 2.0) mm  eta 0:00:08 (0:11:00 of rig time)`
+fn where_and_when(tracker: &ProgressTracker, waited: Duration) -> String {
     let p = tracker.progress();
     let press = p.press.map_or_else(String::new, |press| {
         let block = match press.role {
@@ -106,8 +109,22 @@ fn where_and_when(tracker: &ProgressTracker) -> String {
         format!("  {block}  ({:.1}, {:.1}) mm", press.at.x_mm, press.at.y_mm)
     });
     let paused = if p.paused { "  PAUSED" } else { "" };
-    let eta = p.eta.map_or_else(|| "-".into(), clock_text);
+    let eta = eta_text(p.elapsed, p.eta, waited);
     format!("press {}{press}{paused}  eta {eta}", tracker.press_label())
+}
+
+/// How long the user still waits, and the rig time that passes meanwhile where that is another one.
+fn eta_text(elapsed: HostDuration, rig: Option<HostDuration>, waited: Duration) -> String {
+    let Some(rig) = rig.filter(|_| elapsed.0 > 0) else {
+        return "-".into();
+    };
+    let pace = waited.as_secs_f64() / elapsed.as_secs_f64();
+    let wait = clock_text(HostDuration::from_secs_f64(rig.as_secs_f64() * pace));
+    if (0.8..1.25).contains(&pace) {
+        wait
+    } else {
+        format!("{wait} ({} of rig time)", clock_text(rig))
+    }
 }
 
 /// `camera 1 31.2, camera 2 28.0 kev/s  trigger 24 sent, 24+24 seen`
@@ -149,6 +166,16 @@ pub fn clock_text(d: HostDuration) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_eta_is_what_the_user_waits() {
+        let s = HostDuration::from_secs_f64;
+        let eta = |waited| eta_text(s(100.0), Some(s(200.0)), Duration::from_secs(waited));
+        assert_eq!(eta(1), "0:00:02 (0:03:20 of rig time)");
+        assert_eq!(eta(100), "0:03:20");
+        assert_eq!(eta_text(s(0.0), Some(s(200.0)), Duration::ZERO), "-");
+        assert_eq!(eta_text(s(1.0), None, Duration::ZERO), "-");
+    }
 
     #[test]
     fn durations_read_like_a_clock() {

@@ -27,7 +27,7 @@ pub fn provenance(
     let (run_end, run_end_reason) = match reader.end()? {
         None => (
             "not ended".to_owned(),
-            Some("the recording was cut off".to_owned()),
+            Some("the run is under way, or was cut off".to_owned()),
         ),
         Some((_, end)) => {
             let reason = match &end {

@@ -150,10 +150,22 @@ pub fn write_results(
     Ok((json_path, html_path))
 }
 
+/// Writes a whole file or none: a full disk leaves no half of it.
 fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
-    std::fs::write(path, bytes).map_err(|e| {
+    let mut partial = path.as_os_str().to_owned();
+    partial.push(".partial");
+    let partial = PathBuf::from(partial);
+    let written = std::fs::write(&partial, bytes).and_then(|()| std::fs::rename(&partial, path));
+    written.map_err(|e| {
+        let _ = std::fs::remove_file(&partial);
+        let next = match e.kind() {
+            std::io::ErrorKind::StorageFull => {
+                "free space there, or choose another place with --out"
+            }
+            _ => "choose another place with --out",
+        };
         Failure::internal(format!(
-            "{}: cannot write: {e}\n  next: free space or choose another place with --out",
+            "{}: cannot write: {e}\n  next: {next}",
             path.display()
         ))
     })

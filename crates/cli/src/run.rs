@@ -125,7 +125,7 @@ fn new_session(
                     let _ = std::fs::remove_file(file);
                 }
                 return Err(Failure::internal(format!(
-                    "{error}\n  next: free space there, or choose another folder with --sessions"
+                    "{error}\n  next: choose a folder that can be written, with space, with --sessions"
                 )));
             }
         }
@@ -138,8 +138,11 @@ fn header(
     rig: &Rig,
     started_at: &str,
 ) -> Result<RunHeader, Failure> {
-    let description = serde_json::from_str(&rig.description_json)
-        .unwrap_or_else(|_| serde_json::Value::String(rig.description_json.clone()));
+    let description = serde_json::from_str(&rig.description_json).map_err(|e| {
+        Failure::internal(format!(
+            "expected the description of the rig as JSON, found: {e}"
+        ))
+    })?;
     let document = RigDocument {
         geometry: rig.geometry,
         analysis: intent.analysis.clone(),
@@ -207,29 +210,44 @@ pub fn conclude(
     max_rmse_mm: Option<f64>,
     json: bool,
 ) -> Outcome {
-    let mut limit = Ok(Exit::Ok);
-    if no_analysis && json {
+    let analysed = if no_analysis && json {
         crate::print_json(&serde_json::json!({ "files": { "session": session } }));
+        Ok(Exit::Ok)
     } else if no_analysis {
         outln!("{}", session.display());
+        Ok(Exit::Ok)
     } else {
-        let results = results::analyze_session(session, &[])?;
-        let written = results::write_results(&results, None, None)?;
-        results::print_results(&results, json, &written);
-        limit = results::check_limit(&results, max_rmse_mm);
-    }
+        analyse(session, max_rmse_mm, json)
+    };
+    // How the run ended comes first: a failing analysis must not hide a fault of the rig.
     let kept = format!("the session up to there is kept: {}", session.display());
+    let also = |analysed: Outcome| {
+        if let Err(failure) = analysed {
+            errln!("also: {}", failure.message);
+        }
+    };
     match &report.end {
-        RunEnd::Completed => limit,
+        RunEnd::Completed => analysed,
         RunEnd::Stopped(reason) => {
+            also(analysed);
             errln!("stopped: {reason}; {kept}");
             Ok(Exit::Stopped)
         }
-        RunEnd::Faulted(reason) => Err(Failure::rig(format!(
-            "{reason}\n  {kept}\n  next: put right what is named above (device, cable, file, disk space) and run \
+        RunEnd::Faulted(reason) => Err(Failure::rig({
+            also(analysed);
+            format!(
+                "{reason}\n  {kept}\n  next: put right what is named above (device, cable, file, disk space) and run \
              again; `skinrig show` lists what was kept"
-        ))),
+            )
+        })),
     }
+}
+
+fn analyse(session: &Path, max_rmse_mm: Option<f64>, json: bool) -> Outcome {
+    let results = results::analyze_session(session, &[])?;
+    let written = results::write_results(&results, None, None)?;
+    results::print_results(&results, json, &written);
+    results::check_limit(&results, max_rmse_mm)
 }
 
 fn fresh(
@@ -253,7 +271,18 @@ fn fresh(
         outln!("{summary}");
         outln!("rig       simulated ({level}), seed {seed}\n");
     }
-    let rig = rig::simulated(&protocol, level, seed, args.real_time);
+    let mut rig = rig::simulated(&protocol, level, seed, args.real_time);
+    if level < protocol.scene.level {
+        // In the name, so that no report of this session can be read without it.
+        rig.name = format!(
+            "simulated ({level}, less than the scene needs: {})",
+            protocol.scene.level
+        );
+        errln!(
+            "warning: --level {level} is less than the protocol's scene needs ({}): what needs it is not in the data\n",
+            protocol.scene.level
+        );
+    }
     let intent = Intent {
         text: &protocol.text,
         file_name: &protocol.file_name,

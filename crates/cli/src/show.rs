@@ -142,8 +142,18 @@ fn print(d: &serde_json::Value) {
         outln!("           {reason}");
     }
     let p = &d["totals"]["presses"];
+    let open = ["valid", "missed", "invalid", "excluded"]
+        .iter()
+        .fold(count(&p["planned"]), |rest, key| {
+            rest.saturating_sub(count(&p[*key]))
+        });
+    let open = if open > 0 {
+        format!(" + {open} without a verdict")
+    } else {
+        String::new()
+    };
     outln!(
-        "presses    {} planned = {} valid + {} missed + {} invalid + {} excluded; {} sync",
+        "presses    {} planned = {} valid + {} missed + {} invalid + {} excluded{open}; {} sync",
         p["planned"],
         p["valid"],
         p["missed"],

@@ -39,7 +39,7 @@ pub fn verify(args: &SessionArg, json: bool) -> Outcome {
                 if report.sealed {
                     ", sealed"
                 } else {
-                    ", not sealed: hashes over the whole were not checked"
+                    ", but not sealed: camera bytes, poses and counts were checked, not every byte"
                 },
                 t.presses.planned + t.sync.planned,
                 t.cd_events,

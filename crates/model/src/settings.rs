@@ -31,8 +31,9 @@ pub enum CalibrationModel {
     Full,
 }
 
-/// Settings of an analysis.
+/// Settings of an analysis. A session recorded before a setting existed gets that setting's default.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct AnalysisSettings {
     /// Rows kept per camera, both ends included (public code: camera 1 185..=360, camera 2 200..=355).
     pub crop_v: [(u16, u16); 2],

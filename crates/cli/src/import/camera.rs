@@ -21,6 +21,8 @@ const CHUNK_BYTES: usize = 1 << 20;
 const CHUNK_SPAN_US: u64 = 400_000;
 /// Chunks that may wait between the reading thread and the run.
 const QUEUE: usize = 4;
+/// A camera may have been started this long after the schedule's begin, µs; its file then ends as much earlier.
+const LATE_START_US: u64 = 60_000_000;
 /// Time words of encoded streams come this often, µs: the sparsest that EVT2 allows, because a container without
 /// time words gives no reason for more.
 const TIME_HIGH_EVERY_US: u64 = 64;
@@ -116,12 +118,14 @@ impl ChunkFeed {
 /// The camera.
 pub struct FileCamera {
     camera: CameraId,
-    file: String,
+    identity: DeviceIdentity,
     format: StreamFormat,
     clock: SimClock,
     queue: Receiver<Item>,
     waiting: Option<(Vec<u8>, ChunkFacts, Vec<TriggerEdge>)>,
     base_us: Option<u64>,
+    /// End of the last chunk handed over, after the file's first word.
+    reached_us: u64,
     seq: u64,
     streaming: bool,
 }
@@ -134,7 +138,7 @@ impl FileCamera {
     /// A message when the thread cannot be started.
     pub fn new(
         camera: CameraId,
-        file: String,
+        identity: DeviceIdentity,
         format: StreamFormat,
         clock: SimClock,
         read: impl FnOnce(&mut ChunkFeed) -> Result<(), String> + Send + 'static,
@@ -158,12 +162,13 @@ impl FileCamera {
             .map_err(|e| format!("cannot start a reading thread: {e}"))?;
         Ok(Self {
             camera,
-            file,
+            identity,
             format,
             clock,
             queue,
             waiting: None,
             base_us: None,
+            reached_us: 0,
             seq: 0,
             streaming: false,
         })
@@ -180,14 +185,8 @@ impl FileCamera {
                 Some(waiting) => waiting,
                 None => match self.queue.recv() {
                     Ok(Ok(next)) => next,
-                    Ok(Err(detail)) => {
-                        return Err(DeviceError::Lost {
-                            role: DeviceRole::of_camera(self.camera),
-                            serial: self.file.clone(),
-                            detail,
-                        });
-                    }
-                    Err(_) => return Ok(()),
+                    Ok(Err(detail)) => return Err(self.lost(detail)),
+                    Err(_) => return self.ended(until_us),
                 },
             };
             let base_us = *self.base_us.get_or_insert(facts.first_us.unwrap_or(0));
@@ -198,6 +197,9 @@ impl FileCamera {
             if !due {
                 self.waiting = Some((bytes, facts, triggers));
                 return Ok(());
+            }
+            if let Some(last) = facts.last_us {
+                self.reached_us = last.saturating_sub(base_us);
             }
             chunks.push(RawChunk {
                 camera: self.camera,
@@ -211,6 +213,27 @@ impl FileCamera {
             self.seq += 1;
         }
     }
+
+    /// The file is read to its end: all is well unless the schedule goes on long after it.
+    fn ended(&self, until_us: Option<u64>) -> Result<(), DeviceError> {
+        match until_us {
+            Some(now_us) if now_us > self.reached_us + LATE_START_US => Err(self.lost(format!(
+                "the recording ends after {:.0} s, but the schedule still presses at {:.0} s: expected a \
+                 recording as long as its schedule; is it the schedule of this recording?",
+                self.reached_us as f64 * 1e-6,
+                now_us as f64 * 1e-6
+            ))),
+            _ => Ok(()),
+        }
+    }
+
+    fn lost(&self, detail: String) -> DeviceError {
+        DeviceError::Lost {
+            role: DeviceRole::of_camera(self.camera),
+            serial: self.identity.serial.clone(),
+            detail,
+        }
+    }
 }
 
 impl EventCamera for FileCamera {
@@ -219,11 +242,7 @@ impl EventCamera for FileCamera {
     }
 
     fn identity(&self) -> DeviceIdentity {
-        DeviceIdentity {
-            model: "recorded file".into(),
-            serial: self.file.clone(),
-            firmware: "none".into(),
-        }
+        self.identity.clone()
     }
 
     fn capabilities(&self) -> CameraCapabilities {

@@ -7,15 +7,17 @@ mod camera;
 mod indenter;
 mod plan;
 
+use std::io::Read;
 use std::path::Path;
 
+use sha2::{Digest, Sha256};
 use skinrig_device::{CameraSettings, Rig};
 use skinrig_formats::Geometry;
 use skinrig_formats::hdf5::Container;
 use skinrig_formats::inspect::FileKind;
 use skinrig_formats::positions::{LengthUnit, PositionTable};
 use skinrig_formats::raw::RawReader;
-use skinrig_model::{CameraId, HostDuration, Point2, RigidTransform, StreamFormat};
+use skinrig_model::{CameraId, DeviceIdentity, HostDuration, Point2, RigidTransform, StreamFormat};
 use skinrig_protocol::Schedule;
 use skinrig_sim::SimClock;
 
@@ -25,6 +27,9 @@ use crate::run::{Intent, conclude, record};
 use crate::sink::Foreknowledge;
 use camera::{ChunkFeed, FileCamera};
 use indenter::ScheduledIndenter;
+
+/// Presses closer together than this are no path, mm: less than any indenter's tip.
+const SMALLEST_PATH_MM: f64 = 1.0;
 
 /// Imports a dataset.
 ///
@@ -52,8 +57,8 @@ pub fn import(args: &ImportArgs, command_line: &str, json: bool) -> Outcome {
 
     refuse_one_file_twice(args)?;
     let clock = SimClock::new();
-    let one = open(CameraId::One, &args.camera1, args.stream1.clone(), &clock)?;
-    let two = open(CameraId::Two, &args.camera2, args.stream2.clone(), &clock)?;
+    let (one, about_one) = open(CameraId::One, &args.camera1, args.stream1.clone(), &clock)?;
+    let (two, about_two) = open(CameraId::Two, &args.camera2, args.stream2.clone(), &clock)?;
     let rig = Rig {
         kind: "imported".into(),
         name: "imported recording".into(),
@@ -65,7 +70,8 @@ pub fn import(args: &ImportArgs, command_line: &str, json: bool) -> Outcome {
         robot_from_skin: RigidTransform::identity(),
         geometry: schedule.rig,
         description_json: serde_json::json!({
-            "camera1": args.camera1, "camera2": args.camera2, "presses": args.presses,
+            "kind": "imported", "camera1": about_one, "camera2": about_two,
+            "presses": { "file": file_name(&args.presses), "sha256": sha256_of(&args.presses)? },
         })
         .to_string(),
     };
@@ -118,11 +124,65 @@ fn read_positions(path: &Path, schedule: &Schedule) -> Result<Vec<Point2>, Failu
             table.blank_lines
         );
     }
-    Ok(table
+    let points: Vec<Point2> = table
         .presses
         .iter()
         .map(|p| Point2::new(p.x_mm * scale, p.y_mm * scale))
-        .collect())
+        .collect();
+    plausible(path, schedule, &points)?;
+    Ok(points)
+}
+
+/// A wrong unit puts all presses on one spot, or off the skin.
+fn plausible(path: &Path, schedule: &Schedule, points: &[Point2]) -> Result<(), Failure> {
+    let next =
+        "next: is `csv.unit` of the schedule the unit of this file, and `rig.outline` this skin?";
+    let outline = schedule.rig.outline;
+    if let Some((row, p)) = points
+        .iter()
+        .enumerate()
+        .find(|(_, p)| !outline.contains(**p))
+    {
+        return Err(Failure::input(format!(
+            "{}: press {} at ({:.3}, {:.3}) mm: expected a place on the skin, found one beside it\n  {next}",
+            path.display(),
+            row + 1,
+            p.x_mm,
+            p.y_mm
+        )));
+    }
+    let extent = points
+        .iter()
+        .map(|p| p.distance_mm(points[0]))
+        .fold(0.0, f64::max);
+    if points.len() > 1 && extent < SMALLEST_PATH_MM {
+        return Err(Failure::input(format!(
+            "{}: expected a path of at least {SMALLEST_PATH_MM} mm, found all presses within {extent:.3} mm\n  {next}",
+            path.display()
+        )));
+    }
+    Ok(())
+}
+
+fn file_name(path: &Path) -> String {
+    path.file_name()
+        .map(|n| n.to_string_lossy().into_owned())
+        .unwrap_or_default()
+}
+
+/// Lower-case hex SHA-256 of a file: its identity in the session, wherever it lay.
+fn sha256_of(path: &Path) -> Result<String, Failure> {
+    let unreadable = |e| Failure::input(format!("{}: cannot read it: {e}", path.display()));
+    let mut file = std::fs::File::open(path).map_err(unreadable)?;
+    let mut hash = Sha256::new();
+    let mut buffer = vec![0; 1 << 18];
+    loop {
+        match file.read(&mut buffer).map_err(unreadable)? {
+            0 => break,
+            n => hash.update(&buffer[..n]),
+        }
+    }
+    Ok(hash.finalize().iter().map(|b| format!("{b:02x}")).collect())
 }
 
 /// Both cameras from one file is a slip of the keyboard, unless two streams of it are named.
@@ -142,47 +202,56 @@ fn refuse_one_file_twice(args: &ImportArgs) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Opens one camera's file and starts reading it.
+/// Opens one camera's file and starts reading it; also what the session keeps about the file.
 fn open(
     camera: CameraId,
     path: &Path,
     stream: Option<String>,
     clock: &SimClock,
-) -> Result<FileCamera, Failure> {
-    let file = path.display().to_string();
+) -> Result<(FileCamera, serde_json::Value), Failure> {
     let path = path.to_owned();
+    let mut about = serde_json::json!({ "file": file_name(&path), "sha256": sha256_of(&path)? });
+    let identity = |model: &str| DeviceIdentity {
+        model: model.into(),
+        serial: file_name(&path),
+        firmware: "none".into(),
+    };
     let kind = FileKind::detect(&path).map_err(Failure::input)?;
     let opened = match kind {
         FileKind::Hdf5 => {
             // Opened here once, so that a wrong file is refused before a session is made.
             let container = Container::open(&path).map_err(Failure::input)?;
-            container
+            let entry = container
                 .choose(stream.as_deref())
                 .map_err(Failure::input)?;
+            about["stream"] = entry.name.clone().into();
+            about["ts_offset_s"] = entry.ts_offset_s.into();
+            about["written_by"] = container.written_by().into();
             FileCamera::new(
                 camera,
-                file,
+                identity("recorded file (bimvee HDF5, events re-encoded as EVT2)"),
                 StreamFormat::Evt2,
                 clock.clone(),
                 move |feed| read_hdf5(&path, stream.as_deref(), feed),
             )
         }
         FileKind::Raw => {
-            let format = RawReader::open(&path)
-                .map_err(Failure::input)?
-                .header()
-                .format;
-            FileCamera::new(camera, file, format, clock.clone(), move |feed| {
+            let reader = RawReader::open(&path).map_err(Failure::input)?;
+            let format = reader.header().format;
+            about["header"] = serde_json::json!(reader.header().entries);
+            let identity = identity("recorded file (Prophesee RAW, bytes as recorded)");
+            FileCamera::new(camera, identity, format, clock.clone(), move |feed| {
                 read_raw(&path, feed)
             })
         }
         FileKind::Sqlite | FileKind::Unknown => {
             return Err(Failure::input(format!(
-                "{file}: expected bimvee HDF5 or Prophesee RAW for {camera}, found another kind of file"
+                "{}: expected bimvee HDF5 or Prophesee RAW for {camera}, found another kind of file",
+                path.display()
             )));
         }
     };
-    opened.map_err(Failure::internal)
+    Ok((opened.map_err(Failure::internal)?, about))
 }
 
 fn read_hdf5(path: &Path, stream: Option<&str>, feed: &mut ChunkFeed) -> Result<(), String> {
