@@ -161,7 +161,7 @@ fn a_killed_run_leaves_a_session_that_opens() {
         "{words}"
     );
     let verified = skinrig(&["verify", &text(&session)]).code(0).out;
-    assert!(verified.contains("sound, not sealed"), "{verified}");
+    assert!(verified.contains("sound, but not sealed"), "{verified}");
     let listed = skinrig(&["sessions", &lab.text("s")]).code(0).out;
     assert!(listed.contains("cut off"), "{listed}");
     skinrig(&["analyze", &text(&session)]).code(0);
