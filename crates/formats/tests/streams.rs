@@ -243,7 +243,7 @@ proptest! {
                         high = high.wrapping_add(step) & 0x0fff_ffff;
                         0x8000_0000 | high
                     }
-                    _ => any & 0x1fc0_0000 | any % 640 << 11 | any % 480,
+                    _ => (any & 0x1fc0_0000) | ((any % 640) << 11) | (any % 480),
                 }
                 .to_le_bytes()
             })

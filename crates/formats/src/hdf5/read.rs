@@ -147,11 +147,11 @@ impl EventReader {
     fn check(&self, start: usize) -> Result<(), FormatsError> {
         let Geometry { width, height } = self.geometry;
         let ts = &self.ts_s;
-        let backward = ts
+        let ordered = ts
             .iter()
             .zip(&ts[1..])
-            .fold(0, |bad, (a, b)| bad | u64::from(!(a <= b)));
-        if backward != 0 || !(ts[0] >= self.last_ts_s && ts[ts.len() - 1] <= MAX_TS_S) {
+            .fold(1, |all, (a, b)| all & u64::from(a <= b));
+        if ordered == 0 || !(ts[0] >= self.last_ts_s && ts[ts.len() - 1] <= MAX_TS_S) {
             let mut previous = self.last_ts_s;
             for (row, ts) in ts.iter().enumerate() {
                 if !(*ts >= previous && *ts <= MAX_TS_S) {
