@@ -22,7 +22,7 @@ static MIGRATOR: Migrator = sqlx::migrate!("../../migrations");
 
 /// Bytes of a page, the largest that SQLite knows. Every page of camera bytes costs three system calls on its way
 /// through the log: 64 KiB took in 500 MB/s where 16 KiB took in 380 (`cargo bench -p skinrig-bench --bench ingest`).
-/// Its price: an empty session has 2 MB, and a commit of one small row writes some 200 KiB.
+/// Its price: an empty session has 1.4 MB, and a commit of one small row writes 128 KiB.
 const PAGE_BYTES: u32 = 65536;
 
 /// Pages in the log that start a checkpoint: 16 MiB, which stay in the system's cache. A longer log was no faster.
