@@ -1,6 +1,6 @@
 //! One SQLite file per session: the one writer, the read-only reader, the check of every byte, the catalogue.
 //!
-//! A session is written by a [`SessionWriter`] on a thread of its own: records go in, an [`Intent`] or
+//! A session is written by a [`SessionWriter`] on threads of its own: records go in, an [`Intent`] or
 //! [`Outcome`] comes back only when it and everything before it is on the disk. [`SessionReader`] reads it
 //! while it grows and after it is sealed; [`verify()`] recomputes all of it; [`list`] describes a folder.
 //! The layout is in `docs/session-file.md` and, column by column, in `migrations/`.
