@@ -3,7 +3,9 @@
 use std::path::Path;
 
 use sha2::{Digest, Sha256};
-use skinrig_model::{CameraId, ChunkFacts, HostTime, RunEnd, StreamFormat, TriggerEdge};
+use skinrig_model::{
+    CameraId, ChunkFacts, HostTime, PlannedPress, RunEnd, RunHeader, StreamFormat, TriggerEdge,
+};
 
 use crate::error::RecorderError;
 use crate::query::{each_row, int, num, sha, text};
@@ -149,6 +151,7 @@ fn check_header(reader: &SessionReader, report: &mut VerifyReport) -> Option<[St
         &digest(&header.plan_json),
         &header.plan_sha256,
     );
+    check_plan(&header, report);
     for (expected, press) in (0u32..).zip(&header.presses) {
         if press.id.0 != expected {
             report.add(format!(
@@ -244,6 +247,31 @@ fn check_poses(reader: &SessionReader, report: &mut VerifyReport) -> Result<(), 
         after = id;
     }
     Ok(())
+}
+
+/// The planned presses of the table are those of the stored plan, where the plan lists any under `presses`.
+fn check_plan(header: &RunHeader, report: &mut VerifyReport) {
+    #[derive(serde::Deserialize)]
+    struct Presses {
+        #[serde(default)]
+        presses: Vec<PlannedPress>,
+    }
+    let plan = match serde_json::from_str::<Presses>(&header.plan_json) {
+        Ok(plan) => plan,
+        Err(e) => return report.add(format!("plan: expected JSON with its presses, found: {e}")),
+    };
+    if plan.presses.is_empty() {
+        return;
+    }
+    report.equal("press: rows", &plan.presses.len(), &header.presses.len());
+    for (planned, row) in plan.presses.iter().zip(&header.presses) {
+        if planned != row {
+            report.add(format!(
+                "{}: expected what the stored plan says, found another place, depth or role",
+                row.id
+            ));
+        }
+    }
 }
 
 /// The journal: moments in order, lineage without holes, no open attempt once the run has ended.

@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use crate::common::{Evt2, sealed};
-use skinrig_model::{CameraId, HostTime};
-use skinrig_recorder::{SessionReader, list, verify};
+use crate::common::{Evt2, header, sealed, sha};
+use skinrig_model::{CameraId, HostTime, Record};
+use skinrig_recorder::{SessionReader, SessionWriter, list, verify};
 
 /// Bytes of a page of a session file.
 const PAGE: usize = 65536;
@@ -49,6 +49,27 @@ fn check(original: &[u8], offsets: impl Iterator<Item = usize>, bit: impl Fn(usi
         }
         bytes[offset] = original[offset];
     }
+}
+
+#[test]
+fn planned_presses_are_those_of_the_plan_even_without_a_seal() {
+    let verify_with = |move_mm: f64| {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("x.session.sqlite");
+        let mut header = header(3);
+        let mut planned = header.presses.clone();
+        planned[1].at.x_mm += move_mm;
+        header.plan_json = serde_json::json!({ "presses": planned }).to_string();
+        header.plan_sha256 = sha(&header.plan_json);
+        let mut writer = SessionWriter::create(&path).unwrap();
+        writer.accept(Record::Started(Box::new(header))).unwrap();
+        drop(writer);
+        verify(&path, &mut Evt2::default()).unwrap().problems
+    };
+    assert_eq!(verify_with(0.0), Vec::<String>::new());
+    let problems = verify_with(5.0);
+    assert_eq!(problems.len(), 1, "{problems:?}");
+    assert!(problems[0].starts_with("press 1: expected what the stored plan says"));
 }
 
 #[test]
