@@ -5,15 +5,15 @@ use skinrig_model::{
 };
 
 use crate::accumulate::{Accumulated, Accumulator, SLACK_US, ZoomPlan, rate_bin_us};
-use crate::calibrate::{affordable_model, calibrate};
+use crate::calibrate::{affordable_model, calibrate, model_name};
 use crate::clock::{PressSpan, SUSPICIOUS_DRIFT_PPM, fit_marks, fit_rates};
 use crate::error::AnalysisError;
 use crate::input::{EventSource, SessionInput};
 use crate::metrics::{Exclusions, metrics};
 use crate::rates::RateHistogram;
 use crate::result::{
-    ANALYSIS_VERSION, Analysis, CalibrationResult, ClockFit, LocationOutcome, PressPicture,
-    PressResult, PressView, RateSeries, RateZoom,
+    ANALYSIS_VERSION, Analysis, CalibrationResult, ClockFit, DepthResult, LocationOutcome,
+    PressPicture, PressResult, PressView, RateSeries, RateZoom,
 };
 use crate::segment::{Window, windows};
 use crate::sets::{CalibrationSet, ScoreSet};
@@ -59,23 +59,35 @@ pub fn analyze(input: &SessionInput, source: &dyn EventSource) -> Result<Analysi
         let column = |k: usize| row.views[k].and_then(|v| v.centroid_u);
         row.location_outcome = locate(&geometry, &input.rig.outline, [column(0), column(1)]);
         let judged = row.role != PressRole::Sync && row.verdict == PressVerdict::Valid.name();
-        if judged && let Some(rule) = verdict::location_rule(&row.location_outcome, &input.settings)
+        if judged
+            && let Some(judgement) = verdict::location_rule(&row.location_outcome, &input.settings)
         {
-            verdict::put(row, &PressVerdict::Excluded(rule));
+            verdict::put(row, judgement);
         }
     }
     let scores = ScoreSet::from_presses(&presses, &input.outcomes);
-    let measure = |exclusions| {
+    let measure = |set: &ScoreSet, exclusions| {
         metrics(
-            &scores,
+            set,
             exclusions,
             &input.rig.outline,
             input.settings.bootstrap_resamples,
             input.settings.seed,
         )
     };
-    let (scored, scored_without_exclusions) =
-        (measure(Exclusions::Applied), measure(Exclusions::Ignored));
+    let (scored, scored_without_exclusions) = (
+        measure(&scores, Exclusions::Applied),
+        measure(&scores, Exclusions::Ignored),
+    );
+    let depths = scores.depths_mm();
+    let depths = if depths.len() > 1 { depths } else { Vec::new() };
+    let depths = depths.into_iter().map(|depth_mm| DepthResult {
+        depth_mm,
+        rmse_mm: measure(&scores.at_depth(depth_mm), Exclusions::Applied).rmse_mm,
+    });
+    let depths = depths.collect();
+    let both = [&scored.rmse_mm, &scored_without_exclusions.rmse_mm];
+    warnings.extend(verdict::weight_of_exclusions(&presses, both));
     if scores.presses().is_empty() {
         warnings.push("no scored press was attempted: there are no metrics".to_owned());
     }
@@ -97,6 +109,7 @@ pub fn analyze(input: &SessionInput, source: &dyn EventSource) -> Result<Analysi
         calibration,
         scored,
         scored_without_exclusions,
+        depths,
         rates: [one.rates, two.rates],
         presses,
         warnings: [one.warnings, two.warnings, warnings].concat(),
@@ -338,7 +351,7 @@ fn rows(input: &SessionInput, cameras: &[CameraResult; 2]) -> Vec<PressResult> {
         .map(|(i, (planned, outcome))| {
             let views = [0, 1].map(|k| cameras[k].views[i]);
             let data_lost = [0, 1].map(|k| cameras[k].data_lost[i]);
-            let verdict = verdict::from_data(
+            let judgement = verdict::from_data(
                 planned.role,
                 outcome.as_ref(),
                 has_clock,
@@ -356,11 +369,12 @@ fn rows(input: &SessionInput, cameras: &[CameraResult; 2]) -> Vec<PressResult> {
                 truth: outcome.as_ref().and_then(|o| o.measured_at),
                 verdict: String::new(),
                 reason: None,
+                rule: None,
                 timing: outcome.as_ref().and_then(|o| o.timing),
                 views,
                 location_outcome: LocationOutcome::Missing,
             };
-            verdict::put(&mut row, &verdict);
+            verdict::put(&mut row, judgement);
             row
         })
         .collect()
@@ -386,7 +400,9 @@ fn calibrated(
     let model = affordable_model(&set, wanted);
     if model != wanted {
         warnings.push(format!(
-            "the calibrating presses touch too few places for the calibration `{wanted:?}`: `{model:?}` is used"
+            "the calibrating presses touch too few places for the calibration `{}`: `{}` is used",
+            model_name(wanted),
+            model_name(model)
         ));
     }
     let Some((geometry, result)) = calibrate(&set, &nominal, model, input.settings.seed) else {

@@ -104,7 +104,10 @@ fn place(group: &[&Scored], exclusions: Exclusions) -> Place {
             let (mx, my) = (mean(|p| p.x_mm), mean(|p| p.y_mm));
             let squares: f64 = repeats
                 .iter()
-                .map(|(_, at, _)| (at.x_mm - mx).powi(2) + (at.y_mm - my).powi(2))
+                .map(|(_, at, _)| {
+                    let (dx, dy) = (at.x_mm - mx, at.y_mm - my);
+                    dx * dx + dy * dy
+                })
                 .sum();
             (squares / (n - 1.0)).sqrt()
         })

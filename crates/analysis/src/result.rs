@@ -30,6 +30,9 @@ pub struct Analysis {
     pub scored: Metrics,
     /// Metrics over all scored presses with an estimate, exclusions ignored.
     pub scored_without_exclusions: Metrics,
+    /// The RMSE of the scored presses at each depth, shallowest first; empty when one depth was scored.
+    #[serde(default)]
+    pub depths: Vec<DepthResult>,
     /// Event-rate course of each camera over the whole session.
     pub rates: [RateSeries; 2],
     /// One row per planned press, in plan order.
@@ -109,8 +112,17 @@ pub struct Estimate {
     pub low: Option<f64>,
     /// Upper end.
     pub high: Option<f64>,
-    /// How many presses (or, for the std between repetitions, locations) it stands on.
+    /// How many presses (or, for the std between repetitions, locations at one depth) it stands on.
     pub n: u32,
+}
+
+/// The error at one depth.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct DepthResult {
+    /// Planned depth, mm.
+    pub depth_mm: f64,
+    /// Root mean square Euclidean error of the presses that count at this depth.
+    pub rmse_mm: Estimate,
 }
 
 /// Localisation metrics, mm. Intervals come from a bootstrap that resamples locations.
@@ -130,7 +142,7 @@ pub struct Metrics {
     pub median_mm: Estimate,
     /// 95th percentile of the Euclidean error.
     pub p95_mm: Estimate,
-    /// Mean over locations of the std between repetitions (Euclid, sample std with n-1).
+    /// Mean over locations and depths of the std between repetitions (Euclid, sample std with n-1).
     pub repeat_std_mm: Estimate,
     /// Share of the attempted scored presses, invalid ones included, that got an estimate which counts here.
     pub located_rate: Estimate,
@@ -145,6 +157,9 @@ pub struct CalibrationResult {
     pub start: StereoGeometry,
     /// Names of the fitted parameters.
     pub names: Vec<String>,
+    /// The values they started from.
+    #[serde(default)]
+    pub start_values: Vec<f64>,
     /// Their values.
     pub values: Vec<f64>,
     /// Their standard errors; `None` where the data do not determine them.
@@ -192,8 +207,11 @@ pub struct PressResult {
     pub truth: Option<Point2>,
     /// `valid`, `missed`, `invalid` or `excluded`.
     pub verdict: String,
-    /// The rule or reason, for everything but valid.
+    /// The reason in full, with this press's numbers, for everything but valid.
     pub reason: Option<String>,
+    /// The rule behind the reason: a short name without this press's numbers, so that presses can be grouped.
+    #[serde(default)]
+    pub rule: Option<String>,
     /// Measured moments, host clock.
     pub timing: Option<PressTiming>,
     /// What each camera saw.

@@ -103,6 +103,22 @@ impl ScoreSet {
         )
     }
 
+    /// The planned depths, mm, shallowest first, each once.
+    #[must_use]
+    pub fn depths_mm(&self) -> Vec<f64> {
+        let mut depths: Vec<f64> = self.0.iter().map(|p| p.depth_mm).collect();
+        depths.sort_by(f64::total_cmp);
+        depths.dedup();
+        depths
+    }
+
+    /// The presses planned at this depth.
+    #[must_use]
+    pub fn at_depth(&self, depth_mm: f64) -> Self {
+        let here = self.0.iter().filter(|p| p.depth_mm == depth_mm);
+        Self(here.copied().collect())
+    }
+
     /// The presses, in plan order.
     #[must_use]
     pub fn presses(&self) -> &[Scored] {

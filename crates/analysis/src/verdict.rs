@@ -13,7 +13,70 @@
 
 use skinrig_model::{AnalysisSettings, CameraId, PressOutcome, PressRole, PressVerdict};
 
-use crate::result::{LocationOutcome, PressCounts, PressResult, PressView};
+use crate::result::{Estimate, LocationOutcome, PressCounts, PressResult, PressView};
+
+/// A verdict and the rule behind it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Judgement {
+    /// The verdict, its reason in full.
+    pub verdict: PressVerdict,
+    /// The rule without the press's numbers; `None` for valid.
+    pub rule: Option<String>,
+}
+
+impl Judgement {
+    const VALID: Self = Self {
+        verdict: PressVerdict::Valid,
+        rule: None,
+    };
+
+    fn invalid(rule: &str) -> Self {
+        Self {
+            verdict: PressVerdict::Invalid(rule.to_owned()),
+            rule: Some(rule.to_owned()),
+        }
+    }
+
+    fn excluded(rule: String, reason: String) -> Self {
+        Self {
+            verdict: PressVerdict::Excluded(reason),
+            rule: Some(rule),
+        }
+    }
+
+    /// What the journal says; its rule is the reason with every number but a camera's left out.
+    fn from_journal(verdict: PressVerdict) -> Self {
+        let rule = verdict.reason().map(without_numbers);
+        Self { verdict, rule }
+    }
+}
+
+/// `text` with `…` for every number, except the number of a camera.
+fn without_numbers(text: &str) -> String {
+    let mut out = String::new();
+    let mut rest = text;
+    while let Some(at) = rest.find(|c: char| c.is_ascii_digit()) {
+        let (before, number) = rest.split_at(at);
+        let end = number
+            .find(|c: char| !(c.is_ascii_digit() || c == '.'))
+            .unwrap_or(number.len());
+        // A full stop or an ellipsis after the number is not part of it.
+        let digits = number[..end].trim_end_matches('.');
+        if before.ends_with("camera ") {
+            out.push_str(before);
+            out.push_str(digits);
+        } else {
+            // A minus sign goes with its number; a hyphen stays.
+            let sign = before.strip_suffix('-');
+            let sign = sign.filter(|b| b.chars().next_back().is_none_or(|c| !c.is_alphanumeric()));
+            out.push_str(sign.unwrap_or(before));
+            out.push('…');
+        }
+        rest = &number[digits.len()..];
+    }
+    out.push_str(rest);
+    out
+}
 
 /// The verdict before any location is known.
 #[must_use]
@@ -24,57 +87,63 @@ pub fn from_data(
     data_lost: [bool; 2],
     views: &[Option<PressView>; 2],
     settings: &AnalysisSettings,
-) -> PressVerdict {
+) -> Judgement {
     let Some(outcome) = outcome else {
-        return PressVerdict::Missed("never attempted".to_owned());
+        return Judgement::from_journal(PressVerdict::Missed("never attempted".to_owned()));
     };
     if outcome.verdict != PressVerdict::Valid {
-        return outcome.verdict.clone();
+        return Judgement::from_journal(outcome.verdict.clone());
     }
-    let invalid = |reason: &str| PressVerdict::Invalid(reason.to_owned());
     if outcome.timing.is_none() {
-        return invalid("no measured times");
+        return Judgement::invalid("no measured times");
     }
     if outcome
         .measured_at
         .is_none_or(|p| !p.x_mm.is_finite() || !p.y_mm.is_finite())
     {
-        return invalid("no measured position");
+        return Judgement::invalid("no measured position");
     }
     for camera in CameraId::ALL {
         if !has_clock[camera.index()] {
-            return PressVerdict::Invalid(format!("no clock alignment ({camera})"));
+            return Judgement::invalid(&format!("no clock alignment ({camera})"));
         }
         if data_lost[camera.index()] {
-            return PressVerdict::Invalid(format!("data lost in window ({camera})"));
+            return Judgement::invalid(&format!("data lost in window ({camera})"));
         }
     }
     if role == PressRole::Sync {
-        return PressVerdict::Valid;
+        return Judgement::VALID;
     }
     for camera in CameraId::ALL {
         let view = views[camera.index()];
         let Some(view) = view.filter(|v| v.centroid_u.is_some()) else {
-            return PressVerdict::Excluded(format!("no cluster ({camera})"));
+            let rule = format!("no cluster ({camera})");
+            return Judgement::excluded(rule.clone(), rule);
         };
         if view.cluster_events < settings.min_cluster_events {
-            return PressVerdict::Excluded(format!(
-                "too few cluster events: {} < {} ({camera})",
-                view.cluster_events, settings.min_cluster_events
-            ));
+            return Judgement::excluded(
+                format!("too few cluster events ({camera})"),
+                format!(
+                    "too few cluster events: {} < {} ({camera})",
+                    view.cluster_events, settings.min_cluster_events
+                ),
+            );
         }
         if let Some(idle) = idle_events(&view).filter(|idle| {
             f64::from(view.events)
                 < idle.expected + settings.min_response_sigma * idle.standard_error
         }) && settings.min_response_sigma > 0.0
         {
-            return PressVerdict::Excluded(format!(
-                "no response: {} events, {:.0} ± {:.0} expected at the idle rate ({camera})",
-                view.events, idle.expected, idle.standard_error
-            ));
+            return Judgement::excluded(
+                format!("no response ({camera})"),
+                format!(
+                    "no response: {} events, {:.0} ± {:.0} expected at the idle rate ({camera})",
+                    view.events, idle.expected, idle.standard_error
+                ),
+            );
         }
     }
-    PressVerdict::Valid
+    Judgement::VALID
 }
 
 /// What a camera would have sent in the press window without a press.
@@ -100,31 +169,71 @@ fn idle_events(view: &PressView) -> Option<IdleEvents> {
 
 /// The rule that leaves a valid press out because of where its rays meet, if any.
 #[must_use]
-pub fn location_rule(outcome: &LocationOutcome, settings: &AnalysisSettings) -> Option<String> {
+pub fn location_rule(outcome: &LocationOutcome, settings: &AnalysisSettings) -> Option<Judgement> {
+    let plain = |rule: &str| Some(Judgement::excluded(rule.to_owned(), rule.to_owned()));
     match *outcome {
-        LocationOutcome::Missing => Some("no view".to_owned()),
-        LocationOutcome::Parallel { .. } => Some("parallel rays".to_owned()),
-        LocationOutcome::Behind { .. } => Some("behind camera".to_owned()),
+        LocationOutcome::Missing => plain("no view"),
+        LocationOutcome::Parallel { .. } => plain("parallel rays"),
+        LocationOutcome::Behind { .. } => plain("behind camera"),
         LocationOutcome::Located { sine, .. } | LocationOutcome::Outside { sine, .. }
             if sine.abs() < settings.min_ray_sine =>
         {
-            Some(format!(
-                "nearly parallel rays: sine {:.4} < {}",
-                sine.abs(),
-                settings.min_ray_sine
+            Some(Judgement::excluded(
+                "nearly parallel rays".to_owned(),
+                format!(
+                    "nearly parallel rays: sine {:.4} < {}",
+                    sine.abs(),
+                    settings.min_ray_sine
+                ),
             ))
         }
         LocationOutcome::Outside { .. } if settings.exclude_outside => {
-            Some("outside the skin outline".to_owned())
+            plain("outside the skin outline")
         }
         LocationOutcome::Located { .. } | LocationOutcome::Outside { .. } => None,
     }
 }
 
 /// Writes a verdict into a row.
-pub fn put(row: &mut PressResult, verdict: &PressVerdict) {
-    row.verdict = verdict.name().to_owned();
-    row.reason = verdict.reason().map(str::to_owned);
+pub fn put(row: &mut PressResult, judgement: Judgement) {
+    row.verdict = judgement.verdict.name().to_owned();
+    row.reason = judgement.verdict.reason().map(str::to_owned);
+    row.rule = judgement.rule;
+}
+
+/// A warning when the headline stands on the rules: when the RMSE of all located presses lies outside the 95 %
+/// interval of the RMSE of those that count (without an interval: when the two differ at all), or when nothing
+/// counts. `rmse`: with and without exclusions.
+#[must_use]
+pub fn weight_of_exclusions(presses: &[PressResult], rmse: [&Estimate; 2]) -> Option<String> {
+    let [with, without] = rmse;
+    let all = without.value?;
+    let left_out = without.n.saturating_sub(with.n);
+    let change = match (with.value, with.low, with.high) {
+        (Some(value), Some(low), Some(high)) if all < low || all > high => {
+            format!("from {all:.2} mm to {value:.2} mm, more than its 95 % interval")
+        }
+        (Some(value), None, _) | (Some(value), _, None) if all != value => {
+            format!("from {all:.2} mm to {value:.2} mm")
+        }
+        (None, ..) => format!("from {all:.2} mm to nothing"),
+        _ => return None,
+    };
+    let mut rules: Vec<&str> = presses
+        .iter()
+        .filter(|p| p.role == PressRole::Score && p.error_mm().is_some())
+        .filter_map(|p| p.rule.as_deref())
+        .collect();
+    rules.sort_unstable();
+    let most = rules
+        .chunk_by(|a, b| a == b)
+        .max_by_key(|group| group.len())
+        .map(|group| format!(" (most often, {} times: {})", group.len(), group[0]))
+        .unwrap_or_default();
+    Some(format!(
+        "the RMSE stands on what was left out: leaving out {left_out} of {} located presses{most} changes it {change}",
+        without.n
+    ))
 }
 
 /// Counts the verdicts.
@@ -162,9 +271,13 @@ mod tests {
             None
         );
         assert_eq!(
-            rule(LocationOutcome::Located { at, sine: -0.0499 }, &settings).as_deref(),
-            Some("nearly parallel rays: sine 0.0499 < 0.05")
+            rule(LocationOutcome::Located { at, sine: -0.0499 }, &settings),
+            Some(Judgement::excluded(
+                "nearly parallel rays".to_owned(),
+                "nearly parallel rays: sine 0.0499 < 0.05".to_owned()
+            ))
         );
+        let rule = |outcome: LocationOutcome, s: &AnalysisSettings| rule(outcome, s)?.rule;
         let outside = LocationOutcome::Outside { at, sine: 0.5 };
         assert_eq!(
             rule(outside, &settings).as_deref(),
@@ -230,17 +343,58 @@ mod tests {
             )
         };
         // 10 expected, standard error sqrt(20): the rule needs 32.4.
-        assert_eq!(judge(PressRole::Score, 33, 33), PressVerdict::Valid);
+        assert_eq!(judge(PressRole::Score, 33, 33), Judgement::VALID);
         assert_eq!(
             judge(PressRole::Score, 33, 32),
-            PressVerdict::Excluded(
+            Judgement::excluded(
+                "no response (camera 2)".to_owned(),
                 "no response: 32 events, 10 ± 4 expected at the idle rate (camera 2)".to_owned()
             )
         );
         assert_eq!(
             judge(PressRole::Calibrate, 33, 19),
-            PressVerdict::Excluded("too few cluster events: 19 < 20 (camera 2)".to_owned())
+            Judgement::excluded(
+                "too few cluster events (camera 2)".to_owned(),
+                "too few cluster events: 19 < 20 (camera 2)".to_owned()
+            )
         );
-        assert_eq!(judge(PressRole::Sync, 0, 0), PressVerdict::Valid);
+        assert_eq!(judge(PressRole::Sync, 0, 0), Judgement::VALID);
+    }
+
+    #[test]
+    fn a_rule_of_the_journal_has_no_numbers_but_a_camera() {
+        assert_eq!(
+            without_numbers("settled -0.31 mm from plan, limit 0.10. Robot-3 lost: camera 2"),
+            "settled … mm from plan, limit …. Robot-… lost: camera 2"
+        );
+        assert_eq!(
+            without_numbers("the run was stopped"),
+            "the run was stopped"
+        );
+    }
+
+    #[test]
+    fn exclusions_that_make_the_headline_are_called_out() {
+        let estimate = |value: Option<f64>, n: u32, ends: Option<(f64, f64)>| Estimate {
+            value,
+            low: ends.map(|e| e.0),
+            high: ends.map(|e| e.1),
+            n,
+        };
+        let weight = |a: &Estimate, b: &Estimate| weight_of_exclusions(&[], [a, b]);
+        let with = estimate(Some(0.17), 90, Some((0.16, 0.18)));
+        let all = |value| estimate(Some(value), 100, None);
+        assert_eq!(weight(&with, &all(0.175)), None);
+        assert_eq!(
+            weight(&with, &all(5.43)).as_deref(),
+            Some(
+                "the RMSE stands on what was left out: leaving out 10 of 100 located presses changes it \
+                 from 5.43 mm to 0.17 mm, more than its 95 % interval"
+            )
+        );
+        let nothing = estimate(None, 0, None);
+        assert!(weight(&nothing, &all(5.43)).is_some_and(|w| w.ends_with("to nothing")));
+        assert_eq!(weight(&nothing, &nothing), None);
+        assert_eq!(weight(&all(5.43), &all(5.43)), None);
     }
 }

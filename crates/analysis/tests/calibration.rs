@@ -35,6 +35,7 @@ fn row(id: u32, role: PressRole, truth: Point2, columns: [f64; 2]) -> PressResul
         truth: Some(truth),
         verdict: "valid".to_owned(),
         reason: None,
+        rule: None,
         timing: None,
         views: columns.map(view),
         location_outcome: LocationOutcome::Missing,

@@ -19,6 +19,7 @@ fn row(location: u32, error: Option<(f64, f64)>, verdict: &str) -> PressResult {
         truth: Some(truth),
         verdict: verdict.to_owned(),
         reason: None,
+        rule: None,
         timing: None,
         views: [None, None],
         location_outcome: error.map_or(LocationOutcome::Missing, |(dx, dy)| {

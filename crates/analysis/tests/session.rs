@@ -588,3 +588,53 @@ proptest! {
         prop_assert!(a.scored.rmse_mm.n <= a.scored_without_exclusions.rmse_mm.n);
     }
 }
+
+#[test]
+fn a_rule_groups_what_the_reason_tells_apart() {
+    let (input, mut source) = session();
+    // Camera 2 sees almost nothing of two presses, not equally little.
+    for (row, most) in [(40usize, 15), (41, 17)] {
+        let from = camera_us(1, plan()[row].4 - 0.1) as u64;
+        let mut kept = 0;
+        source.events[1].retain(|e| {
+            let inside = (from..from + 700_000).contains(&e.t_us);
+            let keep = !inside || ((265..275).contains(&e.y) && kept < most);
+            kept += u32::from(inside && keep);
+            keep
+        });
+    }
+    let a = analyze(&input, &source).unwrap();
+    let (p, q) = (&a.presses[40], &a.presses[41]);
+    assert_eq!(p.verdict, "excluded", "{:?}", p.reason);
+    assert_ne!(p.reason, q.reason);
+    assert!(p.rule.as_deref().unwrap().ends_with("(camera 2)"));
+    assert_eq!(p.rule, q.rule);
+    assert!(
+        a.presses
+            .iter()
+            .all(|p| p.rule.is_some() == (p.verdict != "valid"))
+    );
+}
+
+#[test]
+fn several_depths_are_also_scored_one_by_one() {
+    let (mut input, source) = session();
+    assert_eq!(analyze(&input, &source).unwrap().depths, []);
+    for planned in input.planned.iter_mut().filter(|p| p.location % 2 == 0) {
+        planned.depth_mm = 1.0;
+    }
+    let a = analyze(&input, &source).unwrap();
+    let depths: Vec<f64> = a.depths.iter().map(|d| d.depth_mm).collect();
+    assert_eq!(depths, [1.0, 2.0]);
+    assert_eq!(
+        a.depths.iter().map(|d| d.rmse_mm.n).sum::<u32>(),
+        a.scored.rmse_mm.n
+    );
+    let squares: f64 = a
+        .depths
+        .iter()
+        .map(|d| f64::from(d.rmse_mm.n) * d.rmse_mm.value.unwrap().powi(2))
+        .sum();
+    let pooled = (squares / f64::from(a.scored.rmse_mm.n)).sqrt();
+    assert!((pooled - a.scored.rmse_mm.value.unwrap()).abs() < 1e-9);
+}

@@ -61,6 +61,17 @@ pub const fn parameter_count(model: CalibrationModel) -> usize {
     }
 }
 
+/// What a model is called in settings and messages.
+#[must_use]
+pub const fn model_name(model: CalibrationModel) -> &'static str {
+    match model {
+        CalibrationModel::None => "none",
+        CalibrationModel::Positions => "positions",
+        CalibrationModel::PositionsSkews => "positions_skews",
+        CalibrationModel::Full => "full",
+    }
+}
+
 /// The largest model of `wanted` and the smaller ones that the data can bear: at least as many different
 /// locations as parameters, that is two residuals per parameter.
 #[must_use]
@@ -132,6 +143,7 @@ pub fn calibrate(
     let result = CalibrationResult {
         start: *start,
         names: NAMES[..count].iter().map(|n| (*n).to_owned()).collect(),
+        start_values: base[..count].to_vec(),
         values: solution.parameters.clone(),
         standard_errors,
         rmse_before_mm: rmse_mm(sights, start),
@@ -212,6 +224,13 @@ fn in_words(reason: &TerminationReason) -> String {
             "converged to the resolution of floating point".to_owned()
         }
         TerminationReason::LostPatience => "not converged: too many evaluations".to_owned(),
-        other => format!("not converged: {other:?}"),
+        TerminationReason::Numerical(what) => {
+            format!("not converged: {what} is not a finite number")
+        }
+        TerminationReason::User(what) | TerminationReason::WrongDimensions(what) => {
+            format!("not converged: {what} could not be computed")
+        }
+        TerminationReason::NoParameters => "not converged: no parameters".to_owned(),
+        TerminationReason::NoResiduals => "not converged: no presses".to_owned(),
     }
 }

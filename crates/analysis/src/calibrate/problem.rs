@@ -155,8 +155,8 @@ impl<'a> Problem<'a> {
                 residuals[2 * i + axis] = e[axis] * shrink;
                 for p in 0..count {
                     let radial = e[0] * slope[0][p] + e[1] * slope[1][p];
-                    jacobian[(2 * i + axis, p)] =
-                        shrink * slope[axis][p] - e[axis] * radial * shrink.powi(3) / c_sq;
+                    jacobian[(2 * i + axis, p)] = shrink * slope[axis][p]
+                        - e[axis] * radial * (shrink * shrink * shrink) / c_sq;
                 }
             }
         }

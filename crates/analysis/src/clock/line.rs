@@ -89,7 +89,7 @@ pub fn fit(pairs: &[Pair], floor_us: f64) -> Option<Line> {
         .collect();
     let count = inliers.len() as f64;
     let mean_x = inliers.iter().map(|p| p.0).sum::<f64>() / count;
-    let spread: f64 = inliers.iter().map(|p| (p.0 - mean_x).powi(2)).sum();
+    let spread: f64 = inliers.iter().map(|p| square(p.0 - mean_x)).sum();
     let residuals: Vec<f64> = inliers
         .iter()
         .map(|(x, y)| y - intercept - slope * x)
@@ -114,9 +114,13 @@ fn least_squares(points: &[(f64, f64)], used: &[bool]) -> Option<(f64, f64)> {
     let n = chosen().count() as f64;
     let mean_x = chosen().map(|p| p.0).sum::<f64>() / n;
     let mean_y = chosen().map(|p| p.1).sum::<f64>() / n;
-    let sxx: f64 = chosen().map(|p| (p.0 - mean_x).powi(2)).sum();
+    let sxx: f64 = chosen().map(|p| square(p.0 - mean_x)).sum();
     let sxy: f64 = chosen().map(|p| (p.0 - mean_x) * (p.1 - mean_y)).sum();
     (sxx > 0.0).then(|| (sxy / sxx, mean_y - sxy / sxx * mean_x))
+}
+
+fn square(x: f64) -> f64 {
+    x * x
 }
 
 /// The median; `None` without values. Reorders them.
