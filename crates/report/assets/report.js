@@ -5,6 +5,9 @@
   const $$ = (q, from = document) => [...from.querySelectorAll(q)];
   const SVG = 'http://www.w3.org/2000/svg';
   const data = JSON.parse($('#report-data').textContent);
+  // A column is an array, or runs of equal cells: [value, count, value, count, ...].
+  const unpacked = c => Array.isArray(c) ? c : c.runs.flatMap((v, i) => i % 2 ? Array(v).fill(c.runs[i - 1]) : []);
+  for (const t of Object.values(data.tables)) t.data = t.data.map(unpacked);
   const table = name => data.tables[name];
   const column = (t, name) => t.data[t.columns.indexOf(name)];
   const P = table('presses');

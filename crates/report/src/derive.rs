@@ -1,6 +1,6 @@
 //! Owns the summaries that only a drawing needs: per location, shares of sorted errors. Nothing here is a result.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use skinrig_analysis::result::{Analysis, PressResult};
 use skinrig_model::{Point2, PressRole};
@@ -94,20 +94,58 @@ pub fn sorted_errors_mm(analysis: &Analysis) -> Vec<f64> {
     errors
 }
 
-/// Presses that are not valid, grouped: (verdict, reason) and how many, most frequent first. Sync presses too.
+/// Presses that one rule left out.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Rejection {
+    /// `missed`, `invalid` or `excluded`.
+    pub verdict: String,
+    /// The rule.
+    pub rule: String,
+    /// The reason of the first of them, when it says more than the rule.
+    pub example: Option<String>,
+    /// How many.
+    pub n: u32,
+}
+
+/// Presses that are not valid, grouped by verdict and rule, most frequent first. Sync presses, which the counts
+/// leave apart, only with `sync`; all others only without.
 #[must_use]
-pub fn rejections(analysis: &Analysis) -> Vec<(String, String, u32)> {
-    let mut groups: BTreeMap<(&str, &str), u32> = BTreeMap::new();
-    for press in analysis.presses.iter().filter(|p| p.verdict != "valid") {
-        let reason = press.reason.as_deref().unwrap_or("no reason given");
-        *groups.entry((&press.verdict, reason)).or_default() += 1;
+pub fn rejections(analysis: &Analysis, sync: bool) -> Vec<Rejection> {
+    let mut groups: BTreeMap<(&str, &str), (u32, Option<&str>)> = BTreeMap::new();
+    let rejected = analysis.presses.iter().filter(|p| p.verdict != "valid");
+    for press in rejected.filter(|p| (p.role == PressRole::Sync) == sync) {
+        let reason = press.reason.as_deref();
+        let rule = press.rule.as_deref().or(reason);
+        let rule = rule.unwrap_or("no reason given");
+        let example = reason.filter(|r| *r != rule);
+        let group = groups.entry((&press.verdict, rule));
+        group.or_insert((0, example)).0 += 1;
     }
-    let mut rows: Vec<_> = groups
+    let mut rows: Vec<Rejection> = groups
         .into_iter()
-        .map(|((verdict, reason), n)| (verdict.to_owned(), reason.to_owned(), n))
+        .map(|((verdict, rule), (n, example))| Rejection {
+            verdict: verdict.to_owned(),
+            rule: rule.to_owned(),
+            example: example.map(str::to_owned),
+            n,
+        })
         .collect();
-    rows.sort_by(|a, b| b.2.cmp(&a.2).then_with(|| a.cmp(b)));
+    rows.sort_by(|a, b| b.n.cmp(&a.n));
     rows
+}
+
+/// Repetitions and locations in the plan, without the sync presses.
+#[must_use]
+pub fn extent(analysis: &Analysis) -> (u32, u32) {
+    let planned = || {
+        analysis
+            .presses
+            .iter()
+            .filter(|p| p.role != PressRole::Sync)
+    };
+    let repetitions = planned().map(|p| p.repetition + 1).max().unwrap_or(0);
+    let locations: BTreeSet<u32> = planned().map(|p| p.location).collect();
+    (repetitions, locations.len() as u32)
 }
 
 /// Says so when the figures stand on another number of presses than the headline: they must not.

@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 
 use minijinja::{AutoEscape, Environment, Value, context};
 use serde::Serialize;
+use skinrig_analysis::result::Analysis;
 
 use crate::derive;
 use crate::figures::{self, Figure};
@@ -62,6 +63,8 @@ pub(crate) fn render(input: &ReportInput<'_>) -> Result<String, ReportError> {
         script => safe(SCRIPT),
         data => safe(&script_json(&tables::script_data(input))?),
         session => or_missing(&p.session_id),
+        heading => heading(&p.protocol_name),
+        extent => extent(input),
         simulated => p.simulated,
         rig_name => or_missing(&p.rig_name),
         rig_kind => p.rig_kind.clone(),
@@ -98,8 +101,13 @@ pub(crate) fn render(input: &ReportInput<'_>) -> Result<String, ReportError> {
         losses => p.lost_bytes.iter().enumerate().filter(|(_, b)| **b > 0)
             .map(|(i, b)| context! { camera => i + 1, bytes => grouped(*b) })
             .collect::<Vec<_>>(),
-        rejections => derive::rejections(a).into_iter()
-            .map(|(verdict, reason, n)| context! { verdict, reason, n })
+        rejections => rejections(a, false),
+        sync_rejections => rejections(a, true),
+        depths => a.depths.iter()
+            .map(|d| context! {
+                depth => d.depth_mm.to_string(), value => number(d.rmse_mm.value, 2),
+                interval => interval(&d.rmse_mm, 1.0, 2), n => d.rmse_mm.n,
+            })
             .collect::<Vec<_>>(),
         provenance => provenance_rows(p, a.version),
         devices => p.devices.iter()
@@ -132,8 +140,33 @@ fn figure_value(f: Figure) -> Value {
     }
 }
 
+fn rejections(a: &Analysis, sync: bool) -> Vec<Value> {
+    let rows = derive::rejections(a, sync).into_iter();
+    rows.map(|r| context! { verdict => r.verdict, rule => r.rule, example => r.example, n => r.n })
+        .collect()
+}
+
+/// The protocol's name without folder and ending.
+fn heading(protocol: &str) -> String {
+    let file = protocol.rsplit(['/', '\\']).next().unwrap_or(protocol);
+    let stem = file
+        .strip_suffix(".yaml")
+        .or_else(|| file.strip_suffix(".yml"));
+    or_missing(stem.unwrap_or(file)).to_owned()
+}
+
+fn extent(input: &ReportInput<'_>) -> String {
+    let (repetitions, locations) = derive::extent(input.analysis);
+    let count = |n: u32, what: &str| format!("{n} {what}{}", if n == 1 { "" } else { "s" });
+    format!(
+        "{}, {}",
+        count(repetitions, "repetition"),
+        count(locations, "location")
+    )
+}
+
 fn metrics(input: &ReportInput<'_>) -> Vec<Value> {
-    metric_rows(&input.analysis.scored)
+    metric_rows(input.analysis)
         .into_iter()
         .map(|r| {
             context! { key => r.key, name => r.name, value => r.value, unit => r.unit,
@@ -208,6 +241,14 @@ fn calibration(input: &ReportInput<'_>) -> Option<Value> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_heading_is_the_name_of_the_protocol() {
+        assert_eq!(heading("protocols/paper-meander.yaml"), "paper-meander");
+        assert_eq!(heading("C:\\lab\\a.b.yml"), "a.b");
+        assert_eq!(heading("replay of demo"), "replay of demo");
+        assert_eq!(heading(""), "not recorded");
+    }
 
     #[test]
     fn script_json_cannot_end_its_element() {

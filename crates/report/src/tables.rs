@@ -3,7 +3,6 @@
 
 use serde_json::{Map, Value, json};
 use skinrig_analysis::result::{Analysis, CalibrationResult};
-use skinrig_model::{LensModel, StereoGeometry};
 
 use crate::ReportInput;
 use crate::derive;
@@ -44,8 +43,20 @@ impl Table {
     }
 
     fn finish(self) -> Value {
-        json!({ "columns": self.columns, "data": self.data })
+        let data: Vec<Value> = self.data.into_iter().map(packed).collect();
+        json!({ "columns": self.columns, "data": data })
     }
+}
+
+/// A column as it stands in the page: its cells, or, where that is shorter, `{"runs": [value, count, ...]}`
+/// with runs of equal cells. The script unpacks it.
+fn packed(cells: Vec<Value>) -> Value {
+    let runs: Vec<&[Value]> = cells.chunk_by(|a, b| a == b).collect();
+    if 2 * runs.len() >= cells.len() {
+        return Value::Array(cells);
+    }
+    let pairs = runs.iter().flat_map(|r| [r[0].clone(), json!(r.len())]);
+    json!({ "runs": pairs.collect::<Vec<_>>() })
 }
 
 /// Everything the script needs: session id and the named tables.
@@ -155,6 +166,7 @@ fn presses(a: &Analysis) -> Table {
             "counted",
             rows.iter().map(|p| json!(u8::from(derive::counts(p)))),
         )
+        .column("rule", rows.iter().map(|p| json!(p.rule)))
         .column("reason", rows.iter().map(|p| json!(p.reason)))
 }
 
@@ -298,31 +310,11 @@ pub(crate) fn calibration(c: &CalibrationResult) -> Vec<ParameterRow> {
         .enumerate()
         .map(|(i, name)| ParameterRow {
             name: name.clone(),
-            before: start_value(&c.start, name),
+            before: c.start_values.get(i).copied(),
             after: c.values.get(i).copied(),
             standard_error: c.standard_errors.get(i).copied().flatten(),
         })
         .collect()
-}
-
-/// The value in `geometry` of a parameter named as the calibration names it, for example
-/// `camera 1 skew (deg)`; `None` for a name not known here.
-fn start_value(geometry: &StereoGeometry, name: &str) -> Option<f64> {
-    let rest = name.strip_prefix("camera ")?;
-    let (number, what) = rest.split_once(' ')?;
-    let camera = match number {
-        "1" => &geometry.cameras[0],
-        "2" => &geometry.cameras[1],
-        _ => return None,
-    };
-    let LensModel::Exponential { w, .. } = camera.lens;
-    match what.split(" (").next()? {
-        "x" => Some(camera.position.x_mm),
-        "y" => Some(camera.position.y_mm),
-        "skew" => Some(camera.skew_deg),
-        "distortion W" => Some(w),
-        _ => None,
-    }
 }
 
 /// The analysis settings as (name, value) texts.

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use skinrig_analysis::result::{ClockFit, ClockMethod, Estimate, Metrics};
+use skinrig_analysis::result::{Analysis, ClockFit, ClockMethod, Estimate};
 
 use crate::ReportInput;
 use crate::format::{grouped, interval, number, or_missing};
@@ -21,7 +21,8 @@ pub(crate) struct MetricRow {
 }
 
 /// The metrics in the order in which they are read.
-pub(crate) fn metric_rows(m: &Metrics) -> Vec<MetricRow> {
+pub(crate) fn metric_rows(a: &Analysis) -> Vec<MetricRow> {
+    let m = &a.scored;
     let mm = |key, name, e: &Estimate, what_n| MetricRow {
         key,
         name,
@@ -43,7 +44,11 @@ pub(crate) fn metric_rows(m: &Metrics) -> Vec<MetricRow> {
             "repeat-std",
             "std between repetitions",
             &m.repeat_std_mm,
-            "locations",
+            if a.depths.is_empty() {
+                "locations"
+            } else {
+                "location-depths"
+            },
         ),
         MetricRow {
             key: "located",
@@ -159,13 +164,13 @@ pub(crate) fn table(input: &ReportInput<'_>, color: bool) -> String {
     out.push('\n');
 
     let head = format!(
-        "{:<26}{:>10}     {:^20}{:>7}",
+        "{:<24}{:>8}     {:^20}{:>7}",
         "scored presses", "value", "95 % interval", "n"
     );
     let _ = writeln!(out, "{}", paint.bold(&head));
-    for r in metric_rows(&a.scored) {
+    for r in metric_rows(a) {
         let line = format!(
-            "{:<26}{:>10} {:<3} {:^20}{:>7} {}",
+            "{:<24}{:>8} {:<3} {:^20}{:>7} {}",
             r.name, r.value, r.unit, r.interval, r.n, r.what_n
         );
         let line = if r.key == "rmse" {
@@ -178,7 +183,7 @@ pub(crate) fn table(input: &ReportInput<'_>, color: bool) -> String {
     if let Some(share) = a.scored.rmse_diagonal_percent {
         let _ = writeln!(
             out,
-            "{:<26}{:>10} %   of the skin's diagonal",
+            "{:<24}{:>8} %   of the skin's diagonal",
             "RMSE",
             number(Some(share), 2)
         );
@@ -187,11 +192,21 @@ pub(crate) fn table(input: &ReportInput<'_>, color: bool) -> String {
         let e = &a.scored_without_exclusions.rmse_mm;
         let _ = writeln!(
             out,
-            "{:<26}{:>10} mm  {:^20}{:>7} presses",
+            "{:<24}{:>8} mm  {:^20}{:>7} presses",
             "RMSE, nothing excluded",
             number(e.value, 2),
             interval(e, 1.0, 2),
             e.n
+        );
+    }
+    for d in &a.depths {
+        let _ = writeln!(
+            out,
+            "{:<24}{:>8} mm  {:^20}{:>7} presses",
+            format!("RMSE at {} mm depth", d.depth_mm),
+            number(d.rmse_mm.value, 2),
+            interval(&d.rmse_mm, 1.0, 2),
+            d.rmse_mm.n
         );
     }
     out.push('\n');
@@ -210,8 +225,15 @@ pub(crate) fn table(input: &ReportInput<'_>, color: bool) -> String {
         );
     }
     if c.sync > 0 {
-        let _ = writeln!(out, "          and {} sync presses, counted apart", c.sync);
+        let plural = if c.sync == 1 { "" } else { "es" };
+        let _ = writeln!(
+            out,
+            "          and {} sync press{plural}, counted apart",
+            c.sync
+        );
     }
+    out += &left_out(a, false);
+    out += &left_out(a, true);
     for (i, clock) in a.clocks.iter().enumerate() {
         out += &clock_lines(i + 1, clock.as_ref());
     }
@@ -242,6 +264,29 @@ pub(crate) fn table(input: &ReportInput<'_>, color: bool) -> String {
     }
     for warning in &a.warnings {
         out += &paint.warn(&wrap("warning   ", &plain(warning)));
+    }
+    out
+}
+
+/// Rules with lines of their own in the table; the page lists all.
+const MOST_RULES: usize = 6;
+
+/// What the rules left out, a line each.
+fn left_out(a: &Analysis, sync: bool) -> String {
+    let rows = crate::derive::rejections(a, sync);
+    let first = if sync { "sync      " } else { "left out  " };
+    let indent = " ".repeat(first.len());
+    let mut out = String::new();
+    for (i, r) in rows.iter().take(MOST_RULES).enumerate() {
+        let text = plain(&format!("{} {}: {}", r.n, r.verdict, r.rule));
+        out += &wrap(if i == 0 { first } else { &indent }, &text);
+    }
+    if rows.len() > MOST_RULES {
+        let more: u32 = rows[MOST_RULES..].iter().map(|r| r.n).sum();
+        out += &wrap(
+            &indent,
+            &format!("{more} by {} other rules", rows.len() - MOST_RULES),
+        );
     }
     out
 }

@@ -103,3 +103,25 @@ fn blunt(value: serde_json::Value) -> serde_json::Value {
         other => other,
     }
 }
+
+#[test]
+fn several_depths_have_lines_of_their_own_and_the_unit_says_so() {
+    let mut analysis = support::analysis(3, 2);
+    analysis.depths = [0.5, 2.25]
+        .map(|depth_mm| skinrig_analysis::result::DepthResult {
+            depth_mm,
+            rmse_mm: analysis.scored.rmse_mm,
+        })
+        .to_vec();
+    let input = ReportInput {
+        analysis: &analysis,
+        provenance: support::provenance(),
+    };
+    let table = terminal_table(&input, false);
+    assert!(table.contains("RMSE at 2.25 mm depth"), "{table}");
+    assert!(table.contains("250 location-depths"), "{table}");
+    assert!(table.lines().all(|l| l.chars().count() <= 80), "{table}");
+    let page = skinrig_report::html(&input).unwrap();
+    assert!(page.contains("RMSE at depth 2.25 mm"));
+    assert!(page.contains("All 2 depths together"));
+}

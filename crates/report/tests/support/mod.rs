@@ -125,6 +125,7 @@ pub fn analysis(side: u32, repetitions: u32) -> Analysis {
             start: geometry,
             names: ["camera 1 x (mm)", "camera 1 y (mm)", "camera 2 x (mm)", "camera 2 y (mm)", "camera 1 skew (deg)",
                 "camera 2 skew (deg)", "camera 1 distortion W (1)", "camera 2 distortion W (1)"].map(str::to_owned).to_vec(),
+            start_values: vec![45.0, -30.0, 50.0, 40.0, -2.0, -1.0, -0.1, 0.05],
             values: vec![44.1, -32.2, 49.9, 39.6, -1.8, -1.5, -0.16, 0.071],
             standard_errors: vec![Some(0.21), Some(0.18), Some(0.25), Some(0.2), Some(0.1), Some(0.11), Some(0.02), None],
             rmse_before_mm: 5.87,
@@ -134,6 +135,7 @@ pub fn analysis(side: u32, repetitions: u32) -> Analysis {
         }),
         scored,
         scored_without_exclusions,
+        depths: vec![],
         rates,
         presses,
         warnings: vec!["camera 2 has no trigger marks; its clock was fitted from the event rates of the sync presses".into()],
@@ -227,6 +229,7 @@ fn press(
         truth: (!missed).then_some(truth),
         verdict: verdict.into(),
         reason: reason.map(str::to_owned),
+        rule: reason.map(|r| r.split([':', ',']).next().unwrap_or(r).to_owned()),
         timing: (!missed).then(|| PressTiming {
             approach: t(0.8),
             contact: t(1.0),
