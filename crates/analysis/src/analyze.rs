@@ -137,13 +137,15 @@ struct Closeups {
 }
 
 impl Closeups {
-    /// Evenly spaced over the scored presses that were done; over all presses when none scores.
+    /// Spread over the scored presses that were done (over all presses when none scores) and over their locations:
+    /// of each of equal parts of the session, the press nearest to its share of the locations. Equal steps alone
+    /// would meet the same few places in every repetition.
     fn choose(input: &SessionInput) -> Self {
-        let done = |scored: bool| -> Vec<(usize, PressId)> {
+        let done = |scored: bool| -> Vec<(usize, PressId, u32)> {
             let rows = input.planned.iter().zip(&input.outcomes).enumerate();
             rows.filter(|(_, (p, _))| !scored || p.role == PressRole::Score)
                 .filter(|(_, (_, o))| o.as_ref().is_some_and(|o| o.timing.is_some()))
-                .map(|(row, (p, _))| (row, p.id))
+                .map(|(row, (p, _))| (row, p.id, p.location))
                 .collect()
         };
         let mut candidates = done(true);
@@ -153,10 +155,18 @@ impl Closeups {
         let spaced = |most: usize| {
             let n = candidates.len();
             let count = most.min(n);
-            // The middles of `count` equal parts.
-            (0..count)
-                .map(|i| candidates[(2 * i + 1) * n / (2 * count)])
-                .collect()
+            let lowest = candidates.iter().map(|c| c.2).min().unwrap_or(0);
+            let highest = candidates.iter().map(|c| c.2).max().unwrap_or(0);
+            let part = |i: usize| {
+                let share = (2 * i + 1) as f64 / (2 * count) as f64;
+                let wanted = f64::from(lowest) + share * f64::from(highest - lowest);
+                let away = |c: &&(usize, PressId, u32)| (f64::from(c.2) - wanted).abs();
+                candidates[i * n / count..(i + 1) * n / count]
+                    .iter()
+                    .min_by(|a, b| away(a).total_cmp(&away(b)))
+            };
+            let chosen = (0..count).filter_map(part);
+            chosen.map(|&(row, press, _)| (row, press)).collect()
         };
         Self {
             pictures: spaced(PICTURES),
@@ -190,7 +200,7 @@ fn camera_pass(
     } else {
         if !input.marks.is_empty() {
             warnings.push(format!(
-                "of {} trigger marks sent too few were seen ({} edges): the clock is aligned by event rates",
+                "too few trigger marks to fit the clock ({} sent, {} edges seen): event rates are used instead",
                 input.marks.len(),
                 input.edges[k].len()
             ));

@@ -39,7 +39,7 @@ pub struct Analysis {
     pub presses: Vec<PressResult>,
     /// Things a reader must know: fallbacks taken, data missing, suspicious residuals.
     pub warnings: Vec<String>,
-    /// What the cameras saw of a few scored presses, evenly spaced over the session.
+    /// What the cameras saw of a few scored presses, spread over the session and the skin.
     #[serde(default)]
     pub pictures: Vec<PressPicture>,
     /// The event rates around a few scored presses.

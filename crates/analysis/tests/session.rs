@@ -638,3 +638,30 @@ fn several_depths_are_also_scored_one_by_one() {
     let pooled = (squares / f64::from(a.scored.rmse_mm.n)).sqrt();
     assert!((pooled - a.scored.rmse_mm.value.unwrap()).abs() < 1e-9);
 }
+
+/// Parts of the session as long as a repetition or a multiple of it would show the same place again and again.
+#[test]
+fn pictures_are_spread_over_the_places() {
+    let (mut input, source) = session();
+    // Both repetitions score: 50 presses at 25 places.
+    for planned in input.planned.iter_mut().skip(3) {
+        planned.role = PressRole::Score;
+    }
+    let a = analyze(&input, &source).unwrap();
+    let mut places: Vec<u32> = a
+        .pictures
+        .iter()
+        .filter(|p| p.camera == CameraId::One)
+        .map(|picture| {
+            a.presses
+                .iter()
+                .find(|p| p.press == picture.press)
+                .unwrap()
+                .location
+        })
+        .collect();
+    assert_eq!(places.len(), 6);
+    places.sort_unstable();
+    places.dedup();
+    assert_eq!(places.len(), 6, "{places:?}");
+}
