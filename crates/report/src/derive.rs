@@ -99,9 +99,9 @@ pub fn sorted_errors_mm(analysis: &Analysis) -> Vec<f64> {
 pub struct Rejection {
     /// `missed`, `invalid` or `excluded`.
     pub verdict: String,
-    /// The rule.
+    /// The rule; the reason in full when all of them share it.
     pub rule: String,
-    /// The reason of the first of them, when it says more than the rule.
+    /// The reason of the first of them, when they differ.
     pub example: Option<String>,
     /// How many.
     pub n: u32,
@@ -111,26 +111,28 @@ pub struct Rejection {
 /// leave apart, only with `sync`; all others only without.
 #[must_use]
 pub fn rejections(analysis: &Analysis, sync: bool) -> Vec<Rejection> {
-    let mut groups: BTreeMap<(&str, &str), (u32, Option<&str>)> = BTreeMap::new();
+    let mut groups: BTreeMap<(&str, &str), Vec<&str>> = BTreeMap::new();
     let rejected = analysis.presses.iter().filter(|p| p.verdict != "valid");
     for press in rejected.filter(|p| (p.role == PressRole::Sync) == sync) {
-        let reason = press.reason.as_deref();
-        let rule = press.rule.as_deref().or(reason);
-        let rule = rule.unwrap_or("no reason given");
-        let example = reason.filter(|r| *r != rule);
-        let group = groups.entry((&press.verdict, rule));
-        group.or_insert((0, example)).0 += 1;
+        let reason = press.reason.as_deref().unwrap_or("no reason given");
+        let rule = press.rule.as_deref().unwrap_or(reason);
+        let group = groups.entry((&press.verdict, rule)).or_default();
+        group.push(reason);
     }
     let mut rows: Vec<Rejection> = groups
         .into_iter()
-        .map(|((verdict, rule), (n, example))| Rejection {
-            verdict: verdict.to_owned(),
-            rule: rule.to_owned(),
-            example: example.map(str::to_owned),
-            n,
+        .map(|((verdict, rule), reasons)| {
+            let first = reasons[0];
+            let alike = reasons.iter().all(|r| *r == first);
+            Rejection {
+                verdict: verdict.to_owned(),
+                rule: if alike { first } else { rule }.to_owned(),
+                example: (!alike).then(|| first.to_owned()),
+                n: reasons.len() as u32,
+            }
         })
         .collect();
-    rows.sort_by(|a, b| b.n.cmp(&a.n));
+    rows.sort_by_key(|row| std::cmp::Reverse(row.n));
     rows
 }
 

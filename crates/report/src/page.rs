@@ -12,7 +12,7 @@ use skinrig_analysis::result::Analysis;
 
 use crate::derive;
 use crate::figures::{self, Figure};
-use crate::format::{grouped, interval, number, or_missing};
+use crate::format::{digits_of_error, grouped, interval, number, or_missing};
 use crate::provenance::Provenance;
 use crate::svg::{FIGURE_CSS, plain_css};
 use crate::tables;
@@ -72,6 +72,7 @@ pub(crate) fn render(input: &ReportInput<'_>) -> Result<String, ReportError> {
         prototype => or_missing(&p.prototype),
         run_end => or_missing(&p.run_end),
         run_end_reason => p.run_end_reason.clone(),
+        run_end_s => p.interruptions.iter().find(|i| p.ended_by(i)).map(|i| number(Some(i.t_s), 1)),
         metrics => metrics(input),
         rmse_all => context! {
             differs => a.scored_without_exclusions != a.scored,
@@ -92,7 +93,7 @@ pub(crate) fn render(input: &ReportInput<'_>) -> Result<String, ReportError> {
         disagreement => derive::disagreement(a),
         empty => a.presses.is_empty(),
         warnings => a.warnings.clone(),
-        interruptions => p.interruptions.iter()
+        interruptions => p.interruptions.iter().filter(|i| !p.ended_by(i))
             .map(|i| context! { t => number(Some(i.t_s), 1), kind => i.kind.clone(), reason => i.reason.clone() })
             .collect::<Vec<_>>(),
         notes => p.notes.iter()
@@ -151,8 +152,9 @@ fn heading(protocol: &str) -> String {
     let file = protocol.rsplit(['/', '\\']).next().unwrap_or(protocol);
     let stem = file
         .strip_suffix(".yaml")
-        .or_else(|| file.strip_suffix(".yml"));
-    or_missing(stem.unwrap_or(file)).to_owned()
+        .or_else(|| file.strip_suffix(".yml"))
+        .unwrap_or(file);
+    or_missing(stem.strip_suffix(".schedule").unwrap_or(stem)).to_owned()
 }
 
 fn extent(input: &ReportInput<'_>) -> String {
@@ -209,8 +211,8 @@ fn clocks(input: &ReportInput<'_>) -> Vec<Value> {
             found => true,
             method => clock_method(c.method),
             offset => number(Some(c.offset_us), 1),
-            drift => number(Some(c.drift_ppm), 3),
-            drift_se => number(Some(c.drift_se_ppm), 3),
+            drift => number(Some(c.drift_ppm), digits_of_error(c.drift_se_ppm)),
+            drift_se => number(Some(c.drift_se_ppm), digits_of_error(c.drift_se_ppm)),
             rms => number(Some(c.residual_rms_us), 2),
             max => number(Some(c.residual_max_us), 2),
             n => c.n,
@@ -246,6 +248,10 @@ mod tests {
     fn a_heading_is_the_name_of_the_protocol() {
         assert_eq!(heading("protocols/paper-meander.yaml"), "paper-meander");
         assert_eq!(heading("C:\\lab\\a.b.yml"), "a.b");
+        assert_eq!(
+            heading("single-repetition.schedule.yaml"),
+            "single-repetition"
+        );
         assert_eq!(heading("replay of demo"), "replay of demo");
         assert_eq!(heading(""), "not recorded");
     }

@@ -51,6 +51,13 @@ pub struct Provenance {
     pub lost_bytes: [u64; 2],
 }
 
+impl Provenance {
+    /// True when this interruption is the one that ended the run: both give the same reason.
+    pub(crate) fn ended_by(&self, interruption: &InterruptionRow) -> bool {
+        self.run_end_reason.as_ref() == Some(&interruption.reason)
+    }
+}
+
 /// One device.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct DeviceRow {

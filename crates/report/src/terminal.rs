@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use skinrig_analysis::result::{Analysis, ClockFit, ClockMethod, Estimate};
 
 use crate::ReportInput;
-use crate::format::{grouped, interval, number, or_missing};
+use crate::format::{digits_of_error, grouped, interval, number, or_missing};
 
 const WIDTH: usize = 80;
 
@@ -251,12 +251,12 @@ pub(crate) fn table(input: &ReportInput<'_>, color: bool) -> String {
         out += &paint.warn(&wrap("loss      ", &text));
     }
     for row in &p.interruptions {
-        let text = plain(&format!(
-            "{} at {} s: {}",
-            row.kind,
-            number(Some(row.t_s), 1),
-            row.reason
-        ));
+        let mut text = format!("{} at {} s", row.kind, number(Some(row.t_s), 1));
+        // What ended the run is said above.
+        if !p.ended_by(row) {
+            let _ = write!(text, ": {}", row.reason);
+        }
+        let text = plain(&text);
         out += &paint.warn(&wrap("event     ", &text));
     }
     if let Some(text) = crate::derive::disagreement(a) {
@@ -279,6 +279,14 @@ fn left_out(a: &Analysis, sync: bool) -> String {
     let mut out = String::new();
     for (i, r) in rows.iter().take(MOST_RULES).enumerate() {
         let text = plain(&format!("{} {}: {}", r.n, r.verdict, r.rule));
+        // One line each: the run's end and the page say the rest.
+        let room = WIDTH - first.len();
+        let text = if text.chars().count() > room {
+            let cut: String = text.chars().take(room - 1).collect();
+            format!("{}…", cut.trim_end())
+        } else {
+            text
+        };
         out += &wrap(if i == 0 { first } else { &indent }, &text);
     }
     if rows.len() > MOST_RULES {
@@ -301,8 +309,8 @@ fn clock_lines(camera: usize, clock: Option<&ClockFit>) -> String {
     };
     let drift = format!(
         "{} ± {}",
-        number(Some(c.drift_ppm), 3),
-        number(Some(c.drift_se_ppm), 3)
+        number(Some(c.drift_ppm), digits_of_error(c.drift_se_ppm)),
+        number(Some(c.drift_se_ppm), digits_of_error(c.drift_se_ppm))
     );
     let text = format!(
         "drift {drift} ppm, residual rms {} µs, max {} µs, n {} ({} rejected), from {}",

@@ -337,3 +337,35 @@ fn packed_columns_hold_every_cell() {
     assert_eq!(serde_json::json!(at("role")), serde_json::json!(roles));
     assert_eq!(at("press").len(), analysis.presses.len());
 }
+
+/// A camera without a clock fit has no place on the host's time axis.
+#[test]
+fn an_unaligned_camera_is_drawn_from_its_first_event() {
+    let mut analysis = support::analysis(4, 3);
+    let panel = "clock not aligned: time since its first event";
+    assert!(!html(&input(&analysis)).unwrap().contains(panel));
+    analysis.clocks[1] = None;
+    analysis.rates[1].start_s = 5e6;
+    let figures = skinrig_report::figures::all(&input(&analysis));
+    let rates = figures.iter().find(|f| f.id == "event-rates").unwrap();
+    assert_eq!(rates.svg.matches(panel).count(), 1);
+    let end = rates.svg.split("data-t1=\"").nth(1).unwrap();
+    let end: f64 = end.split('"').next().unwrap().parse().unwrap();
+    assert!(end < 1000.0, "{end}");
+}
+
+#[test]
+fn the_reason_that_ended_the_run_is_said_once() {
+    let analysis = support::analysis(3, 2);
+    let mut input = input(&analysis);
+    input.provenance.run_end = "faulted".into();
+    input.provenance.run_end_reason = Some("the belt tore".into());
+    input.provenance.interruptions[0].kind = "fault".into();
+    input.provenance.interruptions[0].reason = "the belt tore".into();
+    let page = html(&input).unwrap();
+    assert_eq!(page.matches("the belt tore").count(), 1);
+    assert!(page.contains("Run faulted at 1803.2 s."));
+    let table = skinrig_report::terminal_table(&input, false);
+    assert_eq!(table.matches("the belt tore").count(), 1, "{table}");
+    assert!(table.contains("fault at 1803.2 s"), "{table}");
+}

@@ -45,7 +45,7 @@ pub fn error_distribution(input: &ReportInput<'_>) -> Figure {
         x,
         y: Scale::new((0.0, f64::from(most.max(1)) * 1.06), (416.0, 274.0)),
         x_label: "Euclidean error (mm)".into(),
-        y_label: format!("presses per {} mm", tick_label(width, width)),
+        y_label: format!("presses per {} mm", bin_width(width)),
         tick_count: (8, 4),
     };
     let svg = &mut canvas.svg;
@@ -203,6 +203,17 @@ pub fn error_scatter(input: &ReportInput<'_>) -> Figure {
         canvas.empty("no scored press was located");
     }
     canvas.finish(&format!("n = {} presses", errors.len()), "presses", "")
+}
+
+/// Three digits of a bin's width, without trailing zeros.
+fn bin_width(width: f64) -> String {
+    let text = tick_label(width, width * 0.01);
+    let text = if text.contains('.') {
+        text.trim_end_matches('0').trim_end_matches('.')
+    } else {
+        &text
+    };
+    text.to_owned()
 }
 
 #[cfg(test)]

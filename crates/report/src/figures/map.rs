@@ -1,5 +1,6 @@
 //! Owns the maps of the skin: localisation errors and spread between repetitions, per location.
 
+use skinrig_analysis::result::PressResult;
 use skinrig_model::PressRole;
 
 use super::skin::{Layout, colour_bar};
@@ -87,8 +88,8 @@ pub fn skin_map(input: &ReportInput<'_>) -> Figure {
     let caption = format!(
         "Localisation error over the skin. Discs: scored locations, coloured by the mean Euclidean error of \
          their presses. Lines run from each measured position (truth) to its estimate, which ends in a dot \
-         ({} presses at {} locations). Open squares: {} scored presses that do not count. Thin grey line: \
-         press path of the first repetition. Tinted: fields of view of camera 1 and camera 2; both tints \
+         ({} presses at {} locations). Open squares: scored presses that do not count ({}; those never done are drawn \
+         only at places without a disc). Thin grey line: press path of the first repetition. Tinted: fields of view of camera 1 and camera 2; both tints \
          together mark the overlap, where a press can be located.",
         counted.len(),
         locations.len(),
@@ -149,7 +150,8 @@ pub fn skin_map(input: &ReportInput<'_>) -> Figure {
     svg.path("dots tips", &dots(tips));
     svg.close();
     let mut squares = String::new();
-    for p in &others {
+    let disc = |p: &PressResult| locations.iter().any(|l| l.location == p.location);
+    for p in others.iter().filter(|p| p.timing.is_some() || !disc(p)) {
         let (x, y) = layout.px(p.truth.unwrap_or(p.planned));
         squares.push_str(&polyline(
             [

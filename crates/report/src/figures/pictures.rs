@@ -25,7 +25,7 @@ pub fn press_pictures(input: &ReportInput<'_>) -> Option<Figure> {
         .fold(1.0, f64::max);
     // Two strips beside each other; a pixel of the sensor is `k` wide and high.
     let k = 570.0 / f64::from(SENSOR_WIDTH);
-    let row_height = tallest * k + 52.0;
+    let row_height = tallest * k + 56.0;
     let size = (1240.0, 46.0 + row_height * presses.len() as f64 + 26.0);
     let caption = "Pixels with events during single presses, cropped rows of the sensor, camera 1 left, camera 2 \
          right. Colour: the polarity that the pixel saw more often. Pale pixels are not part of the cluster. \
@@ -87,7 +87,7 @@ fn strip(canvas: &mut Canvas<'_>, p: &PressPicture, at: (f64, f64), k: f64, cent
     let height = f64::from(rows(p)) * k;
     let width = f64::from(SENSOR_WIDTH) * k;
     svg.text(
-        (at.0, at.1 - 10.0),
+        (at.0, at.1 - 11.0),
         "panel",
         "start",
         &format!("press {} · camera {}", p.press.0, p.camera.number()),
@@ -103,7 +103,7 @@ fn strip(canvas: &mut Canvas<'_>, p: &PressPicture, at: (f64, f64), k: f64, cent
         ],
     );
     svg.text(
-        (at.0 + width, at.1 - 10.0),
+        (at.0 + width, at.1 - 11.0),
         "tick",
         "end",
         "column u (px) across, row v (px) down",
@@ -130,7 +130,7 @@ fn strip(canvas: &mut Canvas<'_>, p: &PressPicture, at: (f64, f64), k: f64, cent
     svg.close();
     for u in [0.0, 160.0, 320.0, 480.0, 640.0] {
         svg.text(
-            (at.0 + u * k, at.1 + height + 12.0),
+            (at.0 + u * k, at.1 + height + 19.0),
             "tick",
             "middle",
             &tick_label(u, 1.0),

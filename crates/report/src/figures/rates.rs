@@ -59,7 +59,12 @@ fn stairs(start: f64, width: f64, values: &[f32], axes: &Axes, divisor: f64) -> 
 /// The event rate of both cameras over the session, with a mark at the contact of each press.
 #[must_use]
 pub fn event_rates(input: &ReportInput<'_>) -> Figure {
-    let series = &input.analysis.rates;
+    // Without a fit a camera's times are its own: they are drawn from 0 on, and the panel says so.
+    let aligned = input.analysis.clocks.map(|c| c.is_some());
+    let mut series = input.analysis.rates.clone();
+    for (s, _) in series.iter_mut().zip(aligned).filter(|(_, a)| !a) {
+        s.start_s = 0.0;
+    }
     let contacts: Vec<f64> = input
         .analysis
         .presses
@@ -134,7 +139,12 @@ pub fn event_rates(input: &ReportInput<'_>) -> Figure {
         svg.open("g", &[("class", &"time-axes")]);
         axes.draw(svg);
         svg.close();
-        let panel = format!("{}   camera {}", ["A", "B"][camera], camera + 1);
+        let own = if aligned[camera] || s.mean_per_s.is_empty() {
+            ""
+        } else {
+            " (clock not aligned: time since its first event)"
+        };
+        let panel = format!("{}   camera {}{own}", ["A", "B"][camera], camera + 1);
         svg.text((66.0, top - 9.0), "panel", "start", &panel);
         svg.open("g", &[("clip-path", &"url(#event-rates-clip)")]);
         svg.open("g", &[("class", &"zoomed")]);
