@@ -21,10 +21,10 @@ pub(crate) fn number(value: Option<f64>, digits: usize) -> String {
     }
 }
 
-/// Decimals that show two digits of a standard error, at least 1 and at most 6; 3 without one.
+/// Decimals that show two digits of a standard error, at least 1 and at most 4; 3 without one.
 pub(crate) fn digits_of_error(standard_error: f64) -> usize {
     if standard_error.is_finite() && standard_error > 0.0 {
-        (1.0 - standard_error.log10().floor()).clamp(1.0, 6.0) as usize
+        (1.0 - standard_error.log10().floor()).clamp(1.0, 4.0) as usize
     } else {
         3
     }
@@ -79,10 +79,10 @@ mod tests {
     }
 
     #[test]
-    fn a_standard_error_shows_two_digits() {
+    fn a_standard_error_shows_two_digits_where_four_decimals_can() {
         let written = |se: f64| number(Some(se), digits_of_error(se));
         assert_eq!(written(0.0123), "0.012");
-        assert_eq!(written(0.000_057), "0.000057");
+        assert_eq!(written(0.000_057), "0.0001");
         assert_eq!(written(1.893), "1.9");
         assert_eq!(written(38.0), "38.0");
         assert_eq!(written(0.0), "0.000");

@@ -68,7 +68,12 @@ pub fn error_distribution(input: &ReportInput<'_>) -> Figure {
     svg.close();
     svg.path("ecdf", &ecdf(&errors, &upper));
     if errors.is_empty() {
-        canvas.empty("no scored press was located");
+        canvas.svg.text(
+            (333.0, 137.0),
+            "empty",
+            "middle",
+            "no scored press was located",
+        );
     } else {
         let marks = [
             ("median", m.median_mm.value, "ref"),
