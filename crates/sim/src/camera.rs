@@ -107,6 +107,22 @@ impl SimCamera {
         }
     }
 
+    /// Neither gone nor streaming.
+    fn expect_stopped(&self) -> Result<(), DeviceError> {
+        if self.gone {
+            return Err(self.gone_error());
+        }
+        if self.streaming.is_some() {
+            return Err(DeviceError::State {
+                role: self.role(),
+                serial: self.serial.clone(),
+                expected: "stopped".to_owned(),
+                found: "streaming".to_owned(),
+            });
+        }
+        Ok(())
+    }
+
     fn role(&self) -> DeviceRole {
         DeviceRole::of_camera(self.id)
     }
@@ -124,7 +140,7 @@ impl SimCamera {
         DeviceError::Lost {
             role: self.role(),
             serial: self.serial.clone(),
-            detail: "expected transfers, the device is unplugged".to_owned(),
+            detail: "expected transfers, found the device unplugged".to_owned(),
         }
     }
 
@@ -258,17 +274,7 @@ impl EventCamera for SimCamera {
     }
 
     fn configure(&mut self, settings: &CameraSettings) -> Result<Vec<Setting>, DeviceError> {
-        if self.gone {
-            return Err(self.gone_error());
-        }
-        if self.streaming.is_some() {
-            return Err(DeviceError::State {
-                role: self.role(),
-                serial: self.serial.clone(),
-                expected: "stopped".to_owned(),
-                found: "streaming".to_owned(),
-            });
-        }
+        self.expect_stopped()?;
         self.check(settings)?;
         let mut biases: BTreeMap<String, i64> =
             BIASES.iter().map(|b| (b.0.to_owned(), b.3)).collect();
@@ -310,17 +316,7 @@ impl EventCamera for SimCamera {
     }
 
     fn start(&mut self) -> Result<(), DeviceError> {
-        if self.gone {
-            return Err(self.gone_error());
-        }
-        if self.streaming.is_some() {
-            return Err(DeviceError::State {
-                role: self.role(),
-                serial: self.serial.clone(),
-                expected: "stopped".to_owned(),
-                found: "streaming".to_owned(),
-            });
-        }
+        self.expect_stopped()?;
         let grid = self.shared.world().watch(self.id.index());
         let start_ns = grid * GRID_NS;
         let clock = match self.clock {

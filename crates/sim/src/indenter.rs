@@ -109,7 +109,7 @@ impl Indenter for SimIndenter {
         };
         limits::check_command(&self.serial, &limits, target, speed_mm_s)?;
         let rises = target.z_mm > world.motion.tip().z_mm;
-        if world.take_tripped(rises) && !rises {
+        if !rises && world.must_rise() {
             return Err(limits::refused(
                 &self.serial,
                 format!(
@@ -119,7 +119,7 @@ impl Indenter for SimIndenter {
                 format!("z = {} mm", target.z_mm),
             ));
         }
-        world.motion.move_to(target, speed_mm_s);
+        world.move_to(target, speed_mm_s, rises);
         Ok(())
     }
 
@@ -137,7 +137,7 @@ impl Indenter for SimIndenter {
     fn hold(&mut self) -> Result<(), DeviceError> {
         let mut world = self.shared.world();
         self.check_lost(&world)?;
-        world.motion.hold();
+        world.hold();
         Ok(())
     }
 

@@ -39,8 +39,8 @@ pub fn check_limits(
         if !(low <= min && min < max && max <= high) {
             return Err(refused(
                 serial,
-                format!("limits of axis {axis} within {low}..={high} mm"),
-                format!("{min}..={max} mm"),
+                format!("limits of axis {axis} within {low:.3}..={high:.3} mm"),
+                format!("{min:.3}..={max:.3} mm"),
             ));
         }
     }
@@ -74,8 +74,8 @@ pub fn check_command(
         if !(min..=max).contains(&value) {
             return Err(refused(
                 serial,
-                format!("coordinate {axis} of the target within {min}..={max} mm"),
-                format!("{value} mm"),
+                format!("coordinate {axis} of the target within {min:.3}..={max:.3} mm"),
+                format!("{value:.3} mm"),
             ));
         }
     }
@@ -89,12 +89,18 @@ pub fn check_command(
     Ok(())
 }
 
+/// `(x, y, z)` to the micrometre.
+#[must_use]
+pub fn millimetres([x, y, z]: [f64; 3]) -> String {
+    format!("({x:.3}, {y:.3}, {z:.3})")
+}
+
 /// Limits as settings, requested and read back.
 #[must_use]
 pub fn settings(limits: &MotionLimits) -> Vec<Setting> {
     let all = [
-        ("min_mm", format!("{:?}", limits.min_mm)),
-        ("max_mm", format!("{:?}", limits.max_mm)),
+        ("min_mm", millimetres(limits.min_mm)),
+        ("max_mm", millimetres(limits.max_mm)),
         ("max_speed_mm_s", limits.max_speed_mm_s.to_string()),
         ("max_force_n", limits.max_force_n.to_string()),
     ];

@@ -8,7 +8,7 @@ use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use skinrig_device::{Clock, RobotSample};
-use skinrig_model::{HostTime, RigidTransform, Robot, Skin};
+use skinrig_model::{HostTime, Point3, RigidTransform, Robot, Skin};
 
 use crate::clock::SimClock;
 use crate::config::SimConfig;
@@ -46,7 +46,12 @@ pub struct World {
     touching: bool,
     last_z_mm: f64,
     force_limit_n: f64,
+    /// The robot has stopped by itself; the next rise releases it.
     tripped: bool,
+    /// The force is above its limit.
+    overloaded: bool,
+    /// The present motion leads away from the skin; no force stops it.
+    rising: bool,
 }
 
 impl World {
@@ -68,6 +73,8 @@ impl World {
             last_z_mm: config.start.z_mm,
             force_limit_n: f64::INFINITY,
             tripped: false,
+            overloaded: false,
+            rising: false,
         };
         world.observe();
         world
@@ -109,7 +116,8 @@ impl World {
             self.touching = false;
         }
         let (force_n, felt_n) = self.motion.force_n(-position.z_mm, rate);
-        if force_n > self.force_limit_n && !self.tripped {
+        self.overloaded = force_n > self.force_limit_n;
+        if self.overloaded && !self.rising {
             self.tripped = true;
             self.motion.hold();
         }
@@ -166,13 +174,24 @@ impl World {
         self.force_limit_n = limit_n;
     }
 
-    /// True when the robot stopped because of its force limit; `release` lets it move again.
-    pub const fn take_tripped(&mut self, release: bool) -> bool {
-        let tripped = self.tripped;
-        if release {
-            self.tripped = false;
-        }
-        tripped
+    /// True when only a rise is allowed: the robot stopped because of its force limit, and has not been told to
+    /// rise since, or it still presses too hard.
+    #[must_use]
+    pub const fn must_rise(&self) -> bool {
+        self.tripped || self.overloaded
+    }
+
+    /// Sends the robot to `target`.
+    pub fn move_to(&mut self, target: Point3<Robot>, speed_mm_s: f64, rises: bool) {
+        self.rising = rises;
+        self.tripped &= !rises;
+        self.motion.move_to(target, speed_mm_s);
+    }
+
+    /// Brings the robot to rest.
+    pub fn hold(&mut self) {
+        self.rising = false;
+        self.motion.hold();
     }
 
     /// Takes all samples that nobody has taken yet.

@@ -5,11 +5,16 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use skinrig_device::{Clock, DeviceError};
 use skinrig_model::{
-    CameraId, DeviceIdentity, DeviceRole, HostTime, MotionCommand, PoseSample, RawChunk,
-    RigidTransform, Robot, SentMark, Setting, Skin,
+    CameraId, DeviceIdentity, DeviceRole, HostDuration, HostTime, MotionCommand, PoseSample,
+    RawChunk, RigidTransform, Robot, SentMark, Setting, Skin,
 };
 
 use super::recording::{Recording, RecordingError};
+use crate::limits::millimetres;
+
+/// This long after its last pose, and no other to come, a recording has ended. Shorter than any controller waits
+/// for a pose (0.1 s), longer than its ticks.
+const LONGEST_GAP: HostDuration = HostDuration::from_millis(50);
 
 /// Reading positions in a recording.
 pub struct Reader {
@@ -18,6 +23,7 @@ pub struct Reader {
     command: Option<(HostTime, MotionCommand)>,
     commands_read: u64,
     poses: VecDeque<PoseSample>,
+    last_pose: Option<HostTime>,
     mark: Option<SentMark>,
     marks_read: u64,
     chunks: [Option<RawChunk>; 2],
@@ -46,6 +52,7 @@ impl Tape {
             command: None,
             commands_read: 0,
             poses: VecDeque::new(),
+            last_pose: None,
             mark: None,
             marks_read: 0,
             chunks: [None, None],
@@ -113,6 +120,18 @@ impl Reader {
         }
     }
 
+    /// There is nothing further that the device could be asked for: the recorded run ended here.
+    pub(super) fn ended(&self, role: DeviceRole) -> DeviceError {
+        DeviceError::Lost {
+            role,
+            serial: self.identity(role).serial,
+            detail: format!(
+                "the recording ends here, at {}; expected nothing further to be asked",
+                self.now
+            ),
+        }
+    }
+
     pub(super) fn check(&self, role: DeviceRole) -> Result<(), DeviceError> {
         match &self.failure {
             None => Ok(()),
@@ -139,18 +158,13 @@ impl Reader {
         let at = format!("command {}", self.commands_read);
         let show = |c: &MotionCommand| {
             format!(
-                "a move to {:?} mm at {} mm/s",
-                c.target.to_array(),
+                "a move to {} mm at {:.3} mm/s",
+                millimetres(c.target.to_array()),
                 c.speed_mm_s
             )
         };
         let Some((t, recorded)) = self.command else {
-            return Err(DeviceError::Diverged {
-                role: DeviceRole::Indenter,
-                at,
-                expected: "no further command".to_owned(),
-                found: show(&found),
-            });
+            return Err(self.ended(DeviceRole::Indenter));
         };
         // Nanometres: the round trip through the robot's frame.
         let same = recorded.target.distance_mm(found.target) <= 1e-6
@@ -173,6 +187,7 @@ impl Reader {
     pub(super) fn take_poses(&mut self, out: &mut Vec<PoseSample>) -> Result<(), DeviceError> {
         loop {
             while let Some(pose) = self.poses.front().filter(|p| p.t <= self.now) {
+                self.last_pose = Some(pose.t);
                 out.push(*pose);
                 self.poses.pop_front();
             }
@@ -181,7 +196,14 @@ impl Reader {
             }
             match self.recording.next_poses() {
                 Ok(Some(block)) => self.poses.extend(block),
-                Ok(None) => return Ok(()),
+                Ok(None) => {
+                    return match self.last_pose {
+                        Some(t) if self.now > t + LONGEST_GAP => {
+                            Err(self.ended(DeviceRole::Indenter))
+                        }
+                        _ => Ok(()),
+                    };
+                }
                 Err(e) => return Err(self.lost(DeviceRole::Indenter, &e)),
             }
         }

@@ -127,12 +127,27 @@ fn another_request_is_a_divergence() {
         }
         other => panic!("expected a divergence, found {other:?}"),
     }
-    // Asking for more than was recorded is one too.
+}
+
+#[test]
+fn beyond_its_end_a_recording_says_that_it_ends() {
+    let at = places(2);
+    let (log, _) = recorded(&at);
     let mut rig = replay(&log);
     ready(&mut rig);
     let more = [at.clone(), places(1)].concat();
-    assert!(matches!(
-        press_all(&mut rig, &more, &[5_000]).err(),
-        Some(DeviceError::Diverged { .. })
-    ));
+    let error = press_all(&mut rig, &more, &[5_000]).err();
+    let told = error.map(|e| e.to_string()).unwrap_or_default();
+    assert!(told.contains("the recording ends here, at "), "{told}");
+
+    // Time goes on, but no pose comes any more.
+    let mut rig = replay(&log);
+    ready(&mut rig);
+    press_all(&mut rig, &at, &[5_000]).unwrap();
+    let end = rig.clock.now();
+    rig.clock
+        .wait_until(skinrig_model::HostTime(end.0 + 60_000_000));
+    let error = rig.indenter.poll(&mut Vec::new()).err();
+    let told = error.map(|e| e.to_string()).unwrap_or_default();
+    assert!(told.contains("the recording ends here, at "), "{told}");
 }
