@@ -92,9 +92,10 @@ impl<F> Point3<F> {
     /// Euclidean distance to `other` in mm.
     #[must_use]
     pub fn distance_mm(self, other: Self) -> f64 {
-        let [a, b, c] = self.to_array();
-        let [x, y, z] = other.to_array();
-        ((a - x).powi(2) + (b - y).powi(2) + (c - z).powi(2)).sqrt()
+        let dx = self.x_mm - other.x_mm;
+        let dy = self.y_mm - other.y_mm;
+        let dz = self.z_mm - other.z_mm;
+        (dx * dx + dy * dy + dz * dz).sqrt()
     }
 
     /// True when no coordinate is NaN or infinite.

@@ -67,14 +67,14 @@ impl SkinOutline {
     /// Length of the enclosing rectangle's diagonal, mm.
     #[must_use]
     pub fn diagonal_mm(&self) -> f64 {
-        self.width_mm.hypot(self.height_mm)
+        libm::hypot(self.width_mm, self.height_mm)
     }
 
     /// Exact area in mm².
     #[must_use]
     pub fn area_mm2(&self) -> f64 {
-        let corner = (1.0 - std::f64::consts::FRAC_PI_4) * self.radius_mm.powi(2);
-        self.width_mm * self.height_mm - self.chamfer_mm.powi(2) - 2.0 * corner
+        let corner = (1.0 - std::f64::consts::FRAC_PI_4) * self.radius_mm * self.radius_mm;
+        self.width_mm * self.height_mm - self.chamfer_mm * self.chamfer_mm - 2.0 * corner
     }
 
     /// The outline as a closed polygon (first point not repeated), counter-clockwise, each arc in
@@ -88,7 +88,7 @@ impl SkinOutline {
         let arc = |cx: f64, cy: f64, from: f64| {
             (0..=n).map(move |k| {
                 let a = (from + 90.0 * f64::from(k) / f64::from(n)).to_radians();
-                (cx + r * a.cos(), cy + r * a.sin())
+                (cx + r * libm::cos(a), cy + r * libm::sin(a))
             })
         };
         points.extend(arc(-hx + r, hy - r, 90.0));
