@@ -171,7 +171,7 @@ impl Core<'_> {
         while !self.indenter.is_clear() {
             let now = self.now();
             if now >= t + allowed {
-                return Err(self.not_arrived("retraction", target, allowed));
+                return Err(self.not_arrived("straight up", target, allowed));
             }
             self.clock.wait_until(now + self.settings.tick);
             self.observe()?;

@@ -5,4 +5,5 @@ mod edges;
 mod guard;
 mod mock;
 mod progress;
+mod rig_faults;
 mod simulated;

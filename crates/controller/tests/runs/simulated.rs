@@ -9,7 +9,7 @@ use skinrig_sim::rig::simulated_rig;
 use crate::mock::{MS, Sink, header, plan};
 
 /// The mock's plan at a pace that a robot with inertia can follow.
-fn paced_plan() -> Plan {
+pub fn paced_plan() -> Plan {
     let mut plan = plan();
     for step in &mut plan.steps {
         if let Step::Press(p) = step {

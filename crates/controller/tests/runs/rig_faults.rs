@@ -1,0 +1,205 @@
+//! What goes wrong on the simulated rig, at every stage of a press: how the real controller ends there.
+
+use skinrig_controller::{ControlHandle, RunReport, execute};
+use skinrig_model::*;
+use skinrig_protocol::plan::Plan;
+use skinrig_sim::config::SimConfig;
+use skinrig_sim::faults::{Fault, When};
+use skinrig_sim::rig::simulated_rig;
+
+use crate::mock::{MS, Sink, header};
+use crate::simulated::paced_plan;
+
+/// What a run left behind.
+struct Told {
+    report: RunReport,
+    records: Vec<Record>,
+}
+
+fn run(plan: &Plan, config: &SimConfig) -> Told {
+    let mut sink = Sink::default();
+    let header = RunHeader {
+        robot_from_skin: config.robot_from_skin,
+        ..header(plan)
+    };
+    let rig = simulated_rig(config);
+    let report = execute(plan, header, rig, &ControlHandle::new(), &mut sink);
+    Told {
+        report,
+        records: sink.records,
+    }
+}
+
+impl Told {
+    fn end(&self) -> &str {
+        match &self.report.end {
+            RunEnd::Completed => "completed",
+            RunEnd::Stopped(r) | RunEnd::Faulted(r) => r,
+        }
+    }
+
+    fn last_height_mm(&self) -> f64 {
+        let blocks = self.records.iter().rev().filter_map(|r| match r {
+            Record::Poses(block) => block.last(),
+            _ => None,
+        });
+        blocks.map(|p| p.measured.z_mm).next().unwrap_or(f64::NAN)
+    }
+
+    /// Every planned press ends once, and the counts of the report say the same.
+    fn check_presses(&self, case: &str) {
+        let r = &self.report;
+        assert_eq!(r.planned, r.valid + r.invalid + r.missed, "{case}: {r:?}");
+        for press in 0..r.planned as u32 {
+            let ends = self.records.iter().filter(|record| match record {
+                Record::Outcome(o) => o.attempt.press.0 == press,
+                Record::Missed(a, reason) => a.press.0 == press && !reason.is_empty(),
+                _ => false,
+            });
+            assert_eq!(ends.count(), 1, "{case}: press {press} ends once");
+        }
+    }
+
+    /// Off the skin and without power, as the poses themselves show.
+    fn check_safe(&self, case: &str) {
+        let r = &self.report;
+        assert!(r.disarmed && r.retracted, "{case}: {r:?}");
+        assert!(
+            self.last_height_mm() > 4.9,
+            "{case}: the tip ended at z = {} mm",
+            self.last_height_mm()
+        );
+    }
+}
+
+#[test]
+fn too_much_force_ends_at_clearance_height() {
+    for level in [SimLevel::Kinematic, SimLevel::Geometric] {
+        // From a touch to just below what a press of 2 mm needs (1.2 N at rest, more on the way).
+        for limit_n in [0.1, 0.3, 0.5, 0.8, 1.0, 1.1, 1.2] {
+            for seed in [1, 2, 3] {
+                let mut plan = paced_plan();
+                plan.limits.max_force_n = limit_n;
+                let told = run(&plan, &SimConfig::new(seed, level));
+                let case = format!("{level:?}, {limit_n} N, seed {seed}");
+                let wanted = format!("force: expected at most {limit_n} N, found ");
+                assert!(told.end().starts_with(&wanted), "{case}: {}", told.end());
+                told.check_presses(&case);
+                told.check_safe(&case);
+                assert_eq!(told.report.problems, Vec::<String>::new(), "{case}");
+            }
+        }
+    }
+}
+
+/// Instants in a good run, named: within the travel, and within each phase of two presses.
+fn instants(plan: &Plan, seed: u64) -> Vec<(String, When)> {
+    let good = run(plan, &SimConfig::new(seed, SimLevel::Kinematic));
+    assert_eq!(good.report.end, RunEnd::Completed, "{:?}", good.report);
+    let mut all = vec![
+        ("before arming".to_owned(), When::At(HostTime(0))),
+        ("travel".to_owned(), When::At(HostTime(200 * MS))),
+    ];
+    for record in &good.records {
+        let Record::Outcome(o) = record else { continue };
+        let Some(t) = o.timing.filter(|_| o.attempt.press.0 < 2) else {
+            continue;
+        };
+        let middle = |a: HostTime, b: HostTime| When::At(HostTime(i64::midpoint(a.0, b.0)));
+        for (phase, when) in [
+            ("approach", middle(t.approach, t.contact)),
+            ("contact", When::Contact(o.attempt.press.0)),
+            ("indentation", middle(t.contact, t.at_depth)),
+            ("hold", middle(t.at_depth, t.retract)),
+            ("retraction", middle(t.retract, t.release)),
+            ("rise", middle(t.release, t.clear)),
+        ] {
+            all.push((format!("{phase} of {}", o.attempt), when));
+        }
+    }
+    assert_eq!(all.len(), 14, "{all:?}");
+    all
+}
+
+#[test]
+fn every_fault_at_every_stage_ends_safely() {
+    let seed = 5;
+    let mut plan = paced_plan();
+    plan.presses[0].role = PressRole::Sync;
+    let (one, two) = (CameraId::One, CameraId::Two);
+    let mut cases = vec![
+        ("refused limit".to_owned(), Fault::IndenterReadBack),
+        ("refused bias".to_owned(), Fault::CameraReadBack(two)),
+    ];
+    for press in 0..2 {
+        let (camera, contact, train) = (one, press, 3 * press);
+        let dead = Fault::DeadPress { camera, contact };
+        cases.push((format!("no events in press {press}"), dead));
+        let pulse = 1;
+        let lost = Fault::PulseLost {
+            camera,
+            train,
+            pulse,
+        };
+        cases.push((format!("pulse lost in press {press}"), lost));
+    }
+    for (stage, when) in instants(&plan, seed) {
+        let name = |what: &str| format!("{what}, {stage}");
+        let sluggish = |percent| Fault::Sluggish { when, percent };
+        let lost = |camera, words| Fault::CameraBytesLost {
+            camera,
+            when,
+            words,
+        };
+        let unplugged = |camera| Fault::CameraUnplugged { camera, when };
+        cases.extend([
+            (name("robot lost"), Fault::IndenterLost(when)),
+            (name("robot at 30 %"), sluggish(30)),
+            (name("robot at 5 %"), sluggish(5)),
+            (name("camera 1 unplugged"), unplugged(one)),
+            (name("camera 2 unplugged"), unplugged(two)),
+            (name("bytes lost"), lost(two, 7)),
+            (name("trigger box lost"), Fault::TriggerBoxLost(when)),
+        ]);
+    }
+    for (case, fault) in cases {
+        let mut config = SimConfig::new(seed, SimLevel::Kinematic);
+        config.faults = vec![fault.clone()];
+        let told = run(&plan, &config);
+        told.check_presses(&case);
+        let r = &told.report;
+        let end = told.end();
+        let robot_gone = matches!(fault, Fault::IndenterLost(_));
+        match fault {
+            Fault::IndenterReadBack | Fault::CameraReadBack(_) => {
+                assert!(end.contains("after writing"), "{case}: {end}");
+                assert!(r.disarmed && r.missed == r.planned, "{case}: {r:?}");
+            }
+            Fault::IndenterLost(_) | Fault::CameraUnplugged { .. } | Fault::TriggerBoxLost(_) => {
+                assert!(matches!(r.end, RunEnd::Faulted(_)), "{case}: {r:?}");
+                assert!(end.contains("sim-00000005-"), "{case}, who: {end}");
+            }
+            Fault::Sluggish { .. } => {
+                // Late, never elsewhere: a press is invalid, or a travel ends the run.
+                assert!(r.valid < r.planned || r.end == RunEnd::Completed, "{case}");
+            }
+            Fault::CameraBytesLost { .. } | Fault::PulseLost { .. } | Fault::DeadPress { .. } => {
+                assert_eq!(r.end, RunEnd::Completed, "{case}: {r:?}");
+            }
+        }
+        if let RunEnd::Faulted(_) = r.end {
+            assert!(
+                end.contains("expected") && end.contains("found"),
+                "{case}: {end}"
+            );
+        }
+        if robot_gone {
+            assert!(!r.disarmed, "{case}: {r:?}");
+            assert!(end.contains("switch it off by hand"), "{case}: {end}");
+        } else if r.missed < r.planned {
+            told.check_safe(&case);
+        } else {
+            assert!(r.disarmed && r.retracted, "{case}: {r:?}");
+        }
+    }
+}
