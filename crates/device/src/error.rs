@@ -8,7 +8,7 @@ use skinrig_model::DeviceRole;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum DeviceError {
     /// The device is gone or answers no longer.
-    #[error("{role:?} {serial}: lost: {detail}")]
+    #[error("{role} {serial}: lost: {detail}")]
     Lost {
         /// Which device.
         role: DeviceRole,
@@ -18,7 +18,7 @@ pub enum DeviceError {
         detail: String,
     },
     /// A setting did not read back as written.
-    #[error("{role:?} {serial}: {name}: expected {expected} after writing, found {found}")]
+    #[error("{role} {serial}: {name}: expected {expected} after writing, found {found}")]
     ReadBack {
         /// Which device.
         role: DeviceRole,
@@ -32,7 +32,7 @@ pub enum DeviceError {
         found: String,
     },
     /// A request outside what the device can or may do. Nothing was done.
-    #[error("{role:?} {serial}: refused: expected {expected}, found {found}")]
+    #[error("{role} {serial}: refused: expected {expected}, found {found}")]
     Refused {
         /// Which device.
         role: DeviceRole,
@@ -44,7 +44,7 @@ pub enum DeviceError {
         found: String,
     },
     /// The device is in a state in which it cannot do this (not armed, not started, busy).
-    #[error("{role:?} {serial}: expected to be {expected}, is {found}")]
+    #[error("{role} {serial}: expected to be {expected}, is {found}")]
     State {
         /// Which device.
         role: DeviceRole,
@@ -56,7 +56,7 @@ pub enum DeviceError {
         found: String,
     },
     /// A replayed device was asked for something else than what its recording holds.
-    #[error("{role:?}: replay diverged at {at}: recorded {expected}, requested {found}")]
+    #[error("{role}: replay diverged at {at}: recorded {expected}, requested {found}")]
     Diverged {
         /// Which device.
         role: DeviceRole,

@@ -3,6 +3,8 @@
 //! The controller emits them; terminal, log and recorder consume them. They are the only language between
 //! the running experiment and what remembers it.
 
+use std::fmt;
+
 use serde::{Deserialize, Serialize};
 
 use crate::frame::{Point3, RigidTransform, Robot, Skin};
@@ -46,6 +48,17 @@ impl DeviceRole {
             Self::Camera2 => "camera2",
             Self::TriggerBox => "trigger_box",
         }
+    }
+}
+
+impl fmt::Display for DeviceRole {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Indenter => "indenter",
+            Self::Camera1 => "camera 1",
+            Self::Camera2 => "camera 2",
+            Self::TriggerBox => "trigger box",
+        })
     }
 }
 
