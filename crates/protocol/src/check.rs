@@ -24,6 +24,8 @@ pub struct Violation {
     pub expected: String,
     /// What the plan asks for.
     pub found: String,
+    /// How far past the limit, in the unit of the limit; 0 where that has no measure.
+    pub excess: f64,
     /// The key of the protocol to change.
     pub key: &'static str,
 }
@@ -169,8 +171,16 @@ impl Checker<'_> {
             message: message.to_owned(),
             expected: expected.to_string(),
             found: found.to_string(),
+            excess: 0.0,
             key,
         });
+    }
+
+    /// How far the violation that was added last is past its limit.
+    fn by(&mut self, excess: f64) {
+        if let Some(last) = self.found.last_mut() {
+            last.excess = excess;
+        }
     }
 
     fn limits(&mut self) {
@@ -240,6 +250,7 @@ impl Checker<'_> {
                     format!("{v:.3} mm"),
                     key,
                 );
+                self.by((min[k] - v).max(v - max[k]));
             }
         }
     }
@@ -254,6 +265,7 @@ impl Checker<'_> {
                 format!("{v} mm/s"),
                 key,
             );
+            self.by(v - max);
         }
     }
 
@@ -266,7 +278,10 @@ impl Checker<'_> {
         deadline: HostDuration,
     ) {
         let clearance = self.plan.limits.clearance_mm;
-        self.workspace(segment, to, "path");
+        let planned = self.press.and_then(|p| self.plan.presses.get(p.0 as usize));
+        let sync = planned.is_some_and(|p| p.role == skinrig_model::PressRole::Sync);
+        let key = if sync { "sync.at" } else { "path" };
+        self.workspace(segment, to, key);
         if let Some(from) = from.filter(|_| segment == Segment::FromHome) {
             self.workspace(segment, from, "motion.home");
         }
@@ -284,7 +299,7 @@ impl Checker<'_> {
                 "motion.clearance",
             );
         }
-        self.keep_outs(segment, start.plane(), to.plane(), lowest, "path");
+        self.keep_outs(segment, start.plane(), to.plane(), lowest, key);
         let distance = start.distance_mm(to);
         self.deadline(segment, deadline, distance / speed);
     }
@@ -328,6 +343,7 @@ impl Checker<'_> {
                     ),
                     key,
                 );
+                self.by(keep_out.margin_mm - distance);
             }
         }
     }
@@ -380,6 +396,7 @@ impl Checker<'_> {
                 format!("{depth} mm"),
                 if sync { "sync.depth" } else { "depth" },
             );
+            self.by(depth - limits.max_depth_mm);
         }
         let inside = self.around.outline.clearance_mm(at);
         let margin = self.around.margin_mm;
@@ -396,6 +413,7 @@ impl Checker<'_> {
                 found,
                 key,
             );
+            self.by(margin - inside);
         }
         self.keep_outs(Segment::Press, at, at, -depth, key);
         if press.hold.0 < 0 || press.start_after_begin.is_some_and(|s| s.0 < 0) {

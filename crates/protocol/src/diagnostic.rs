@@ -30,6 +30,11 @@ pub struct Diagnostics {
 }
 
 impl Diagnostics {
+    /// These findings, in this order.
+    pub(crate) fn new(list: Vec<Diagnostic>) -> Self {
+        Self { list }
+    }
+
     /// The findings, in the order of the text.
     #[must_use]
     pub fn list(&self) -> &[Diagnostic] {

@@ -14,6 +14,7 @@ mod build;
 pub mod check;
 mod compile;
 pub mod diagnostic;
+mod findings;
 mod keys;
 mod overrides;
 pub mod plan;

@@ -66,6 +66,9 @@ pub struct Protocol {
     pub analysis: AnalysisSettings,
     /// Settings of camera 1 and camera 2.
     pub cameras: [CameraRequest; 2],
+    /// Where the keys stand that a plan may break.
+    #[serde(skip)]
+    pub(crate) key_places: BTreeMap<&'static str, crate::source::Location>,
 }
 
 /// Which skin is pressed.

@@ -392,7 +392,13 @@ fn numbers(items: &[Node], path: &str, out: &mut Collector) -> Option<Value> {
         match span {
             Some((a, b)) => values.push((a, b, item.span)),
             None => {
-                let help = (text == "0").then(|| "counting starts at 1".to_owned());
+                let backwards = text
+                    .split_once('-')
+                    .and_then(|(a, b)| parse(a).zip(parse(b)))
+                    .map(|(a, b)| format!("the span runs backwards: write `{b}-{a}`"));
+                let help = (text == "0")
+                    .then(|| "counting starts at 1".to_owned())
+                    .or(backwards);
                 out.error(
                     item.span,
                     join(path, &format!("[{i}]")),
@@ -426,6 +432,7 @@ pub(crate) fn expectation(shape: &Shape) -> String {
         Shape::Whole { min, max: i64::MAX } => {
             format!("a whole number of at least {min}, without a unit")
         }
+        Shape::Whole { min, max } if min == max => format!("`{min}`, nothing else"),
         Shape::Whole { min, max } => format!("a whole number from {min} to {max}, without a unit"),
         Shape::Number(range) => format!("a number without a unit, {}", range.describe("")),
         Shape::Flag => "`true` or `false`".to_owned(),

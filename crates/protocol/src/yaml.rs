@@ -195,6 +195,13 @@ impl<'a> Reader<'a, '_> {
                 .found(quote(&written))
                 .help("remove the tag");
         }
+        if event.anchor_id().is_some_and(|id| id != 0) {
+            self.collector
+                .error(span, self.here(), "anchors are not used here")
+                .expected("a plain value")
+                .found("an anchor")
+                .help("remove the word that begins with `&`");
+        }
         let node = match event {
             Event::Scalar(text, style, ..) => {
                 let plain = style == ScalarStyle::Plain;

@@ -64,6 +64,16 @@ pub(crate) fn open(
     let Some(mut root) = yaml::parse(&mut out, source) else {
         return Err(out.finish());
     };
+    if let Some(other) = other_language(&root, table) {
+        out.error(other, "", format!("this is not a {}", table.name))
+            .expected(format!("a {}", table.name))
+            .found(if table.name == "schedule" {
+                "a protocol"
+            } else {
+                "a schedule, which only `skinrig import` reads"
+            });
+        return Err(out.finish());
+    }
     if matches!(root.kind, yaml::Kind::Null) && out.is_clean() {
         out.error(root.span, "", "the file is empty")
             .expected(format!("a {}", table.name))
@@ -74,6 +84,22 @@ pub(crate) fn open(
     crate::overrides::apply(&mut root, table, overrides, &mut out);
     let field = read_table(&root, table, "", &mut out);
     Ok((out, field))
+}
+
+/// The version key of the other language, where the file has that and not its own.
+fn other_language(root: &yaml::Node, table: &Table) -> Option<Span> {
+    let (own, other) = if table.name == "schedule" {
+        ("skinrig_schedule", "skinrig")
+    } else {
+        ("skinrig", "skinrig_schedule")
+    };
+    let yaml::Kind::Map(entries) = &root.kind else {
+        return None;
+    };
+    if entries.iter().any(|e| e.key == own) {
+        return None;
+    }
+    entries.iter().find(|e| e.key == other).map(|e| e.key_span)
 }
 
 /// Reads a protocol; see [`Protocol::parse`].
@@ -225,6 +251,7 @@ fn assemble(
         marks: marks?,
         analysis: analysis?,
         cameras: cameras?,
+        key_places: crate::findings::places(root, &out.sources),
     })
 }
 

@@ -327,6 +327,38 @@ fn overrides_change_one_value_and_are_kept() {
 }
 
 #[test]
+fn a_broken_limit_is_one_finding_at_its_key() {
+    let protocol = crate::common::demo(&["path.meander.pitch=20mm"]);
+    let plan = protocol.compile();
+    let error = protocol.check(&plan).unwrap_err();
+    let all = skinrig_protocol::check(&plan, &protocol.surroundings, None).len();
+    assert!(all > 100 && error.list().len() < 6, "{all}: {error}");
+    let mut seen = std::collections::BTreeSet::new();
+    for d in error.list() {
+        assert!(seen.insert((&d.message, &d.path)), "{error}");
+        assert!(d.location.line > 1 && d.path == "path", "{error}");
+    }
+    assert!(
+        crate::common::demo(&[])
+            .check(&crate::common::demo(&[]).compile())
+            .is_ok()
+    );
+}
+
+#[test]
+fn the_other_language_and_anchors_are_named_once() {
+    let error = parse(&shipped("ten-presses.schedule.yaml"), &[]).unwrap_err();
+    assert_eq!(error.list().len(), 1, "{error}");
+    let error = Schedule::parse("x", shipped("demo.yaml").as_bytes(), &[]).unwrap_err();
+    assert_eq!(error.list().len(), 1, "{error}");
+    assert!(error.to_string().contains("this is not a schedule"));
+    let anchored = shipped("demo.yaml").replacen("operator: ", "operator: &a ", 1);
+    let error = parse(&anchored, &[]).unwrap_err();
+    assert_eq!(error.list().len(), 1, "{error}");
+    assert_eq!(error.list()[0].message, "anchors are not used here");
+}
+
+#[test]
 fn schedules_report_in_the_same_way() {
     let text = shipped("paper-recording.schedule.yaml")
         .replace("presses_used: 250", "presses_used: 300")
