@@ -3,7 +3,7 @@
 use std::io::IsTerminal;
 use std::path::Path;
 
-use skinrig_protocol::{Plan, Protocol, Step, Violation, path_svg};
+use skinrig_protocol::{Diagnostics, Plan, Protocol, Step, path_svg};
 
 use crate::args::{PlanArgs, ProtocolArgs};
 use crate::exit::{Exit, Failure, Outcome};
@@ -16,38 +16,55 @@ pub struct Checked {
     pub plan: Plan,
 }
 
+/// What is wrong with a protocol, and its plan when it could be made.
+struct Refused {
+    found: Diagnostics,
+    planned: Option<Checked>,
+}
+
+impl Refused {
+    fn failure(&self) -> Failure {
+        let color = std::io::stderr().is_terminal();
+        let text = self.found.render(color);
+        // The program puts its own `error:` before every message; the first finding begins with one.
+        let rest = text
+            .strip_prefix("error: ")
+            .or_else(|| text.strip_prefix("\u{1b}[1;31merror\u{1b}[0m: "))
+            .unwrap_or(&text);
+        Failure::input(rest)
+    }
+}
+
 /// Reads, compiles and checks a protocol.
 ///
 /// # Errors
 /// [`Failure::input`] with every finding at once.
 pub fn load(path: &Path, overrides: &[String]) -> Result<Checked, Failure> {
+    read(path, overrides)?.map_err(|refused| refused.failure())
+}
+
+fn read(path: &Path, overrides: &[String]) -> Result<Result<Checked, Box<Refused>>, Failure> {
     let bytes = std::fs::read(path).map_err(|e| {
         Failure::input(format!("{}: cannot read the protocol: {e}", path.display()))
     })?;
     let loader = |p: &Path| std::fs::read(p);
-    let color = std::io::stderr().is_terminal();
-    let protocol = Protocol::parse(&path.to_string_lossy(), &bytes, overrides, &loader)
-        .map_err(|found| Failure::input(format!("in the protocol\n{}", found.render(color))))?;
+    let protocol = match Protocol::parse(&path.to_string_lossy(), &bytes, overrides, &loader) {
+        Ok(protocol) => protocol,
+        Err(found) => {
+            let planned = None;
+            return Ok(Err(Box::new(Refused { found, planned })));
+        }
+    };
     let plan = protocol.compile();
-    let home = Some(protocol.motion.home);
-    let violations = skinrig_protocol::check(&plan, &protocol.surroundings, home);
-    if violations.is_empty() {
-        Ok(Checked { protocol, plan })
-    } else {
-        Err(Failure::input(describe(path, &violations)))
-    }
-}
-
-fn describe(path: &Path, violations: &[Violation]) -> String {
-    let mut text = format!(
-        "{}: the plan breaks {} limit(s)\n",
-        path.display(),
-        violations.len()
-    );
-    for violation in violations {
-        text.push_str(&format!("  {violation}\n"));
-    }
-    text
+    let held = protocol.check(&plan);
+    let checked = Checked { protocol, plan };
+    Ok(match held {
+        Ok(()) => Ok(checked),
+        Err(found) => Err(Box::new(Refused {
+            found,
+            planned: Some(checked),
+        })),
+    })
 }
 
 /// `skinrig check`.
@@ -55,7 +72,16 @@ fn describe(path: &Path, violations: &[Violation]) -> String {
 /// # Errors
 /// See [`load`].
 pub fn check(args: &ProtocolArgs, json: bool) -> Outcome {
-    let checked = load(&args.protocol, &args.overrides)?;
+    let checked = match read(&args.protocol, &args.overrides)? {
+        Ok(checked) => checked,
+        Err(refused) if json => {
+            crate::print_json(&serde_json::json!({
+                "protocol": args.protocol, "findings": refused.found.list(),
+            }));
+            return Ok(Exit::Input);
+        }
+        Err(refused) => return Err(refused.failure()),
+    };
     let summary = checked.plan.summary();
     if json {
         crate::print_json(&serde_json::json!({
@@ -74,17 +100,19 @@ pub fn check(args: &ProtocolArgs, json: bool) -> Outcome {
 /// # Errors
 /// See [`load`]; [`Failure::internal`] when the SVG cannot be written.
 pub fn plan(args: &PlanArgs, json: bool) -> Outcome {
-    let checked = load(&args.protocol.protocol, &args.protocol.overrides)?;
-    let summary = checked.plan.summary();
-    if let Some(file) = &args.svg {
-        std::fs::write(
-            file,
-            path_svg(&checked.plan, &checked.protocol.surroundings),
-        )
-        .map_err(|e| {
+    // A plan that breaks its limits is drawn too: that is when its picture is wanted.
+    let read = read(&args.protocol.protocol, &args.protocol.overrides)?;
+    let drawn = match &read {
+        Ok(checked) => Some(checked),
+        Err(refused) => refused.planned.as_ref(),
+    };
+    if let (Some(file), Some(Checked { protocol, plan })) = (&args.svg, drawn) {
+        std::fs::write(file, path_svg(plan, &protocol.surroundings)).map_err(|e| {
             Failure::internal(format!("{}: cannot write the path: {e}", file.display()))
         })?;
     }
+    let checked = read.map_err(|refused| refused.failure())?;
+    let summary = checked.plan.summary();
     if json {
         crate::print_json(&serde_json::json!({
             "sha256": checked.plan.digest(), "summary": summary, "plan": checked.plan,
