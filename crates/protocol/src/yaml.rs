@@ -134,6 +134,8 @@ impl<'a> Reader<'a, '_> {
             Some(Err(error)) => {
                 let at = error.marker().byte_offset().unwrap_or(self.text.len());
                 let at = at.min(self.text.len());
+                // The scanner often stops before the tab that it stumbles over.
+                let at = indenting_tab(self.text, at).unwrap_or(at);
                 let help = syntax_help(self.text, at);
                 self.collector
                     .error(self.span(at, at), "", "not valid YAML")
@@ -307,10 +309,23 @@ impl<'a> Reader<'a, '_> {
 }
 
 /// What to do about a syntax error near byte `at`, where it can be told.
+/// The first tab that indents the line of `at` or the next one.
+fn indenting_tab(text: &str, at: usize) -> Option<usize> {
+    let mut start = text.get(..at)?.rfind('\n').map_or(0, |i| i + 1);
+    for line in text.get(start..)?.split_inclusive('\n').take(2) {
+        let indent = line.len() - line.trim_start_matches([' ', '\t']).len();
+        if let Some(tab) = line[..indent].find('\t') {
+            return Some(start + tab);
+        }
+        start += line.len();
+    }
+    None
+}
+
 fn syntax_help(text: &str, at: usize) -> Option<String> {
     let start = text.get(..at)?.rfind('\n').map_or(0, |i| i + 1);
     let line = text.get(start..)?.lines().next().unwrap_or("");
-    if line.contains('\t') {
+    if line.trim_start_matches(' ').starts_with('\t') {
         return Some("indent with spaces: YAML does not allow tabs there".to_owned());
     }
     let word = line.trim().split(':').next().unwrap_or("");

@@ -467,3 +467,23 @@ proptest! {
         let _ = parse(&shipped("demo.yaml"), &[&text]);
     }
 }
+
+#[test]
+fn a_tab_is_pointed_at_where_it_stands() {
+    let text = "skinrig: 1\nname: x\n\tpath: 3\n";
+    let error = parse(text, &[]).unwrap_err();
+    let place = &error.list()[0];
+    assert_eq!(
+        (place.location.line, place.location.column),
+        (3, 1),
+        "{error}"
+    );
+    assert!(
+        place
+            .help
+            .as_deref()
+            .unwrap()
+            .starts_with("indent with spaces"),
+        "{error}"
+    );
+}
