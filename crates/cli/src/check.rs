@@ -1,6 +1,5 @@
 //! `skinrig check` and `skinrig plan`: everything before a device is opened.
 
-use std::io::IsTerminal;
 use std::path::Path;
 
 use skinrig_protocol::{Diagnostics, Plan, Protocol, Step, path_svg};
@@ -22,25 +21,12 @@ struct Refused {
     planned: Option<Checked>,
 }
 
-impl Refused {
-    fn failure(&self) -> Failure {
-        let color = std::io::stderr().is_terminal();
-        let text = self.found.render(color);
-        // The program puts its own `error:` before every message; the first finding begins with one.
-        let rest = text
-            .strip_prefix("error: ")
-            .or_else(|| text.strip_prefix("\u{1b}[1;31merror\u{1b}[0m: "))
-            .unwrap_or(&text);
-        Failure::input(rest)
-    }
-}
-
 /// Reads, compiles and checks a protocol.
 ///
 /// # Errors
 /// [`Failure::input`] with every finding at once.
 pub fn load(path: &Path, overrides: &[String]) -> Result<Checked, Failure> {
-    read(path, overrides)?.map_err(|refused| refused.failure())
+    read(path, overrides)?.map_err(|refused| Failure::findings(&refused.found))
 }
 
 fn read(path: &Path, overrides: &[String]) -> Result<Result<Checked, Box<Refused>>, Failure> {
@@ -80,7 +66,7 @@ pub fn check(args: &ProtocolArgs, json: bool) -> Outcome {
             }));
             return Ok(Exit::Input);
         }
-        Err(refused) => return Err(refused.failure()),
+        Err(refused) => return Err(Failure::findings(&refused.found)),
     };
     let summary = checked.plan.summary();
     if json {
@@ -111,7 +97,7 @@ pub fn plan(args: &PlanArgs, json: bool) -> Outcome {
             Failure::internal(format!("{}: cannot write the path: {e}", file.display()))
         })?;
     }
-    let checked = read.map_err(|refused| refused.failure())?;
+    let checked = read.map_err(|refused| Failure::findings(&refused.found))?;
     let summary = checked.plan.summary();
     if json {
         crate::print_json(&serde_json::json!({

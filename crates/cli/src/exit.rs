@@ -1,7 +1,10 @@
 //! Exit codes and the errors behind them.
 
 use std::fmt;
+use std::io::IsTerminal;
 use std::process::{ExitCode, Termination};
+
+use skinrig_protocol::Diagnostics;
 
 /// How the program ended. The numbers are part of the interface and do not change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -43,41 +46,43 @@ impl Termination for Exit {
 pub struct Failure {
     /// The code to end with.
     pub exit: Exit,
-    /// Complete message, without `error:`.
+    /// Complete message for standard error, without the end of line.
     pub message: String,
 }
 
 impl Failure {
+    fn new(exit: Exit, message: impl fmt::Display) -> Self {
+        let message = format!("error: {message}");
+        Self { exit, message }
+    }
+
     /// Bad input.
     pub fn input(message: impl fmt::Display) -> Self {
+        Self::new(Exit::Input, message)
+    }
+
+    /// Findings in a protocol or schedule; each one already begins with `error:`.
+    pub fn findings(found: &Diagnostics) -> Self {
+        let message = found.render(std::io::stderr().is_terminal());
         Self {
             exit: Exit::Input,
-            message: message.to_string(),
+            message: message.trim_end().to_owned(),
         }
     }
 
     /// A fault of the program or the machine.
     pub fn internal(message: impl fmt::Display) -> Self {
-        Self {
-            exit: Exit::Internal,
-            message: message.to_string(),
-        }
+        Self::new(Exit::Internal, message)
     }
 
     /// A rig fault.
     pub fn rig(message: impl fmt::Display) -> Self {
-        Self {
-            exit: Exit::Rig,
-            message: message.to_string(),
-        }
+        Self::new(Exit::Rig, message)
     }
 
     /// A limit that was not met.
     pub fn limit(message: impl fmt::Display) -> Self {
-        Self {
-            exit: Exit::Limit,
-            message: message.to_string(),
-        }
+        Self::new(Exit::Limit, message)
     }
 }
 

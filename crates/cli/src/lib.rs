@@ -55,7 +55,7 @@ pub fn main_with(arguments: impl IntoIterator<Item = OsString>) -> Exit {
         }
         Ok(exit) => exit,
         Err(failure) => {
-            errln!("error: {}", failure.message);
+            errln!("{}", failure.message);
             failure.exit
         }
     }

@@ -97,11 +97,11 @@ fn overridden_settings(
     if header.rig_kind == "imported" {
         skinrig_protocol::schedule::Schedule::parse(&header.protocol_name, text, &all)
             .map(|s| s.analysis)
-            .map_err(Failure::input)
+            .map_err(|found| Failure::findings(&found))
     } else {
         skinrig_protocol::Protocol::parse(&header.protocol_name, text, &all, &loader)
             .map(|p| p.analysis)
-            .map_err(Failure::input)
+            .map_err(|found| Failure::findings(&found))
     }
 }
 

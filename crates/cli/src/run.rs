@@ -223,7 +223,7 @@ pub fn conclude(
     let kept = format!("the session up to there is kept: {}", session.display());
     let also = |analysed: Outcome| {
         if let Err(failure) = analysed {
-            errln!("also: {}", failure.message);
+            errln!("{}", failure.message);
         }
     };
     match &report.end {

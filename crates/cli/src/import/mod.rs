@@ -40,7 +40,7 @@ pub fn import(args: &ImportArgs, command_line: &str, json: bool) -> Outcome {
     let bytes = std::fs::read(&args.schedule)
         .map_err(|e| Failure::input(format!("{name}: cannot read the schedule: {e}")))?;
     let schedule = Schedule::parse(&name, &bytes, &args.overrides)
-        .map_err(|found| Failure::input(format!("in the schedule\n{found}")))?;
+        .map_err(|found| Failure::findings(&found))?;
     let positions = read_positions(&args.presses, &schedule)?;
     let (presses, times) = schedule.planned(&positions).map_err(Failure::input)?;
     let unused = format!("not used: presses_used is {}", schedule.presses_used);
