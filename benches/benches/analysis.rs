@@ -157,7 +157,7 @@ fn whole() {
     });
     table.row("metrics", 1.0, || {
         let outline = &SkinOutline::PAPER;
-        std::hint::black_box(metrics(&scores, Exclusions::Applied, outline, 2000, 1));
+        std::hint::black_box(metrics(&scores, Exclusions::Applied, outline, 5.0, 2000, 1));
     });
     table.baseline("triangulation", 1.0, || {
         for press in &done.presses {

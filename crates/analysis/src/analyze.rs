@@ -9,7 +9,8 @@ use crate::calibrate::{affordable_model, calibrate, model_name};
 use crate::clock::{PressSpan, SUSPICIOUS_DRIFT_PPM, fit_marks, fit_rates};
 use crate::error::AnalysisError;
 use crate::input::{EventSource, SessionInput};
-use crate::metrics::{Exclusions, metrics};
+use crate::kept::Kept;
+use crate::metrics::{Exclusions, metrics, penalised};
 use crate::rates::RateHistogram;
 use crate::result::{
     ANALYSIS_VERSION, Analysis, CalibrationResult, ClockFit, DepthResult, LocationOutcome,
@@ -18,7 +19,7 @@ use crate::result::{
 use crate::segment::{Window, windows};
 use crate::sets::{CalibrationSet, ScoreSet};
 use crate::triangulate::locate;
-use crate::{check, verdict};
+use crate::{audit, bit_rates, check, cmre, coverage, latency, reduction, verdict};
 
 /// Scored presses with a picture.
 const PICTURES: usize = 6;
@@ -40,6 +41,17 @@ const MAX_ZOOM_BINS: usize = 2000;
 /// When the input contradicts itself, a setting is out of its range or the events cannot be read. Whatever
 /// keeps single presses or a camera from being used becomes verdicts and warnings instead.
 pub fn analyze(input: &SessionInput, source: &dyn EventSource) -> Result<Analysis, AnalysisError> {
+    analyze_and_keep(input, source).map(|(analysis, _)| analysis)
+}
+
+/// Like [`analyze`], and hands over the events that the studies kept.
+///
+/// # Errors
+/// See [`analyze`].
+pub fn analyze_and_keep(
+    input: &SessionInput,
+    source: &dyn EventSource,
+) -> Result<(Analysis, Kept), AnalysisError> {
     check::input(input)?;
     let plan = Closeups::choose(input);
     let [one, two] = std::thread::scope(|scope| {
@@ -71,6 +83,7 @@ pub fn analyze(input: &SessionInput, source: &dyn EventSource) -> Result<Analysi
             set,
             exclusions,
             &input.rig.outline,
+            input.settings.within_mm,
             input.settings.bootstrap_resamples,
             input.settings.seed,
         )
@@ -78,6 +91,12 @@ pub fn analyze(input: &SessionInput, source: &dyn EventSource) -> Result<Analysi
     let (scored, scored_without_exclusions) = (
         measure(&scores, Exclusions::Applied),
         measure(&scores, Exclusions::Ignored),
+    );
+    let penalised = penalised(
+        &scores,
+        input.settings.failure_penalty_mm,
+        input.settings.bootstrap_resamples,
+        input.settings.seed,
     );
     let depths = scores.depths_mm();
     let depths = if depths.len() > 1 { depths } else { Vec::new() };
@@ -99,7 +118,8 @@ pub fn analyze(input: &SessionInput, source: &dyn EventSource) -> Result<Analysi
     }
     let [one, two] = cameras;
     let counts = verdict::count(&presses);
-    Ok(Analysis {
+    let kept = Kept::default();
+    let mut analysis = Analysis {
         version: ANALYSIS_VERSION,
         settings: input.settings.clone(),
         rig: input.rig,
@@ -110,12 +130,34 @@ pub fn analyze(input: &SessionInput, source: &dyn EventSource) -> Result<Analysi
         scored,
         scored_without_exclusions,
         depths,
+        penalised,
+        threshold: None,
+        coverage: None,
+        cmre: None,
+        bit_rates: None,
+        reduction: None,
+        latency: None,
+        reference: None,
+        findings: Vec::new(),
+        activity: Vec::new(),
         rates: [one.rates, two.rates],
         presses,
         warnings: [one.warnings, two.warnings, warnings].concat(),
         pictures: [one.pictures, two.pictures].concat(),
         zooms: [one.zooms, two.zooms].concat(),
-    })
+    };
+    evaluate(&mut analysis, input, &kept);
+    Ok((analysis, kept))
+}
+
+/// Fills in what stands on the finished table of presses.
+fn evaluate(analysis: &mut Analysis, input: &SessionInput, kept: &Kept) {
+    analysis.coverage = coverage::coverage(analysis);
+    analysis.cmre = cmre::cmre(analysis);
+    analysis.bit_rates = bit_rates::bit_rates(analysis);
+    analysis.reduction = reduction::study(analysis, kept);
+    analysis.latency = latency::study(analysis, kept);
+    analysis.findings = audit::audit(input, analysis);
 }
 
 /// What came from one camera.
@@ -397,7 +439,10 @@ fn calibrated(
     warnings: &mut Vec<String>,
 ) -> (StereoGeometry, Option<CalibrationResult>) {
     let nominal = input.rig.nominal;
-    let wanted = input.settings.calibration;
+    let wanted = match input.settings.calibration {
+        CalibrationModel::Auto => CalibrationModel::Full,
+        named => named,
+    };
     if wanted == CalibrationModel::None {
         return (nominal, None);
     }

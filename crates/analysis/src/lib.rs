@@ -10,16 +10,23 @@
 
 mod accumulate;
 mod analyze;
+pub mod audit;
+pub mod bit_rates;
 pub mod calibrate;
 mod check;
 pub mod clock;
+pub mod cmre;
+pub mod coverage;
 pub mod dbscan;
 mod error;
 pub mod grid;
 mod hash;
 pub mod input;
+pub mod kept;
+pub mod latency;
 pub mod metrics;
 pub mod rates;
+pub mod reduction;
 pub mod result;
 mod seeded;
 pub mod segment;
@@ -27,7 +34,7 @@ pub mod sets;
 pub mod triangulate;
 mod verdict;
 
-pub use analyze::analyze;
+pub use analyze::{analyze, analyze_and_keep};
 pub use error::AnalysisError;
 pub use hash::results_hash;
 pub use input::{EventSource, SessionInput};

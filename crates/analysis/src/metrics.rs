@@ -4,17 +4,18 @@
 //! presses at one place share its systematic error and are not independent.
 
 use rayon::prelude::*;
-use skinrig_model::SkinOutline;
+use skinrig_model::{Point2, SkinOutline};
 
-use crate::result::{Estimate, Metrics};
+use crate::result::{Estimate, Metrics, Penalised};
 use crate::seeded;
 use crate::sets::{ScoreSet, Scored};
 
 /// Share of a 95 % interval that lies outside on each side.
 const TAIL: f64 = 0.025;
 /// Metrics with an interval, in the order of [`Values`].
-const COUNT: usize = 9;
-/// (value, n) of each metric: rmse, x, y, bias x, bias y, median, p95, repeat std, located rate.
+const COUNT: usize = 10;
+/// (value, n) of each metric: rmse, x, y, bias x, bias y, median, p95, repeat std, located rate, within
+/// rate.
 type Values = [(Option<f64>, u32); COUNT];
 
 /// Which presses give an estimate that counts.
@@ -29,6 +30,7 @@ pub enum Exclusions {
 /// The presses of one location.
 struct Place {
     attempted: u32,
+    within: u32,
     errors: Vec<[f64; 2]>,
     lengths: Vec<f64>,
     /// Standard deviation between repetitions at each depth that has at least two.
@@ -41,10 +43,11 @@ pub fn metrics(
     set: &ScoreSet,
     exclusions: Exclusions,
     outline: &SkinOutline,
+    within_mm: f64,
     resamples: u32,
     seed: u64,
 ) -> Metrics {
-    let places = places(set, exclusions);
+    let places = places(set, exclusions, within_mm);
     let all: Vec<&Place> = places.iter().collect();
     let values = evaluate(&all);
     let intervals = bootstrap(&places, resamples, seed);
@@ -71,20 +74,21 @@ pub fn metrics(
         p95_mm: estimate(6),
         repeat_std_mm: estimate(7),
         located_rate: estimate(8),
+        within_rate: estimate(9),
         rmse_diagonal_percent: rmse_mm.value.map(|r| 100.0 * r / outline.diagonal_mm()),
     }
 }
 
-fn places(set: &ScoreSet, exclusions: Exclusions) -> Vec<Place> {
+fn places(set: &ScoreSet, exclusions: Exclusions, within_mm: f64) -> Vec<Place> {
     let mut presses: Vec<&Scored> = set.presses().iter().collect();
     presses.sort_by_key(|p| p.location);
     presses
         .chunk_by(|a, b| a.location == b.location)
-        .map(|group| place(group, exclusions))
+        .map(|group| place(group, exclusions, within_mm))
         .collect()
 }
 
-fn place(group: &[&Scored], exclusions: Exclusions) -> Place {
+fn place(group: &[&Scored], exclusions: Exclusions, within_mm: f64) -> Place {
     let counts = |p: &Scored| exclusions == Exclusions::Ignored || p.valid;
     let mut found: Vec<_> = group
         .iter()
@@ -98,9 +102,8 @@ fn place(group: &[&Scored], exclusions: Exclusions) -> Place {
         .filter(|repeats| repeats.len() >= 2)
         .map(|repeats| {
             let n = repeats.len() as f64;
-            let mean = |f: fn(&skinrig_model::Point2) -> f64| {
-                repeats.iter().map(|(_, at, _)| f(at)).sum::<f64>() / n
-            };
+            let mean =
+                |f: fn(&Point2) -> f64| repeats.iter().map(|(_, at, _)| f(at)).sum::<f64>() / n;
             let (mx, my) = (mean(|p| p.x_mm), mean(|p| p.y_mm));
             let squares: f64 = repeats
                 .iter()
@@ -112,9 +115,11 @@ fn place(group: &[&Scored], exclusions: Exclusions) -> Place {
             (squares / (n - 1.0)).sqrt()
         })
         .collect();
+    let lengths: Vec<f64> = errors.iter().map(|e| libm::hypot(e[0], e[1])).collect();
     Place {
         attempted: group.len() as u32,
-        lengths: errors.iter().map(|e| libm::hypot(e[0], e[1])).collect(),
+        within: lengths.iter().filter(|e| **e <= within_mm).count() as u32,
+        lengths,
         errors,
         repeat_std,
     }
@@ -123,9 +128,10 @@ fn place(group: &[&Scored], exclusions: Exclusions) -> Place {
 fn evaluate(places: &[&Place]) -> Values {
     let mut sums = [0.0; 4];
     let mut lengths = Vec::new();
-    let (mut attempted, mut stds, mut std_sum) = (0u32, 0u32, 0.0);
+    let (mut attempted, mut within, mut stds, mut std_sum) = (0u32, 0u32, 0u32, 0.0);
     for place in places {
         attempted += place.attempted;
+        within += place.within;
         lengths.extend_from_slice(&place.lengths);
         for [dx, dy] in &place.errors {
             for (sum, term) in sums.iter_mut().zip([dx * dx, dy * dy, *dx, *dy]) {
@@ -151,7 +157,89 @@ fn evaluate(places: &[&Place]) -> Values {
             (attempted > 0).then(|| f64::from(n) / f64::from(attempted)),
             attempted,
         ),
+        (
+            (attempted > 0).then(|| f64::from(within) / f64::from(attempted)),
+            attempted,
+        ),
     ]
+}
+
+/// The RMSE of all attempted presses of `set` where every press without an estimate that counts errs by
+/// `penalty_mm`; without one by the RMS distance of the attempted presses' true (or planned) positions from their
+/// mean, the error of an answer that knows nothing.
+#[must_use]
+pub fn penalised(set: &ScoreSet, penalty_mm: Option<f64>, resamples: u32, seed: u64) -> Penalised {
+    let presses = set.presses();
+    let penalty = penalty_mm.unwrap_or_else(|| spread_mm(presses.iter().map(|p| p.at)));
+    let error = |p: &Scored| match p.found {
+        Some((_, [dx, dy])) if p.valid => libm::hypot(dx, dy),
+        _ => penalty,
+    };
+    let errors: Vec<(u32, f64)> = presses.iter().map(|p| (p.location, error(p))).collect();
+    let failures = presses.iter().filter(|p| !p.valid || p.found.is_none());
+    Penalised {
+        penalty_mm: penalty,
+        derived: penalty_mm.is_none(),
+        failures: failures.count() as u32,
+        rmse_mm: bootstrap_over_locations(&errors, resamples, seed, root_mean_square),
+    }
+}
+
+/// Root mean square distance of points from their mean, mm; 0 without points.
+pub(crate) fn spread_mm(points: impl Iterator<Item = Point2> + Clone) -> f64 {
+    let n = points.clone().count().max(1) as f64;
+    let mean = |f: fn(&Point2) -> f64| points.clone().map(|p| f(&p)).sum::<f64>() / n;
+    let (x, y) = (mean(|p| p.x_mm), mean(|p| p.y_mm));
+    let squares: f64 = points
+        .map(|p| (p.x_mm - x).powi(2) + (p.y_mm - y).powi(2))
+        .sum();
+    (squares / n).sqrt()
+}
+
+/// The root mean square; `None` without values.
+pub(crate) fn root_mean_square(values: &mut [f64]) -> Option<f64> {
+    let squares: f64 = values.iter().map(|v| v * v).sum();
+    (!values.is_empty()).then(|| (squares / values.len() as f64).sqrt())
+}
+
+/// `statistic` of all values, with the percentile interval of a bootstrap that draws whole locations. Each value comes
+/// with its location, in any order; `statistic` may reorder what it gets.
+pub(crate) fn bootstrap_over_locations(
+    values: &[(u32, f64)],
+    resamples: u32,
+    seed: u64,
+    statistic: fn(&mut [f64]) -> Option<f64>,
+) -> Estimate {
+    let mut sorted = values.to_vec();
+    sorted.sort_by_key(|v| v.0);
+    let places: Vec<Vec<f64>> = sorted
+        .chunk_by(|a, b| a.0 == b.0)
+        .map(|group| group.iter().map(|v| v.1).collect())
+        .collect();
+    let mut all: Vec<f64> = sorted.iter().map(|v| v.1).collect();
+    let value = statistic(&mut all);
+    let (mut low, mut high) = (None, None);
+    if value.is_some() && places.len() > 1 && resamples > 1 {
+        let mut samples: Vec<f64> = (0..resamples)
+            .into_par_iter()
+            .filter_map(|sample| {
+                let mut rng = seeded::generator(seed, u64::from(sample));
+                let mut drawn = Vec::with_capacity(values.len() + 8);
+                for _ in 0..places.len() {
+                    drawn.extend_from_slice(&places[seeded::index(&mut rng, places.len())]);
+                }
+                statistic(&mut drawn)
+            })
+            .collect();
+        low = quantile(&mut samples, TAIL);
+        high = quantile(&mut samples, 1.0 - TAIL);
+    }
+    Estimate {
+        value,
+        low,
+        high,
+        n: values.len() as u32,
+    }
 }
 
 fn bootstrap(places: &[Place], resamples: u32, seed: u64) -> [Option<(f64, f64)>; COUNT] {

@@ -62,6 +62,8 @@ pub struct Scored {
     pub location: u32,
     /// Planned depth, mm.
     pub depth_mm: f64,
+    /// The measured position, the planned one where none was measured.
+    pub at: Point2,
     /// Neither invalid nor excluded.
     pub valid: bool,
     /// Estimate and error vector (estimate - truth, mm), when both exist.
@@ -93,6 +95,7 @@ impl ScoreSet {
                     press: p.press,
                     location: p.location,
                     depth_mm: p.depth_mm,
+                    at: p.truth.unwrap_or(p.planned),
                     valid: is_valid(p),
                     found: p
                         .estimate()

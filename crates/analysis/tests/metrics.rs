@@ -36,6 +36,7 @@ fn measure(rows: &[PressResult], exclusions: Exclusions) -> Metrics {
         &ScoreSet::from_presses(rows, &[]),
         exclusions,
         &SkinOutline::PAPER,
+        5.0,
         500,
         1,
     )

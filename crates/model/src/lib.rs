@@ -29,7 +29,10 @@ pub use record::{
     DeviceIdentity, DeviceRole, InterruptionKind, MotionCommand, Record, RunEnd, RunHeader, Setting,
 };
 pub use scene::{SceneNeed, SimLevel};
-pub use settings::{AnalysisSettings, CalibrationModel, CentroidRule, RigGeometry};
+pub use settings::{
+    AnalysisSettings, Background, CalibrationModel, CentroidRule, CmreSettings, LatencySettings,
+    LensKind, ReductionSettings, RigGeometry, ThresholdRule, WindowAnchor,
+};
 pub use skin::SkinOutline;
 pub use stream::{ChunkFacts, RawChunk, StreamFormat};
 pub use time::{HostDuration, HostTime};

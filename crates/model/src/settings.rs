@@ -27,8 +27,147 @@ pub enum CalibrationModel {
     /// Positions and skews (6).
     PositionsSkews,
     /// Positions, skews and distortions: the paper's eight.
-    #[default]
     Full,
+    /// The eight and a scale of the field of view per camera (10).
+    FullScale,
+    /// The smallest of the models above whose cross-validated error is within one standard error of the best.
+    #[default]
+    Auto,
+}
+
+/// How a column becomes an angle before distortion. See [`crate::camera::LensModel`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum LensKind {
+    /// The paper's: equidistant with an exponential falloff.
+    #[default]
+    Exponential,
+    /// Angle proportional to the distance from the middle (f-theta).
+    Equidistant,
+    /// Pinhole: tangent of the angle proportional to the distance.
+    Rectilinear,
+    /// Tangent of half the angle proportional to the distance.
+    Stereographic,
+    /// Sine of half the angle proportional to the distance.
+    Equisolid,
+}
+
+/// How the least number of cluster events for a press to count is found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ThresholdRule {
+    /// Chosen on the calibrating presses alone; never below `min_cluster_events`.
+    #[default]
+    Calibrated,
+    /// `min_cluster_events` as it is.
+    Fixed,
+}
+
+/// Where a press window is anchored.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum WindowAnchor {
+    /// From `window_before_ms` before the measured contact to `window_after_ms` after the measured release.
+    #[default]
+    Touch,
+    /// From `window_before_ms` before the middle between contact and release to `window_after_ms` after it, as the
+    /// public code does.
+    Middle,
+}
+
+/// Where the background of the latency detector is taken from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Background {
+    /// The idle time before the press, as the paper says.
+    #[default]
+    Before,
+    /// 1.5 s to 2.4 s after the middle of the press, as the public code does.
+    After,
+}
+
+/// The data-reduction study.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct ReductionSettings {
+    /// Thinning factors 2^0 ..= 2^this (0..=20; the paper: 10).
+    pub max_power: u32,
+    /// Random seeds per factor and kind of thinning, at least 1.
+    pub seeds: u32,
+    /// DBSCAN core threshold for all factors; 0: that of the analysis. The public code: 1.
+    pub min_samples: u32,
+}
+
+impl Default for ReductionSettings {
+    fn default() -> Self {
+        Self {
+            max_power: 12,
+            seeds: 10,
+            min_samples: 0,
+        }
+    }
+}
+
+/// The detection-latency study: a one-sided CUSUM on binned, smoothed event counts of both cameras.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct LatencySettings {
+    /// Width of a bin, ms (paper: 0.2).
+    pub bin_ms: f64,
+    /// Standard deviation of the Gaussian kernel, ms (paper: 0.5).
+    pub sigma_ms: f64,
+    /// Rate increase that the detector is tuned to (paper: 4).
+    pub alpha: f64,
+    /// Bins in a row that must be above the threshold (paper: 3).
+    pub consecutive: u32,
+    /// Thresholds h that are tried, first and last (public code: 17 to 19 at full data; the paper reports 1).
+    pub threshold_range: (f64, f64),
+    /// How many thresholds, evenly spaced, both ends included.
+    pub thresholds: u32,
+    /// The threshold chosen has the fewest false alarms among those that detect at least this share (paper: 0.95).
+    pub target_rate: f64,
+    /// A detection counts when it lies within this of the median onset, ms (paper: 100).
+    pub window_ms: f64,
+    /// Where the background comes from.
+    pub background: Background,
+}
+
+impl Default for LatencySettings {
+    fn default() -> Self {
+        Self {
+            bin_ms: 0.2,
+            sigma_ms: 0.5,
+            alpha: 4.0,
+            consecutive: 3,
+            threshold_range: (1.0, 20.0),
+            thresholds: 20,
+            target_rate: 0.95,
+            window_ms: 100.0,
+            background: Background::Before,
+        }
+    }
+}
+
+/// The contact map reconstruction error. None of these values is published: see `docs/paper.md`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct CmreSettings {
+    /// Side of a square cell, mm (the virtual grid of the skin that defined the measure: 5).
+    pub cell_mm: f64,
+    /// Standard deviation of the estimate's Gaussian, mm (default of the public code: 1).
+    pub sigma_mm: f64,
+    /// Side of the square sensing region that the public code calls SR, in the unit of its weights, mm.
+    pub region_mm: f64,
+}
+
+impl Default for CmreSettings {
+    fn default() -> Self {
+        Self {
+            cell_mm: 5.0,
+            sigma_mm: 1.0,
+            region_mm: 100.0,
+        }
+    }
 }
 
 /// Settings of an analysis. A session recorded before a setting existed gets that setting's default.
@@ -47,7 +186,12 @@ pub struct AnalysisSettings {
     pub min_samples: u32,
     /// Which clustered events make the centroid.
     pub centroid: CentroidRule,
-    /// A press with fewer clustered events than this in either camera is excluded (0 = rule off).
+    /// Where the press window is anchored.
+    pub window_anchor: WindowAnchor,
+    /// How the least number of clustered events is found.
+    pub cluster_threshold: ThresholdRule,
+    /// A press with fewer clustered events than this in either camera is excluded (0 = rule off); the least value
+    /// when the threshold is calibrated.
     pub min_cluster_events: u32,
     /// A press whose events in the window are fewer than the idle rate predicts plus this many standard errors, in
     /// either camera, is excluded: the camera did not see it (0 = rule off).
@@ -56,8 +200,28 @@ pub struct AnalysisSettings {
     pub min_ray_sine: f64,
     /// Leave estimates outside the skin's outline out of the headline metrics (they are always counted).
     pub exclude_outside: bool,
+    /// Presses left out by hand, by number (from 0, sync presses counted).
+    pub exclude_presses: Vec<u32>,
     /// Which parameters are calibrated.
     pub calibration: CalibrationModel,
+    /// The lens that is calibrated.
+    pub lens: LensKind,
+    /// The error that a failed press counts in the penalised RMSE, mm; `None`: the RMS distance of the scored
+    /// presses from their mean, the error of an answer that knows nothing.
+    pub failure_penalty_mm: Option<f64>,
+    /// A press is "within" when its error is at most this, mm.
+    pub within_mm: f64,
+    /// Bits per event in the bit rates (paper: 21).
+    pub bits_per_event: f64,
+    /// Most scored presses whose events are kept for the studies of data reduction and latency, spread evenly over
+    /// the session (0: no studies).
+    pub study_presses: u32,
+    /// The data-reduction study.
+    pub reduction: ReductionSettings,
+    /// The detection-latency study.
+    pub latency: LatencySettings,
+    /// The contact map reconstruction error.
+    pub cmre: CmreSettings,
     /// Resamples of the bootstrap over locations.
     pub bootstrap_resamples: u32,
     /// Seed of the bootstrap.
@@ -75,14 +239,67 @@ impl Default for AnalysisSettings {
             eps_px: 10.0,
             min_samples: 10,
             centroid: CentroidRule::LargestCluster,
+            window_anchor: WindowAnchor::Touch,
+            cluster_threshold: ThresholdRule::Calibrated,
             min_cluster_events: 20,
             min_response_sigma: 5.0,
             min_ray_sine: 0.05,
             exclude_outside: true,
-            calibration: CalibrationModel::Full,
+            exclude_presses: Vec::new(),
+            calibration: CalibrationModel::Auto,
+            lens: LensKind::Exponential,
+            failure_penalty_mm: None,
+            within_mm: 5.0,
+            bits_per_event: 21.0,
+            study_presses: 300,
+            reduction: ReductionSettings::default(),
+            latency: LatencySettings::default(),
+            cmre: CmreSettings::default(),
             bootstrap_resamples: 2000,
             seed: 1,
             rate_bin_ms: 10.0,
+        }
+    }
+}
+
+impl AnalysisSettings {
+    /// Period of a press in the published recording, ms: 868 s / 289 (public code).
+    pub const PUBLISHED_PERIOD_MS: f64 = 868_000.0 / 289.0;
+
+    /// The choices of the public analysis code, each where it departs from the paper or from the defaults here
+    /// (`docs/paper.md` lists them): all clusters make the centroid, a press window is one whole period about the
+    /// middle of the press, no threshold and no response rule, data reduction with a core threshold of one event,
+    /// background after the press, thresholds 17 to 19. What `self` says about seeds and resamples stays.
+    #[must_use]
+    pub fn with_reference_code(self) -> Self {
+        Self {
+            crop_v: [(185, 360), (200, 355)],
+            window_anchor: WindowAnchor::Middle,
+            window_before_ms: Self::PUBLISHED_PERIOD_MS / 2.0,
+            window_after_ms: Self::PUBLISHED_PERIOD_MS / 2.0,
+            eps_px: 10.0,
+            min_samples: 10,
+            centroid: CentroidRule::AllClusters,
+            cluster_threshold: ThresholdRule::Fixed,
+            min_cluster_events: 0,
+            min_response_sigma: 0.0,
+            min_ray_sine: 0.0,
+            calibration: CalibrationModel::Full,
+            lens: LensKind::Exponential,
+            bits_per_event: 21.0,
+            reduction: ReductionSettings {
+                max_power: 10,
+                seeds: 10,
+                min_samples: 1,
+            },
+            latency: LatencySettings {
+                threshold_range: (17.0, 19.0),
+                thresholds: 3,
+                background: Background::After,
+                ..LatencySettings::default()
+            },
+            cmre: CmreSettings::default(),
+            ..self
         }
     }
 }

@@ -12,7 +12,7 @@ mod problem;
 
 use levenberg_marquardt::{LevenbergMarquardt, TerminationReason};
 use nalgebra::{DMatrix, DVector};
-use skinrig_model::{CalibrationModel, StereoGeometry};
+use skinrig_model::{CalibrationModel, LensKind, StereoGeometry};
 
 use crate::result::CalibrationResult;
 use crate::seeded;
@@ -57,7 +57,7 @@ pub const fn parameter_count(model: CalibrationModel) -> usize {
         CalibrationModel::None => 0,
         CalibrationModel::Positions => 4,
         CalibrationModel::PositionsSkews => 6,
-        CalibrationModel::Full => PARAMETERS,
+        CalibrationModel::Full | CalibrationModel::FullScale | CalibrationModel::Auto => PARAMETERS,
     }
 }
 
@@ -69,6 +69,8 @@ pub const fn model_name(model: CalibrationModel) -> &'static str {
         CalibrationModel::Positions => "positions",
         CalibrationModel::PositionsSkews => "positions_skews",
         CalibrationModel::Full => "full",
+        CalibrationModel::FullScale => "full_scale",
+        CalibrationModel::Auto => "auto",
     }
 }
 
@@ -141,6 +143,15 @@ pub fn calibrate(
     };
     let standard_errors = covariance::standard_errors(&solution.residuals, &solution.jacobian);
     let result = CalibrationResult {
+        model,
+        lens: LensKind::Exponential,
+        correlation: Vec::new(),
+        condition: None,
+        rank: count as u32,
+        outliers: 0,
+        starts: STARTS as u32,
+        starts_agreeing: 0,
+        compared: Vec::new(),
         start: *start,
         names: NAMES[..count].iter().map(|n| (*n).to_owned()).collect(),
         start_values: base[..count].to_vec(),

@@ -49,11 +49,14 @@ pub(crate) fn analysis(f: &Field, out: &mut Collector) -> Option<AnalysisSetting
             "none" => CalibrationModel::None,
             "positions" => CalibrationModel::Positions,
             "positions_skews" => CalibrationModel::PositionsSkews,
-            _ => CalibrationModel::Full,
+            "full" => CalibrationModel::Full,
+            "full_scale" => CalibrationModel::FullScale,
+            _ => CalibrationModel::Auto,
         },
         bootstrap_resamples: f.count("bootstrap_resamples")?,
         seed: f.whole("seed")?.unsigned_abs(),
         rate_bin_ms: milliseconds(f.quantity("rate_bin")?),
+        ..AnalysisSettings::default()
     })
 }
 

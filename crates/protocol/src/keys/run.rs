@@ -226,7 +226,7 @@ pub(crate) static ANALYSIS: Table = Table {
         default(
             "calibration",
             Shape::Choice(CALIBRATIONS),
-            "full",
+            "auto",
             "Which parameters of the camera geometry are calibrated.",
         ),
         default(
@@ -279,6 +279,14 @@ pub(crate) const CALIBRATIONS: &[Word] = &[
     ("positions", "both positions: 4 parameters"),
     ("positions_skews", "positions and skews: 6 parameters"),
     ("full", "positions, skews and distortions: the paper's 8"),
+    (
+        "full_scale",
+        "the 8 and a scale of the field of view per camera: 10",
+    ),
+    (
+        "auto",
+        "the smallest of them whose cross-validated error is within one standard error of the best",
+    ),
 ];
 
 pub(crate) static CAMERAS: Table = Table {

@@ -122,6 +122,15 @@ pub fn analysis(side: u32, repetitions: u32) -> Analysis {
         counts,
         clocks: [fit(ClockMethod::TriggerMarks, 12.345_6), fit(ClockMethod::EventRates, -3.21)],
         calibration: Some(CalibrationResult {
+            model: CalibrationModel::Full,
+            lens: LensKind::Exponential,
+            correlation: vec![],
+            condition: Some(184.0),
+            rank: 8,
+            outliers: 0,
+            starts: 10,
+            starts_agreeing: 9,
+            compared: vec![],
             start: geometry,
             names: ["camera 1 x (mm)", "camera 1 y (mm)", "camera 2 x (mm)", "camera 2 y (mm)", "camera 1 skew (deg)",
                 "camera 2 skew (deg)", "camera 1 distortion W (1)", "camera 2 distortion W (1)"].map(str::to_owned).to_vec(),
@@ -135,6 +144,21 @@ pub fn analysis(side: u32, repetitions: u32) -> Analysis {
         }),
         scored,
         scored_without_exclusions,
+        penalised: Penalised {
+            penalty_mm: 28.3,
+            derived: true,
+            failures: 4,
+            rmse_mm: scored_without_exclusions.rmse_mm,
+        },
+        threshold: None,
+        coverage: None,
+        cmre: None,
+        bit_rates: None,
+        reduction: None,
+        latency: None,
+        reference: None,
+        findings: vec![],
+        activity: vec![],
         depths: vec![],
         rates,
         presses,
@@ -295,6 +319,10 @@ fn metrics(presses: &[PressResult], valid_only: bool) -> Metrics {
             high: Some(1.0),
             ..e(f64::from(n) / f64::from(attempted.max(1)), attempted)
         },
+        within_rate: e(
+            lengths.iter().filter(|l| **l <= 5.0).count() as f64 / f64::from(attempted.max(1)),
+            attempted,
+        ),
         rmse_diagonal_percent: (n > 0).then_some(rmse / 141.42 * 100.0),
     }
 }

@@ -1,5 +1,19 @@
 //! The result of an analysis: every number that a report shows, with its n.
 
+mod audit;
+mod calibration;
+mod coverage;
+mod latency;
+mod reduction;
+mod reference;
+
+pub use audit::{Fault, Finding, Law};
+pub use calibration::{CalibrationResult, ModelComparison, ThresholdChoice};
+pub use coverage::{Activity, BitRates, Cmre, Coverage};
+pub use latency::{ContactLatency, Latency, LatencyCourse, ThresholdRow};
+pub use reduction::{Reduction, ReductionCurve, ReductionRow, Thinning};
+pub use reference::{ReferenceCode, ReferenceReduction};
+
 use serde::{Deserialize, Serialize};
 use skinrig_model::{
     AnalysisSettings, CameraId, Point2, PressId, PressRole, PressTiming, RigGeometry,
@@ -7,7 +21,7 @@ use skinrig_model::{
 };
 
 /// Version of this layout and of the algorithms behind it; part of every result.
-pub const ANALYSIS_VERSION: u32 = 1;
+pub const ANALYSIS_VERSION: u32 = 2;
 
 /// The result of analysing one session.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -30,8 +44,27 @@ pub struct Analysis {
     pub scored: Metrics,
     /// Metrics over all scored presses with an estimate, exclusions ignored.
     pub scored_without_exclusions: Metrics,
+    /// RMSE over all attempted scored presses in which every failed one counts the stated penalty.
+    pub penalised: Penalised,
+    /// The least number of cluster events, when it was chosen on the calibrating presses.
+    pub threshold: Option<ThresholdChoice>,
+    /// Areas and taxels.
+    pub coverage: Option<Coverage>,
+    /// Contact map reconstruction error.
+    pub cmre: Option<Cmre>,
+    /// Data rates.
+    pub bit_rates: Option<BitRates>,
+    /// The data-reduction study.
+    pub reduction: Option<Reduction>,
+    /// The detection-latency study.
+    pub latency: Option<Latency>,
+    /// The public code's numbers, in reference-code mode only.
+    pub reference: Option<ReferenceCode>,
+    /// Broken laws; empty for a plausible session.
+    pub findings: Vec<Finding>,
+    /// Events per pixel over the whole recording, camera 1 and camera 2.
+    pub activity: Vec<Activity>,
     /// The RMSE of the scored presses at each depth, shallowest first; empty when one depth was scored.
-    #[serde(default)]
     pub depths: Vec<DepthResult>,
     /// Event-rate course of each camera over the whole session.
     pub rates: [RateSeries; 2],
@@ -40,10 +73,8 @@ pub struct Analysis {
     /// Things a reader must know: fallbacks taken, data missing, suspicious residuals.
     pub warnings: Vec<String>,
     /// What the cameras saw of a few scored presses, spread over the session and the skin.
-    #[serde(default)]
     pub pictures: Vec<PressPicture>,
     /// The event rates around a few scored presses.
-    #[serde(default)]
     pub zooms: Vec<RateZoom>,
 }
 
@@ -146,32 +177,24 @@ pub struct Metrics {
     pub repeat_std_mm: Estimate,
     /// Share of the attempted scored presses, invalid ones included, that got an estimate which counts here.
     pub located_rate: Estimate,
+    /// Share of the attempted scored presses that got an estimate which counts here and errs by at most
+    /// `within_mm`.
+    pub within_rate: Estimate,
     /// RMSE as a share of the skin's diagonal, percent.
     pub rmse_diagonal_percent: Option<f64>,
 }
 
-/// A calibration.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct CalibrationResult {
-    /// Where it started.
-    pub start: StereoGeometry,
-    /// Names of the fitted parameters.
-    pub names: Vec<String>,
-    /// The values they started from.
-    #[serde(default)]
-    pub start_values: Vec<f64>,
-    /// Their values.
-    pub values: Vec<f64>,
-    /// Their standard errors; `None` where the data do not determine them.
-    pub standard_errors: Vec<Option<f64>>,
-    /// RMSE over the calibrating presses before, mm.
-    pub rmse_before_mm: f64,
-    /// And after, mm. Always at least as optimistic as the scored RMSE.
-    pub rmse_after_mm: f64,
-    /// Calibrating presses used.
-    pub n: u32,
-    /// Why the optimiser stopped.
-    pub termination: String,
+/// The RMSE with failures counted.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Penalised {
+    /// What a failed press counts, mm.
+    pub penalty_mm: f64,
+    /// True when the penalty was derived from the probed locations, false when the settings name it.
+    pub derived: bool,
+    /// Failed presses: attempted, and without an estimate that counts.
+    pub failures: u32,
+    /// The RMSE, mm.
+    pub rmse_mm: Estimate,
 }
 
 /// An event-rate course.
@@ -210,7 +233,6 @@ pub struct PressResult {
     /// The reason in full, with this press's numbers, for everything but valid.
     pub reason: Option<String>,
     /// The rule behind the reason: a short name without this press's numbers, so that presses can be grouped.
-    #[serde(default)]
     pub rule: Option<String>,
     /// Measured moments, host clock.
     pub timing: Option<PressTiming>,
@@ -255,7 +277,6 @@ pub struct PressView {
     /// Events per second in the idle time before the press; 0 when `idle_s` is 0.
     pub idle_rate_per_s: f64,
     /// Length of the idle time that the idle rate stands on, s; 0 when the presses leave none.
-    #[serde(default)]
     pub idle_s: f64,
 }
 

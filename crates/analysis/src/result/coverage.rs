@@ -1,0 +1,74 @@
+//! Owns what is said about areas, taxels, contact maps and data rates.
+
+use serde::{Deserialize, Serialize};
+use skinrig_model::{CameraId, CmreSettings, Point2};
+
+use super::Estimate;
+
+/// How much of the skin is seen, how much was probed, and how many places can be told apart.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Coverage {
+    /// Area of the outline, mm².
+    pub skin_mm2: f64,
+    /// Area of the outline in the field of view of both cameras, mm².
+    pub seen_by_both_mm2: f64,
+    /// Area that the locations stand for, mm²: the union of one cell per location, clipped to the outline.
+    pub probed_mm2: f64,
+    /// Side of a cell, mm: the median distance of a location from its nearest neighbour.
+    pub cell_mm: Option<f64>,
+    /// Locations probed.
+    pub locations: u32,
+    /// The field of view of each camera within the outline, as a polygon, mm.
+    pub views: [Vec<Point2>; 2],
+    /// Their overlap.
+    pub overlap: Vec<Point2>,
+    /// Circles of radius RMSE that fill the skin's area: area / (pi RMSE²).
+    pub taxels_skin: Estimate,
+    /// The same over the probed area. Only there was the RMSE measured.
+    pub taxels_probed: Estimate,
+}
+
+/// Contact map reconstruction error.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Cmre {
+    /// The parameters.
+    pub settings: CmreSettings,
+    /// Cells along x and y.
+    pub cells: (u32, u32),
+    /// Mean score over the scored presses that count, percent.
+    pub percent: Estimate,
+    /// Presses whose truth lies outside the map and that have no score.
+    pub without_score: u32,
+}
+
+/// Data rates of both cameras together, rows of the crop only.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct BitRates {
+    /// Bits per event that the byte rates assume.
+    pub bits_per_event: f64,
+    /// Mean events per second in the press windows.
+    pub press_events_per_s: Estimate,
+    /// Mean events per second in the idle time before presses.
+    pub idle_events_per_s: Estimate,
+    /// Bytes per second in the press windows.
+    pub press_bytes_per_s: Estimate,
+    /// Bytes per second while idle.
+    pub idle_bytes_per_s: Estimate,
+    /// Mean length of a press, contact to release, s.
+    pub press_s: Option<f64>,
+}
+
+/// Events of a camera per pixel over the whole recording, whole sensor.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Activity {
+    /// Which camera.
+    pub camera: CameraId,
+    /// Side of a cell of the picture, px.
+    pub cell_px: u16,
+    /// Cells along u.
+    pub width: u16,
+    /// Cells along v.
+    pub height: u16,
+    /// Events per cell, row by row.
+    pub counts: Vec<u64>,
+}

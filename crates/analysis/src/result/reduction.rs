@@ -1,0 +1,67 @@
+//! Owns what the data-reduction study reports.
+
+use serde::{Deserialize, Serialize};
+
+use super::Estimate;
+
+/// Localisation on thinned events.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Reduction {
+    /// DBSCAN radius used at all factors, px.
+    pub eps_px: f64,
+    /// DBSCAN core threshold used at all factors.
+    pub min_samples: u32,
+    /// Seeds per factor and kind.
+    pub seeds: u32,
+    /// Presses in the study.
+    pub presses: u32,
+    /// Error below which a press passes: the 95th percentile at factor 1, mm; `None` when nothing is located there.
+    pub pass_threshold_mm: Option<f64>,
+    /// Error up to which a press is "within", mm.
+    pub within_mm: f64,
+    /// One curve per kind of thinning.
+    pub curves: Vec<ReductionCurve>,
+}
+
+/// How events are thinned.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Thinning {
+    /// Exactly max(1, n / k) of the n events of a press in a camera, without replacement (public code).
+    Exact,
+    /// Each event with probability 1 / k (paper); a press can be left with none.
+    Bernoulli,
+}
+
+/// The study with one kind of thinning.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ReductionCurve {
+    /// Kind.
+    pub thinning: Thinning,
+    /// One row per factor, ascending.
+    pub rows: Vec<ReductionRow>,
+}
+
+/// The study at one factor. Values are means over seeds; intervals come from a bootstrap over locations of the
+/// seed means, so that they hold the spread between presses and not only between seeds.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct ReductionRow {
+    /// k.
+    pub factor: u32,
+    /// Mean events per press and camera that are left.
+    pub events_per_view: f64,
+    /// RMSE of the located presses, mm.
+    pub rmse_mm: Estimate,
+    /// Lowest and highest RMSE of a single seed, mm.
+    pub rmse_of_seeds_mm: Option<(f64, f64)>,
+    /// Share of all presses whose error is below the pass threshold; what is not located fails.
+    pub pass_rate: Estimate,
+    /// Share of all presses within `within_mm`.
+    pub within_rate: Estimate,
+    /// Share of all presses with an estimate.
+    pub located_rate: Estimate,
+    /// Bytes per second of both cameras during a press, at the stated bits per event.
+    pub press_bytes_per_s: f64,
+    /// And while idle.
+    pub idle_bytes_per_s: f64,
+}
