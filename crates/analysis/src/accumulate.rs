@@ -8,11 +8,13 @@ use skinrig_model::{
     SENSOR_WIDTH,
 };
 
+use crate::activity::ActivityGrid;
 use crate::dbscan::{Cluster, Dbscan};
 use crate::error::AnalysisError;
 use crate::grid::PixelGrid;
+use crate::keeper::{KeepPlan, Keeper};
 use crate::rates::RateHistogram;
-use crate::result::{PicturePixel, PressPicture, PressView, RateZoom};
+use crate::result::{Activity, PicturePixel, PressPicture, PressView, RateZoom};
 use crate::segment::Window;
 
 /// How far an event may lie before the newest one seen and still find its window open, µs.
@@ -29,6 +31,21 @@ pub struct ZoomPlan {
     pub release_s: f64,
 }
 
+/// What a pass is to collect.
+#[derive(Default)]
+pub struct Wanted<'a> {
+    /// Windows, sorted by start.
+    pub windows: &'a [Window],
+    /// Rows of the plan whose picture is wanted, with the press.
+    pub pictured: &'a [(usize, PressId)],
+    /// Close-ups of the rate, sorted by start.
+    pub zooms: Vec<ZoomPlan>,
+    /// Presses whose events are kept, sorted by start.
+    pub kept: Vec<KeepPlan>,
+    /// The histogram to fill, when this pass is to fill it.
+    pub rates: Option<RateHistogram>,
+}
+
 /// What one camera gives.
 pub struct Accumulator<'a> {
     camera: CameraId,
@@ -36,7 +53,6 @@ pub struct Accumulator<'a> {
     crop: (u16, u16),
     rates: Option<RateHistogram>,
     windows: &'a [Window],
-    /// Rows of the plan whose picture is wanted, with the press.
     pictured: &'a [(usize, PressId)],
     next: usize,
     open: Vec<Open>,
@@ -48,6 +64,8 @@ pub struct Accumulator<'a> {
     dbscan: Dbscan,
     zooms: Vec<(ZoomPlan, Vec<u32>, Vec<u32>)>,
     zoom_next: usize,
+    keeper: Keeper,
+    activity: ActivityGrid,
     bin_us: u64,
     views: Vec<(usize, PressView)>,
     pictures: Vec<PressPicture>,
@@ -71,20 +89,23 @@ pub struct Accumulated {
     pub views: Vec<(usize, PressView)>,
     pub pictures: Vec<PressPicture>,
     pub zooms: Vec<RateZoom>,
+    /// Whole views only.
+    pub kept: Vec<KeepPlan>,
+    pub activity: Option<Activity>,
     /// Events that came more than [`SLACK_US`] after newer ones.
     pub late: u64,
 }
 
 impl<'a> Accumulator<'a> {
-    /// Collects over `windows` (sorted by start); `rates` when this pass is to fill the histogram.
-    pub fn new(
-        camera: CameraId,
-        settings: &'a AnalysisSettings,
-        windows: &'a [Window],
-        pictured: &'a [(usize, PressId)],
-        zooms: Vec<ZoomPlan>,
-        rates: Option<RateHistogram>,
-    ) -> Self {
+    /// Collects what is `wanted`.
+    pub fn new(camera: CameraId, settings: &'a AnalysisSettings, wanted: Wanted<'a>) -> Self {
+        let Wanted {
+            windows,
+            pictured,
+            zooms,
+            kept,
+            rates,
+        } = wanted;
         let zooms = zooms
             .into_iter()
             .map(|plan| {
@@ -108,6 +129,8 @@ impl<'a> Accumulator<'a> {
             dbscan: Dbscan::new(settings.eps_px, settings.min_samples),
             zooms,
             zoom_next: 0,
+            keeper: Keeper::new(kept),
+            activity: ActivityGrid::new(),
             bin_us: rate_bin_us(settings),
             views: Vec::new(),
             pictures: Vec::new(),
@@ -134,6 +157,7 @@ impl<'a> Accumulator<'a> {
             if event.t_us.saturating_add(SLACK_US) < self.newest_us {
                 self.late += 1;
             }
+            self.activity.add(event);
             if event.y < self.crop.0 || event.y > self.crop.1 {
                 continue;
             }
@@ -169,6 +193,7 @@ impl<'a> Accumulator<'a> {
                 open.idle_events += 1;
             }
         }
+        self.keeper.take(event);
         for (plan, ons, offs) in &mut self.zooms[self.zoom_next..] {
             if event.t_us < plan.start_us {
                 break;
@@ -205,6 +230,7 @@ impl<'a> Accumulator<'a> {
             }
             self.zoom_next += 1;
         }
+        self.keeper.move_on(now.saturating_sub(SLACK_US));
         let closes = self.open.iter().map(|o| o.window.end_us + SLACK_US);
         let opens = self
             .windows
@@ -321,6 +347,8 @@ impl<'a> Accumulator<'a> {
         });
         Ok(Accumulated {
             zooms: zooms.collect(),
+            kept: self.keeper.finish(),
+            activity: Some(self.activity.result(self.camera)),
             rates: self.rates,
             views: self.views,
             pictures: self.pictures,
@@ -358,7 +386,11 @@ mod tests {
 
     fn run(windows: &[Window], events: &[CdEvent]) -> Accumulated {
         let settings = AnalysisSettings::default();
-        let mut all = Accumulator::new(CameraId::One, &settings, windows, &[], Vec::new(), None);
+        let wanted = Wanted {
+            windows,
+            ..Wanted::default()
+        };
+        let mut all = Accumulator::new(CameraId::One, &settings, wanted);
         events.chunks(2).for_each(|slice| all.take(slice));
         all.finish().unwrap()
     }

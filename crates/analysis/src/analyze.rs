@@ -1,34 +1,27 @@
 //! The analysis as a whole: from a session's values and events to one [`Analysis`].
 
 use skinrig_model::{
-    CalibrationModel, CameraId, PressId, PressRole, PressTiming, PressVerdict, StereoGeometry,
+    CalibrationModel, CameraId, PressRole, PressTiming, PressVerdict, StereoGeometry,
 };
 
-use crate::accumulate::{Accumulated, Accumulator, SLACK_US, ZoomPlan, rate_bin_us};
+use crate::accumulate::{Accumulated, Accumulator, SLACK_US, Wanted, rate_bin_us};
 use crate::calibrate::{affordable_model, calibrate, model_name};
 use crate::clock::{PressSpan, SUSPICIOUS_DRIFT_PPM, fit_marks, fit_rates};
+use crate::closeups::{Closeups, keep_plans, zoom_plans};
 use crate::error::AnalysisError;
 use crate::input::{EventSource, SessionInput};
-use crate::kept::Kept;
+use crate::keeper::KeepPlan;
+use crate::kept::{Keep, Kept, KeptPress};
 use crate::metrics::{Exclusions, metrics, penalised};
 use crate::rates::RateHistogram;
 use crate::result::{
-    ANALYSIS_VERSION, Analysis, CalibrationResult, ClockFit, DepthResult, LocationOutcome,
-    PressPicture, PressResult, PressView, RateSeries, RateZoom,
+    ANALYSIS_VERSION, Activity, Analysis, CalibrationResult, ClockFit, DepthResult,
+    LocationOutcome, PressPicture, PressResult, PressView, RateSeries, RateZoom,
 };
 use crate::segment::{Window, windows};
 use crate::sets::{CalibrationSet, ScoreSet};
 use crate::triangulate::locate;
 use crate::{audit, bit_rates, check, cmre, coverage, latency, reduction, verdict};
-
-/// Scored presses with a picture.
-const PICTURES: usize = 6;
-/// Scored presses with a rate close-up.
-const ZOOMS: usize = 3;
-/// A close-up begins this long before the contact and ends this long after the release, s.
-const ZOOM_SIDE_S: f64 = 0.3;
-/// Most bins of a close-up.
-const MAX_ZOOM_BINS: usize = 2000;
 
 /// Analyses a session: one pass over each camera's events when its clock can be fitted from trigger marks, two
 /// when it has to be aligned by event rates; both cameras at the same time.
@@ -41,19 +34,21 @@ const MAX_ZOOM_BINS: usize = 2000;
 /// When the input contradicts itself, a setting is out of its range or the events cannot be read. Whatever
 /// keeps single presses or a camera from being used becomes verdicts and warnings instead.
 pub fn analyze(input: &SessionInput, source: &dyn EventSource) -> Result<Analysis, AnalysisError> {
-    analyze_and_keep(input, source).map(|(analysis, _)| analysis)
+    analyze_and_keep(input, source, Keep::Scored).map(|(analysis, _)| analysis)
 }
 
-/// Like [`analyze`], and hands over the events that the studies kept.
+/// Like [`analyze`], and hands over the events kept around the presses that `keep` says. The studies of the analysis
+/// itself look at scored presses only.
 ///
 /// # Errors
 /// See [`analyze`].
 pub fn analyze_and_keep(
     input: &SessionInput,
     source: &dyn EventSource,
+    keep: Keep,
 ) -> Result<(Analysis, Kept), AnalysisError> {
     check::input(input)?;
-    let plan = Closeups::choose(input);
+    let plan = Closeups::choose(input, keep);
     let [one, two] = std::thread::scope(|scope| {
         let second = scope.spawn(|| camera_pass(input, source, CameraId::Two, &plan));
         let first = camera_pass(input, source, CameraId::One, &plan);
@@ -116,9 +111,22 @@ pub fn analyze_and_keep(
             "press times and positions come from a schedule, not from a measurement".to_owned(),
         );
     }
-    let [one, two] = cameras;
+    let [mut one, mut two] = cameras;
+    let kept = paired(
+        &presses,
+        &plan,
+        [std::mem::take(&mut one.kept), std::mem::take(&mut two.kept)],
+    );
+    let both_clocks = one.clock.is_some() && two.clock.is_some();
+    if both_clocks && kept.left_out > 0 {
+        warnings.push(format!(
+            "{} of {} presses chosen for the studies did not fit into memory: the studies stand on the first {}",
+            kept.left_out,
+            plan.kept.len(),
+            kept.presses.len()
+        ));
+    }
     let counts = verdict::count(&presses);
-    let kept = Kept::default();
     let mut analysis = Analysis {
         version: ANALYSIS_VERSION,
         settings: input.settings.clone(),
@@ -139,7 +147,7 @@ pub fn analyze_and_keep(
         latency: None,
         reference: None,
         findings: Vec::new(),
-        activity: Vec::new(),
+        activity: [one.activity, two.activity].into_iter().flatten().collect(),
         rates: [one.rates, two.rates],
         presses,
         warnings: [one.warnings, two.warnings, warnings].concat(),
@@ -169,51 +177,33 @@ struct CameraResult {
     data_lost: Vec<bool>,
     pictures: Vec<PressPicture>,
     zooms: Vec<RateZoom>,
+    kept: Vec<KeepPlan>,
+    activity: Option<Activity>,
     warnings: Vec<String>,
 }
 
-/// Which presses get pictures and close-ups of the rate.
-struct Closeups {
-    pictures: Vec<(usize, PressId)>,
-    zooms: Vec<(usize, PressId)>,
-}
-
-impl Closeups {
-    /// Spread over the scored presses that were done (over all presses when none scores) and over their locations:
-    /// of each of equal parts of the session, the press nearest to its share of the locations. Equal steps alone
-    /// would meet the same few places in every repetition.
-    fn choose(input: &SessionInput) -> Self {
-        let done = |scored: bool| -> Vec<(usize, PressId, u32)> {
-            let rows = input.planned.iter().zip(&input.outcomes).enumerate();
-            rows.filter(|(_, (p, _))| !scored || p.role == PressRole::Score)
-                .filter(|(_, (_, o))| o.as_ref().is_some_and(|o| o.timing.is_some()))
-                .map(|(row, (p, _))| (row, p.id, p.location))
-                .collect()
-        };
-        let mut candidates = done(true);
-        if candidates.is_empty() {
-            candidates = done(false);
-        }
-        let spaced = |most: usize| {
-            let n = candidates.len();
-            let count = most.min(n);
-            let lowest = candidates.iter().map(|c| c.2).min().unwrap_or(0);
-            let highest = candidates.iter().map(|c| c.2).max().unwrap_or(0);
-            let part = |i: usize| {
-                let share = (2 * i + 1) as f64 / (2 * count) as f64;
-                let wanted = f64::from(lowest) + share * f64::from(highest - lowest);
-                let away = |c: &&(usize, PressId, u32)| (f64::from(c.2) - wanted).abs();
-                candidates[i * n / count..(i + 1) * n / count]
-                    .iter()
-                    .min_by(|a, b| away(a).total_cmp(&away(b)))
-            };
-            let chosen = (0..count).filter_map(part);
-            chosen.map(|&(row, press, _)| (row, press)).collect()
-        };
-        Self {
-            pictures: spaced(PICTURES),
-            zooms: spaced(ZOOMS),
-        }
+/// The views of both cameras, press by press; a press that one camera lacks is left out.
+fn paired(presses: &[PressResult], plan: &Closeups, [one, two]: [Vec<KeepPlan>; 2]) -> Kept {
+    let mut one: Vec<KeepPlan> = one;
+    one.sort_by_key(|k| k.row);
+    let mut others: Vec<KeepPlan> = two;
+    others.sort_by_key(|k| k.row);
+    let mut others = others.into_iter().peekable();
+    let presses: Vec<KeptPress> = one
+        .into_iter()
+        .filter_map(|first| {
+            while others.next_if(|k| k.row < first.row).is_some() {}
+            let second = others.next_if(|k| k.row == first.row)?;
+            Some(KeptPress {
+                row: first.row,
+                press: presses[first.row].press,
+                views: [first.view, second.view],
+            })
+        })
+        .collect();
+    Kept {
+        left_out: (plan.kept.len() - presses.len()) as u32,
+        presses,
     }
 }
 
@@ -247,7 +237,11 @@ fn camera_pass(
                 input.edges[k].len()
             ));
         }
-        let empty = Accumulator::new(camera, settings, &[], &[], Vec::new(), rates.take());
+        let wanted = Wanted {
+            rates: rates.take(),
+            ..Wanted::default()
+        };
+        let empty = Accumulator::new(camera, settings, wanted);
         let first = pass(source, camera, empty)?;
         rates = first.rates;
         let found = rates
@@ -278,6 +272,8 @@ fn camera_pass(
             views: Vec::new(),
             pictures: Vec::new(),
             zooms: Vec::new(),
+            kept: Vec::new(),
+            activity: None,
             late: 0,
         },
         (Some(clock), rates) => {
@@ -287,10 +283,14 @@ fn camera_pass(
             } else {
                 (rates, None)
             };
-            let zooms = zoom_plans(input, plan, &clock);
-            let accumulator =
-                Accumulator::new(camera, settings, &list, &plan.pictures, zooms, fresh);
-            let mut done = pass(source, camera, accumulator)?;
+            let wanted = Wanted {
+                windows: &list,
+                pictured: &plan.pictures,
+                zooms: zoom_plans(input, plan, &clock),
+                kept: keep_plans(input, plan, &list, &clock),
+                rates: fresh,
+            };
+            let mut done = pass(source, camera, Accumulator::new(camera, settings, wanted))?;
             done.rates = done.rates.or(known);
             done
         }
@@ -327,6 +327,8 @@ fn camera_pass(
         data_lost: lost_rows(input.planned.len(), &list, &input.gaps[k]),
         pictures: collected.pictures,
         zooms: collected.zooms,
+        kept: collected.kept,
+        activity: collected.activity,
         warnings: warnings
             .into_iter()
             .map(|w| format!("{camera}: {w}"))
@@ -356,30 +358,6 @@ fn spans(input: &SessionInput) -> Vec<PressSpan> {
     spans
 }
 
-fn zoom_plans(input: &SessionInput, plan: &Closeups, clock: &ClockFit) -> Vec<ZoomPlan> {
-    let bin_us = rate_bin_us(&input.settings);
-    let mut plans: Vec<ZoomPlan> = plan
-        .zooms
-        .iter()
-        .filter_map(|&(row, press)| {
-            let timing = input.outcomes[row].as_ref()?.timing?;
-            let contact = clock.camera_us_of_host(timing.contact);
-            let release = clock.camera_us_of_host(timing.release);
-            let start_us = (contact - ZOOM_SIDE_S * 1e6).ceil().max(0.0) as u64;
-            let length_us = (release + ZOOM_SIDE_S * 1e6 - start_us as f64).max(0.0);
-            Some(ZoomPlan {
-                press,
-                start_us,
-                bins: ((length_us / bin_us as f64).ceil() as usize).min(MAX_ZOOM_BINS),
-                start_s: (start_us as f64 - contact) * 1e-6,
-                release_s: (release - contact) * 1e-6,
-            })
-        })
-        .collect();
-    plans.sort_by_key(|p| p.start_us);
-    plans
-}
-
 fn by_row(rows: usize, views: Vec<(usize, PressView)>) -> Vec<Option<PressView>> {
     let mut out = vec![None; rows];
     for (row, view) in views {
@@ -403,7 +381,7 @@ fn rows(input: &SessionInput, cameras: &[CameraResult; 2]) -> Vec<PressResult> {
         .map(|(i, (planned, outcome))| {
             let views = [0, 1].map(|k| cameras[k].views[i]);
             let data_lost = [0, 1].map(|k| cameras[k].data_lost[i]);
-            let judgement = verdict::from_data(
+            let mut judgement = verdict::from_data(
                 planned.role,
                 outcome.as_ref(),
                 has_clock,
@@ -411,6 +389,9 @@ fn rows(input: &SessionInput, cameras: &[CameraResult; 2]) -> Vec<PressResult> {
                 &views,
                 &input.settings,
             );
+            if input.settings.exclude_presses.contains(&planned.id.0) {
+                judgement = judgement.or_by_hand();
+            }
             let mut row = PressResult {
                 press: planned.id,
                 role: planned.role,

@@ -1,6 +1,6 @@
 //! What an analysis asks of its input before it begins.
 
-use skinrig_model::{CameraId, SENSOR_HEIGHT};
+use skinrig_model::{AnalysisSettings, CameraId, SENSOR_HEIGHT};
 
 use crate::error::AnalysisError;
 use crate::input::SessionInput;
@@ -100,6 +100,26 @@ fn settings(input: &SessionInput) -> Result<(), AnalysisError> {
         "at most a million resamples",
         f64::from(s.bootstrap_resamples),
     )?;
+    let positive = |v: f64, most: f64| v > 0.0 && v <= most;
+    number(
+        "failure_penalty_mm",
+        s.failure_penalty_mm.is_none_or(|mm| positive(mm, 1e6)),
+        "a length above 0",
+        s.failure_penalty_mm.unwrap_or(0.0),
+    )?;
+    number(
+        "within_mm",
+        positive(s.within_mm, 1e6),
+        "a length above 0",
+        s.within_mm,
+    )?;
+    number(
+        "bits_per_event",
+        positive(s.bits_per_event, 1024.0),
+        "a number above 0 and up to 1024",
+        s.bits_per_event,
+    )?;
+    studies(s, &number)?;
     for (from, to) in s.crop_v {
         if from > to || to >= SENSOR_HEIGHT {
             return Err(AnalysisError::Setting {
@@ -110,4 +130,92 @@ fn settings(input: &SessionInput) -> Result<(), AnalysisError> {
         }
     }
     Ok(())
+}
+
+/// Ranges of the studies' settings. `number` makes the error.
+fn studies(
+    s: &AnalysisSettings,
+    number: &impl Fn(&'static str, bool, &'static str, f64) -> Result<(), AnalysisError>,
+) -> Result<(), AnalysisError> {
+    let positive = |v: f64, most: f64| v > 0.0 && v <= most;
+    let (r, l, c) = (&s.reduction, &s.latency, &s.cmre);
+    number(
+        "reduction.max_power",
+        r.max_power <= 20,
+        "a power of 2 from 0 to 20",
+        f64::from(r.max_power),
+    )?;
+    number(
+        "reduction.seeds",
+        (1..=1000).contains(&r.seeds),
+        "1 to 1000 seeds",
+        f64::from(r.seeds),
+    )?;
+    number(
+        "latency.bin_ms",
+        (0.01..=10.0).contains(&l.bin_ms),
+        "a bin between 0.01 ms and 10 ms",
+        l.bin_ms,
+    )?;
+    number(
+        "latency.sigma_ms",
+        (0.0..=50.0).contains(&l.sigma_ms),
+        "a width between 0 and 50 ms",
+        l.sigma_ms,
+    )?;
+    number(
+        "latency.alpha",
+        l.alpha > 1.0 && l.alpha <= 1000.0,
+        "a rate increase above 1 and up to 1000",
+        l.alpha,
+    )?;
+    number(
+        "latency.consecutive",
+        (1..=1000).contains(&l.consecutive),
+        "1 to 1000 bins",
+        f64::from(l.consecutive),
+    )?;
+    let (first, last) = l.threshold_range;
+    number(
+        "latency.threshold_range",
+        positive(first, 1e6) && positive(last, 1e6) && first <= last,
+        "two thresholds above 0 in order",
+        first,
+    )?;
+    number(
+        "latency.thresholds",
+        (1..=1000).contains(&l.thresholds),
+        "1 to 1000 thresholds",
+        f64::from(l.thresholds),
+    )?;
+    number(
+        "latency.target_rate",
+        (0.0..=1.0).contains(&l.target_rate),
+        "a share from 0 to 1",
+        l.target_rate,
+    )?;
+    number(
+        "latency.window_ms",
+        positive(l.window_ms, 10_000.0),
+        "a time above 0 and up to 10 s",
+        l.window_ms,
+    )?;
+    number(
+        "cmre.cell_mm",
+        (0.5..=100.0).contains(&c.cell_mm),
+        "a side between 0.5 mm and 100 mm",
+        c.cell_mm,
+    )?;
+    number(
+        "cmre.sigma_mm",
+        positive(c.sigma_mm, 1000.0),
+        "a length above 0",
+        c.sigma_mm,
+    )?;
+    number(
+        "cmre.region_mm",
+        positive(c.region_mm, 1e6),
+        "a length above 0",
+        c.region_mm,
+    )
 }

@@ -71,7 +71,7 @@ pub struct KeptView {
     pub contact_us: f64,
     /// The measured release.
     pub release_us: f64,
-    /// The events, by time; equal times by row and column.
+    /// The events by time; at equal times by polarity, row and column.
     pub events: Vec<KeptEvent>,
 }
 
@@ -89,6 +89,15 @@ impl KeptView {
         let (from, to) = (at(from_us), at(to_us));
         &self.events[from..to.max(from)]
     }
+}
+
+/// Which presses to keep.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Keep {
+    /// Up to `study_presses` scored presses.
+    Scored,
+    /// Up to `study_presses` scored presses and as many calibrating ones.
+    All,
 }
 
 /// One press of the studies.

@@ -9,12 +9,14 @@
 //! camera geometry to the presses that calibrate ([`sets`]), [`metrics`] judges those that score.
 
 mod accumulate;
+mod activity;
 mod analyze;
 pub mod audit;
 pub mod bit_rates;
 pub mod calibrate;
 mod check;
 pub mod clock;
+mod closeups;
 pub mod cmre;
 pub mod coverage;
 pub mod dbscan;
@@ -22,6 +24,7 @@ mod error;
 pub mod grid;
 mod hash;
 pub mod input;
+mod keeper;
 pub mod kept;
 pub mod latency;
 pub mod metrics;
@@ -38,4 +41,5 @@ pub use analyze::{analyze, analyze_and_keep};
 pub use error::AnalysisError;
 pub use hash::results_hash;
 pub use input::{EventSource, SessionInput};
+pub use kept::{Keep, Kept};
 pub use result::{ANALYSIS_VERSION, Analysis};

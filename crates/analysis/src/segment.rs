@@ -1,6 +1,6 @@
 //! Windows: which stretch of a camera's time belongs to which press.
 
-use skinrig_model::{AnalysisSettings, PressTiming};
+use skinrig_model::{AnalysisSettings, PressTiming, WindowAnchor};
 
 use crate::result::ClockFit;
 
@@ -14,9 +14,9 @@ const LEAST_IDLE_US: u64 = 20_000;
 pub struct Window {
     /// Row of the press in the plan.
     pub row: usize,
-    /// `window_before_ms` before the contact.
+    /// `window_before_ms` before the contact (or before the middle of the press).
     pub start_us: u64,
-    /// `window_after_ms` after the release.
+    /// `window_after_ms` after the release (or after the middle).
     pub end_us: u64,
     /// The idle time before it: at most 0.5 s, up to the end of any earlier window. Equal to `start_us` when
     /// less than 20 ms is free.
@@ -60,8 +60,12 @@ pub fn windows(
         .map(|(row, timing)| {
             let contact = clock.camera_us_of_host(timing.contact);
             let release = clock.camera_us_of_host(timing.release);
-            let start_us = tick(contact - settings.window_before_ms * 1e3);
-            let end_us = tick(release + settings.window_after_ms * 1e3).max(start_us);
+            let (first, last) = match settings.window_anchor {
+                WindowAnchor::Touch => (contact, release),
+                WindowAnchor::Middle => (0.5 * (contact + release), 0.5 * (contact + release)),
+            };
+            let start_us = tick(first - settings.window_before_ms * 1e3);
+            let end_us = tick(last + settings.window_after_ms * 1e3).max(start_us);
             Window {
                 row,
                 start_us,
@@ -130,6 +134,15 @@ mod tests {
         assert_eq!((w[1].start_us, w[1].idle_start_us), (1_650_250, 1_550_250));
         // 10 ms are free before the third: too little for a rate.
         assert_eq!((w[2].start_us, w[2].idle_start_us), (2_260_250, 2_260_250));
+    }
+
+    #[test]
+    fn a_window_about_the_middle_has_its_own_length() {
+        let settings = AnalysisSettings::default().with_reference_code();
+        let w = windows([(0, timing(4.0, 4.5))].into_iter(), &clock(0.0), &settings)[0];
+        let half: f64 = 0.5e6 * 868.0 / 289.0;
+        assert_eq!(w.start_us, (4.25e6 - half).ceil() as u64);
+        assert_eq!(w.end_us, (4.25e6 + half).ceil() as u64);
     }
 
     #[test]

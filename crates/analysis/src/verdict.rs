@@ -44,6 +44,15 @@ impl Judgement {
         }
     }
 
+    /// Excluded by hand, unless the press is missed or invalid anyway.
+    #[must_use]
+    pub fn or_by_hand(self) -> Self {
+        match self.verdict {
+            PressVerdict::Missed(_) | PressVerdict::Invalid(_) => self,
+            _ => Self::excluded("by hand".to_owned(), "left out by hand".to_owned()),
+        }
+    }
+
     /// What the journal says; its rule is the reason with every number but a camera's left out.
     fn from_journal(verdict: PressVerdict) -> Self {
         let rule = verdict.reason().map(without_numbers);
@@ -359,6 +368,10 @@ mod tests {
             )
         );
         assert_eq!(judge(PressRole::Sync, 0, 0), Judgement::VALID);
+        let by_hand = judge(PressRole::Score, 33, 33).or_by_hand();
+        assert_eq!(by_hand.rule.as_deref(), Some("by hand"));
+        let lost = Judgement::invalid("data lost");
+        assert_eq!(lost.clone().or_by_hand(), lost);
     }
 
     #[test]

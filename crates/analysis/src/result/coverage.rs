@@ -69,6 +69,34 @@ pub struct Activity {
     pub width: u16,
     /// Cells along v.
     pub height: u16,
-    /// Events per cell, row by row.
+    /// Events per cell, row by row. Written as one text per row, the numbers of its cells apart by spaces.
+    #[serde(with = "rows")]
     pub counts: Vec<u64>,
+}
+
+/// A picture's counts as short text, a line per 320 cells (the width of a picture).
+mod rows {
+    use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error};
+
+    const CELLS: usize = 320;
+
+    pub fn serialize<S: Serializer>(counts: &[u64], to: S) -> Result<S::Ok, S::Error> {
+        let line = |row: &[u64]| row.iter().map(u64::to_string).collect::<Vec<_>>().join(" ");
+        counts
+            .chunks(CELLS)
+            .map(line)
+            .collect::<Vec<_>>()
+            .serialize(to)
+    }
+
+    pub fn deserialize<'a, D: Deserializer<'a>>(from: D) -> Result<Vec<u64>, D::Error> {
+        let lines = Vec::<String>::deserialize(from)?;
+        let numbers = lines
+            .iter()
+            .flat_map(|l| l.split(' '))
+            .filter(|n| !n.is_empty());
+        numbers
+            .map(|n| n.parse().map_err(D::Error::custom))
+            .collect()
+    }
 }

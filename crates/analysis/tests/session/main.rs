@@ -6,7 +6,9 @@ mod support;
 
 use proptest::prelude::*;
 use skinrig_analysis::result::LocationOutcome;
-use skinrig_analysis::{AnalysisError, EventSource, SessionInput, analyze, results_hash};
+use skinrig_analysis::{
+    AnalysisError, EventSource, Keep, SessionInput, analyze, analyze_and_keep, results_hash,
+};
 use skinrig_model::{
     CalibrationModel, CameraId, CdEvent, Point2, Polarity, PressRole, PressVerdict, StereoGeometry,
 };
@@ -479,4 +481,60 @@ fn pictures_are_spread_over_the_places() {
     places.sort_unstable();
     places.dedup();
     assert_eq!(places.len(), 6, "{places:?}");
+}
+
+#[test]
+fn kept_events_are_those_of_the_presses_chosen() {
+    let (mut input, source) = session();
+    input.settings.study_presses = 10;
+    let (a, scored) = analyze_and_keep(&input, &source, Keep::Scored).unwrap();
+    let (_, all) = analyze_and_keep(&input, &source, Keep::All).unwrap();
+    assert_eq!((scored.presses.len(), all.presses.len()), (10, 20));
+    assert_eq!((scored.left_out, all.left_out), (0, 0));
+    assert!(all.presses.is_sorted_by_key(|k| k.row));
+    let of_scored =
+        |k: &&skinrig_analysis::kept::KeptPress| a.presses[k.row].role == PressRole::Score;
+    assert!(all.presses.iter().filter(of_scored).eq(&scored.presses));
+    for kept in &all.presses {
+        let press = &a.presses[kept.row];
+        assert_eq!(press.press, kept.press);
+        for (view, seen) in kept.views.iter().zip(press.views.map(Option::unwrap)) {
+            assert_eq!(view.press_events().len(), seen.events as usize);
+            let on = view.press_events().iter().filter(|e| e.is_on()).count();
+            assert_eq!(on, seen.on_events as usize);
+            let idle = view.between(view.idle_from_us, view.window_us.0).len() as f64;
+            assert!((idle / seen.idle_s - seen.idle_rate_per_s).abs() < 1e-9);
+            assert!(view.events.is_sorted());
+            // Contact 50 ms after the window begins, and the view reaches a second before it.
+            assert!((view.contact_us - f64::from(view.window_us.0) - 50e3).abs() < 1.0);
+            assert!((view.contact_us - 1e6).abs() < 2.0);
+        }
+    }
+    let events: u64 = a.activity[1].counts.iter().sum();
+    assert_eq!(events, source.events[1].len() as u64);
+}
+
+#[test]
+fn presses_named_by_hand_are_rows_with_that_rule() {
+    let (mut input, source) = session();
+    let scored = input
+        .planned
+        .iter()
+        .find(|p| p.role == PressRole::Score)
+        .unwrap();
+    input.settings.exclude_presses = vec![scored.id.0];
+    let a = analyze(&input, &source).unwrap();
+    assert_eq!((a.counts.valid, a.counts.excluded), (49, 1));
+    assert_eq!(
+        a.presses[scored.id.0 as usize].rule.as_deref(),
+        Some("by hand")
+    );
+    assert_eq!(a.scored.rmse_mm.n, 24);
+    // It was attempted, so it is a failure.
+    assert_eq!((a.penalised.failures, a.penalised.rmse_mm.n), (1, 25));
+    let count = |e: &skinrig_analysis::result::Estimate| e.value.unwrap() * f64::from(e.n);
+    assert!((count(&a.scored.located_rate) - 24.0).abs() < 1e-9);
+    let rms = |e: &skinrig_analysis::result::Estimate| e.value.unwrap().powi(2) * f64::from(e.n);
+    let wanted = rms(&a.scored.rmse_mm) + a.penalised.penalty_mm.powi(2);
+    assert!((rms(&a.penalised.rmse_mm) - wanted).abs() < 1e-6);
 }

@@ -1,0 +1,38 @@
+//! Events per pixel over a whole recording, in cells of a few pixels.
+
+use skinrig_model::{CameraId, CdEvent, SENSOR_HEIGHT, SENSOR_WIDTH};
+
+use crate::result::Activity;
+
+/// Side of a cell, px; divides both sides of the sensor.
+const CELL_PX: u16 = 2;
+const WIDTH: u16 = SENSOR_WIDTH / CELL_PX;
+const HEIGHT: u16 = SENSOR_HEIGHT / CELL_PX;
+
+/// The counters; they stop at `u32::MAX` events per cell.
+pub struct ActivityGrid(Vec<u32>);
+
+impl ActivityGrid {
+    pub fn new() -> Self {
+        Self(vec![0; usize::from(WIDTH) * usize::from(HEIGHT)])
+    }
+
+    /// Counts an event that lies on the sensor.
+    pub fn add(&mut self, event: &CdEvent) {
+        let cell =
+            usize::from(event.y / CELL_PX) * usize::from(WIDTH) + usize::from(event.x / CELL_PX);
+        if let Some(count) = self.0.get_mut(cell) {
+            *count = count.saturating_add(1);
+        }
+    }
+
+    pub fn result(&self, camera: CameraId) -> Activity {
+        Activity {
+            camera,
+            cell_px: CELL_PX,
+            width: WIDTH,
+            height: HEIGHT,
+            counts: self.0.iter().map(|c| u64::from(*c)).collect(),
+        }
+    }
+}

@@ -1,0 +1,108 @@
+//! Keeps the events around chosen presses while a camera's stream goes by.
+
+use skinrig_model::CdEvent;
+
+use crate::kept::{KeptEvent, KeptView};
+
+/// Most events kept per camera: 128 MiB.
+const MAX_EVENTS: usize = 1 << 24;
+
+/// A press whose events are wanted, and what has come of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct KeepPlan {
+    /// Row of the press in the plan.
+    pub row: usize,
+    /// Its view, at first without events.
+    pub view: KeptView,
+}
+
+/// Collects views that may overlap.
+pub struct Keeper {
+    plans: Vec<KeepPlan>,
+    /// Views before this one are whole.
+    next: usize,
+    events: usize,
+}
+
+impl Keeper {
+    /// Nothing yet; the plans sorted by the start of their views.
+    pub const fn new(plans: Vec<KeepPlan>) -> Self {
+        Self {
+            plans,
+            next: 0,
+            events: 0,
+        }
+    }
+
+    /// Takes the next event of the stream. When the memory is used up, this press and all later ones are given up.
+    pub fn take(&mut self, event: &CdEvent) {
+        for plan in &mut self.plans[self.next..] {
+            let view = &mut plan.view;
+            if event.t_us < view.start_us {
+                break;
+            }
+            if event.t_us - view.start_us < u64::from(view.length_us)
+                && let Some(packed) = KeptEvent::pack(event, view.start_us)
+            {
+                view.events.push(packed);
+                self.events += 1;
+            }
+        }
+        if self.events > MAX_EVENTS {
+            self.plans.truncate(self.next);
+        }
+    }
+
+    /// No event before `time_us` will come any more.
+    pub fn move_on(&mut self, time_us: u64) {
+        while let Some(KeepPlan { view, .. }) = self.plans.get_mut(self.next) {
+            if view.start_us + u64::from(view.length_us) > time_us {
+                break;
+            }
+            view.events.sort_unstable();
+            view.events.shrink_to_fit();
+            self.next += 1;
+        }
+    }
+
+    /// The views that are whole: all but those given up.
+    pub fn finish(mut self) -> Vec<KeepPlan> {
+        self.move_on(u64::MAX);
+        self.plans
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use skinrig_model::Polarity;
+
+    use super::*;
+
+    fn plan(row: usize, start_us: u64, length_us: u32) -> KeepPlan {
+        let view = KeptView {
+            start_us,
+            length_us,
+            ..KeptView::default()
+        };
+        KeepPlan { row, view }
+    }
+
+    #[test]
+    fn overlapping_views_get_all_of_their_events_in_order() {
+        let mut keeper = Keeper::new(vec![plan(0, 100, 50), plan(1, 120, 50)]);
+        for t_us in [99, 100, 149, 130, 150, 169, 170] {
+            keeper.take(&CdEvent {
+                t_us,
+                x: 5,
+                y: 200,
+                polarity: Polarity::On,
+            });
+            keeper.move_on(t_us.saturating_sub(30));
+        }
+        let done = keeper.finish();
+        let times =
+            |i: usize| -> Vec<u32> { done[i].view.events.iter().map(|e| e.t_us()).collect() };
+        assert_eq!((done[0].row, times(0)), (0, vec![0, 30, 49]));
+        assert_eq!((done[1].row, times(1)), (1, vec![10, 29, 30, 49]));
+    }
+}
