@@ -177,6 +177,7 @@ fn session() -> (SessionInput, Memory) {
         edges: [Vec::new(), Vec::new()],
         marks: Vec::new(),
         gaps: [Vec::new(), Vec::new()],
+        pose_interval_us: None,
         rig: RigGeometry {
             outline: SkinOutline::PAPER,
             nominal: StereoGeometry::PAPER,

@@ -15,7 +15,7 @@ use crate::kept::{Keep, Kept, KeptPress};
 use crate::metrics::{Exclusions, metrics, penalised};
 use crate::rates::RateHistogram;
 use crate::result::{
-    ANALYSIS_VERSION, Activity, Analysis, CalibrationResult, ClockFit, DepthResult,
+    ANALYSIS_VERSION, Activity, Analysis, CalibrationResult, ClockFit, ContactTiming, DepthResult,
     LocationOutcome, PressPicture, PressResult, PressView, RateSeries, RateZoom,
 };
 use crate::segment::{Window, windows};
@@ -134,6 +134,7 @@ pub fn analyze_and_keep(
         geometry,
         counts,
         clocks: [one.clock, two.clock],
+        contact_timing: contact_timing(input, scheduled),
         calibration,
         scored,
         scored_without_exclusions,
@@ -156,6 +157,15 @@ pub fn analyze_and_keep(
     };
     evaluate(&mut analysis, input, &kept);
     Ok((analysis, kept))
+}
+
+fn contact_timing(input: &SessionInput, scheduled: bool) -> ContactTiming {
+    let half_widths = input.marks.iter().map(|m| m.uncertainty_ns as f64 * 1e-3);
+    ContactTiming {
+        scheduled,
+        pose_interval_us: input.pose_interval_us.unwrap_or(0.0),
+        mark_half_width_us: half_widths.fold(0.0, f64::max),
+    }
 }
 
 /// Fills in what stands on the finished table of presses.

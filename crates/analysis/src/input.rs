@@ -18,6 +18,8 @@ pub struct SessionInput {
     pub marks: Vec<SentMark>,
     /// Camera-time intervals `(from_us, to_us)` in which bytes of that camera were lost.
     pub gaps: [Vec<(u64, u64)>; 2],
+    /// RMS interval between the two pose samples around a contact, µs; `None` when not known.
+    pub pose_interval_us: Option<f64>,
     /// The rig.
     pub rig: RigGeometry,
     /// The settings.

@@ -94,6 +94,7 @@ fn schedule(positions: &str) -> SessionInput {
         edges: [Vec::new(), Vec::new()],
         marks: Vec::new(),
         gaps: [Vec::new(), Vec::new()],
+        pose_interval_us: None,
         rig: RigGeometry {
             outline: SkinOutline::PAPER,
             nominal: StereoGeometry::PAPER,

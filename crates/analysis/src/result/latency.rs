@@ -5,20 +5,47 @@ use skinrig_model::{LatencySettings, PressId};
 
 use super::Estimate;
 
+/// How the contacts of a session were timed: what a latency from the contact can be trusted to.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct ContactTiming {
+    /// True when any contact comes from a schedule instead of a measurement.
+    pub scheduled: bool,
+    /// RMS interval between the two pose samples around a contact, µs: the contact is interpolated between them. 0 when
+    /// not known.
+    pub pose_interval_us: f64,
+    /// Largest half width of the interval in which the instant of a sent trigger mark certainly lies, µs; 0 without
+    /// marks.
+    pub mark_half_width_us: f64,
+}
+
 /// When the cameras know of a touch.
+///
+/// The width, the median and the detected share follow the paper and are about the *median onset*: without a measured
+/// contact nothing else can be said. They tell how much onsets differ, not how late they are; that is what
+/// [`Self::from_contact`] tells.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Latency {
     /// The settings used.
     pub settings: LatencySettings,
-    /// Trials: presses with events of both cameras in the trial window.
+    /// Trials: presses that both cameras saw, with background. One without any event is a trial without a detection.
     pub trials: u32,
     /// Presses in the study without a usable trial or background.
     pub unusable: u32,
-    /// Background time looked at, s.
+    /// Trials shorter than 0.85 s to either side, because a neighbouring press or the end of what was kept cut them.
+    pub shortened: u32,
+    /// Longest time before and after the contact that every trial covers, ms.
+    pub covered_ms: (f64, f64),
+    /// True when counts are smoothed as if nothing happened beyond the ends of a trial (public code), false when the
+    /// kernel is renormalised there.
+    pub zero_padded: bool,
+    /// A detector that runs live knows an onset this much after its reported time, ms: it has to wait for the rest of
+    /// the run of bins and for half the kernel.
+    pub decision_delay_ms: f64,
+    /// Background time looked at, s: the sum of the background windows of the trials.
     pub background_s: f64,
     /// Median background rate of both cameras, events per second.
     pub background_rate_per_s: f64,
-    /// One row per threshold tried, ascending.
+    /// One row per threshold tried, ascending; empty without trials.
     pub sweep: Vec<ThresholdRow>,
     /// Index of the threshold chosen in `sweep`; `None` when nothing was detected at any.
     pub chosen: Option<u32>,
@@ -26,12 +53,15 @@ pub struct Latency {
     pub detected_rate: Estimate,
     /// Width of the 5-95 % interval of the onsets that count, ms.
     pub width_ms: Estimate,
-    /// Median onset after the measured contact, ms.
+    /// Median onset after the contact (measured or scheduled), ms.
     pub median_ms: Estimate,
     /// False alarms per second of background, with a cool-down of one width.
     pub false_alarms_per_s: Estimate,
-    /// Onsets against the hardware-timestamped contact; `None` when the contact times come from a schedule.
+    /// Onsets against the hardware-timestamped contact; `None` when contact times come from a schedule or a camera's
+    /// clock was aligned by the very events whose latency is asked for.
     pub from_contact: Option<ContactLatency>,
+    /// The same detector on thinned events.
+    pub reduced: Option<ReducedLatency>,
     /// Event rate of both cameras about the contact: percentiles over trials.
     pub course: LatencyCourse,
     /// (press, onset after contact in ms or `None` when not detected) at the chosen threshold.
@@ -58,24 +88,45 @@ pub struct ThresholdRow {
 /// Latency from the contact that the hardware timestamped.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ContactLatency {
-    /// 5th percentile of the onsets at or after contact, ms.
+    /// 5th percentile of the onsets that are not before the contact, ms.
     pub p5_ms: Estimate,
     /// Median, ms.
     pub median_ms: Estimate,
     /// 95th percentile, ms.
     pub p95_ms: Estimate,
-    /// Onsets before the contact: false alarms by definition, not part of the percentiles.
+    /// Onsets further before the contact than half the kernel reaches: false alarms by definition, not part of the
+    /// percentiles.
     pub before_contact: u32,
     /// Trials never detected: beyond every percentile, not part of them.
     pub missed: u32,
-    /// Standard uncertainty of one latency, ms: the parts below in quadrature.
+    /// Standard uncertainty of one latency, ms: the parts below in quadrature. Not in it: where the surface is, which
+    /// shifts all contacts alike (by its error over the speed of the tip).
     pub uncertainty_ms: f64,
     /// Width of a bin / sqrt(12), ms.
     pub from_bins_ms: f64,
-    /// Residual of the clock fits (the worse camera), ms.
+    /// RMS residual of the clock fits (the worse camera) and half width of the marks / sqrt(3), in quadrature, ms.
     pub from_clocks_ms: f64,
     /// Resolution of the measured contact: one interval of the pose samples / sqrt(12), ms; 0 when not known.
     pub from_contact_ms: f64,
+}
+
+/// Detection on thinned events, with the public code's thresholds and target for reduced data.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct ReducedLatency {
+    /// k: of the n events of a trial, and of a background, round(n / k) are kept (public code).
+    pub factor: u32,
+    /// Thresholds tried: first, last and how many (public code: 3 to 8, 6).
+    pub thresholds: (f64, f64, u32),
+    /// Share of trials that the threshold chosen should detect (public code: 0.85).
+    pub target_rate: f64,
+    /// The threshold chosen; `None` when nothing was detected at any.
+    pub threshold: Option<f64>,
+    /// Share of trials detected within the window of the median onset.
+    pub detected_rate: Estimate,
+    /// Width of the 5-95 % interval of the onsets that count, ms.
+    pub width_ms: Estimate,
+    /// False alarms per second of background, with a cool-down of one width.
+    pub false_alarms_per_s: Estimate,
 }
 
 /// Percentiles of the smoothed event rate over trials, contact at 0.
@@ -85,8 +136,9 @@ pub struct LatencyCourse {
     pub start_ms: f64,
     /// Width of a bin, ms (wider than the detector's, for drawing).
     pub bin_ms: f64,
-    /// 5th, 50th and 95th percentile of the trials in each bin, events per second of both cameras.
+    /// 5th, 50th and 95th percentile of the trials in each bin, events per second of both cameras. Bins that less than
+    /// half of the trials cover are left out.
     pub press_per_s: [Vec<f32>; 3],
-    /// 5th, 50th and 95th percentile of the background, events per second of both cameras.
+    /// 5th, 50th and 95th percentile of the background over all its bins, events per second of both cameras.
     pub background_per_s: [f32; 3],
 }

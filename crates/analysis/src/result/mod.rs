@@ -10,7 +10,9 @@ mod reference;
 pub use audit::{Fault, Finding, Law};
 pub use calibration::{CalibrationResult, ModelComparison, ThresholdChoice};
 pub use coverage::{Activity, BitRates, Cmre, Coverage};
-pub use latency::{ContactLatency, Latency, LatencyCourse, ThresholdRow};
+pub use latency::{
+    ContactLatency, ContactTiming, Latency, LatencyCourse, ReducedLatency, ThresholdRow,
+};
 pub use reduction::{Reduction, ReductionCurve, ReductionRow, Thinning};
 pub use reference::{ReferenceCode, ReferenceReduction};
 
@@ -38,6 +40,8 @@ pub struct Analysis {
     pub counts: PressCounts,
     /// Clock fits, camera 1 and camera 2; `None` where no alignment was possible.
     pub clocks: [Option<ClockFit>; 2],
+    /// How the contacts were timed.
+    pub contact_timing: ContactTiming,
     /// The calibration, when there was one.
     pub calibration: Option<CalibrationResult>,
     /// Metrics over the scored presses that are valid and not excluded.

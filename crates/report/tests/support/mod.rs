@@ -116,6 +116,7 @@ pub fn analysis(side: u32, repetitions: u32) -> Analysis {
         .collect();
     Analysis {
         version: ANALYSIS_VERSION,
+        contact_timing: Default::default(),
         settings: AnalysisSettings::default(),
         rig: RigGeometry { outline, nominal: geometry, trigger_channel: Some(0) },
         geometry,
