@@ -1,9 +1,12 @@
 //! The keys of `analysis` as settings of the analysis.
 
-use skinrig_model::{AnalysisSettings, CalibrationModel, CentroidRule};
+use skinrig_model::{
+    AnalysisSettings, Background, CalibrationModel, CentroidRule, CmreSettings, LatencySettings,
+    LensKind, ReductionSettings, ThresholdRule, WindowAnchor,
+};
 
 use crate::diagnostic::Collector;
-use crate::shape::Field;
+use crate::shape::{Field, Value};
 
 /// The settings that `f`, a mapping of the table `analysis`, stands for.
 pub(crate) fn analysis(f: &Field, out: &mut Collector) -> Option<AnalysisSettings> {
@@ -41,10 +44,19 @@ pub(crate) fn analysis(f: &Field, out: &mut Collector) -> Option<AnalysisSetting
             "all_clusters" => CentroidRule::AllClusters,
             _ => CentroidRule::LargestCluster,
         },
+        window_anchor: match f.word("window_anchor")? {
+            "middle" => WindowAnchor::Middle,
+            _ => WindowAnchor::Touch,
+        },
+        cluster_threshold: match f.word("cluster_threshold")? {
+            "fixed" => ThresholdRule::Fixed,
+            _ => ThresholdRule::Calibrated,
+        },
         min_cluster_events: f.count("min_cluster_events")?,
         min_response_sigma: f.number("min_response_sigma")?,
         min_ray_sine: f.number("min_ray_sine")?,
         exclude_outside: f.flag("exclude_outside")?,
+        exclude_presses: presses(f.get("exclude_presses")?)?,
         calibration: match f.word("calibration")? {
             "none" => CalibrationModel::None,
             "positions" => CalibrationModel::Positions,
@@ -53,10 +65,72 @@ pub(crate) fn analysis(f: &Field, out: &mut Collector) -> Option<AnalysisSetting
             "full_scale" => CalibrationModel::FullScale,
             _ => CalibrationModel::Auto,
         },
+        lens: match f.word("lens")? {
+            "equidistant" => LensKind::Equidistant,
+            "rectilinear" => LensKind::Rectilinear,
+            "stereographic" => LensKind::Stereographic,
+            "equisolid" => LensKind::Equisolid,
+            _ => LensKind::Exponential,
+        },
+        failure_penalty_mm: f.quantity("failure_penalty"),
+        within_mm: f.quantity("within")?,
+        bits_per_event: f.number("bits_per_event")?,
+        study_presses: f.count("study_presses")?,
+        reduction: reduction(f.get("reduction")?)?,
+        latency: latency(f.get("latency")?, out)?,
+        cmre: cmre(f.get("cmre")?)?,
         bootstrap_resamples: f.count("bootstrap_resamples")?,
         seed: f.whole("seed")?.unsigned_abs(),
         rate_bin_ms: milliseconds(f.quantity("rate_bin")?),
-        ..AnalysisSettings::default()
+    })
+}
+
+fn presses(f: &Field) -> Option<Vec<u32>> {
+    let number = |item: &Field| match item.value {
+        Value::Whole(n) => u32::try_from(n).ok(),
+        _ => None,
+    };
+    f.items().iter().map(number).collect()
+}
+
+fn reduction(f: &Field) -> Option<ReductionSettings> {
+    Some(ReductionSettings {
+        max_power: f.count("max_power")?,
+        seeds: f.count("seeds")?,
+        min_samples: f.count("min_samples")?,
+    })
+}
+
+fn latency(f: &Field, out: &mut Collector) -> Option<LatencySettings> {
+    let grid = f.get("thresholds")?;
+    let (from, to) = (grid.number("from")?, grid.number("to")?);
+    if from > to {
+        out.error(grid.span, grid.path.as_str(), "no thresholds are left")
+            .expected("the first threshold at or below the last")
+            .found(format!("{from} to {to}"));
+        return None;
+    }
+    Some(LatencySettings {
+        bin_ms: milliseconds(f.quantity("bin")?),
+        sigma_ms: milliseconds(f.quantity("sigma")?),
+        alpha: f.number("alpha")?,
+        consecutive: f.count("consecutive")?,
+        threshold_range: (from, to),
+        thresholds: grid.count("count")?,
+        target_rate: f.number("target_rate")?,
+        window_ms: milliseconds(f.quantity("window")?),
+        background: match f.word("background")? {
+            "after" => Background::After,
+            _ => Background::Before,
+        },
+    })
+}
+
+fn cmre(f: &Field) -> Option<CmreSettings> {
+    Some(CmreSettings {
+        cell_mm: f.quantity("cell")?,
+        sigma_mm: f.quantity("sigma")?,
+        region_mm: f.quantity("region")?,
     })
 }
 

@@ -1,13 +1,15 @@
 //! Every key of a protocol: name, meaning, form, range, default. The reader and the JSON Schema follow this table.
 
+mod analysis;
 mod frame;
 mod path;
 mod run;
 pub(crate) mod schedule;
 
+pub(crate) use analysis::ANALYSIS;
 pub(crate) use frame::{OUTLINE, OUTLINES};
 pub(crate) use path::UNITS;
-pub(crate) use run::{ANALYSIS, EVALUATION};
+pub(crate) use run::EVALUATION;
 
 use crate::quantity::Dimension::{Length, Speed, Time};
 use crate::shape::{Key, Need, Range, Shape, Table, Word};

@@ -1,10 +1,10 @@
-//! Keys of motion, limits, triggers, evaluation, analysis and cameras.
+//! Keys of motion, limits, triggers, evaluation and cameras.
 
 use super::{
-    DEPTH, PACE, POSITION, POSITIVE_LENGTH, POSITIVE_SPAN, SEED, SPAN, SPEED, count, default,
-    optional, required,
+    DEPTH, PACE, POSITION, POSITIVE_LENGTH, POSITIVE_SPAN, SPAN, SPEED, count, default, optional,
+    required,
 };
-use crate::quantity::Dimension::{Force, Length, Pixels, Time};
+use crate::quantity::Dimension::{Force, Length};
 use crate::shape::{Range, Shape, Table, Word};
 
 pub(crate) static MOTION: Table = Table {
@@ -153,141 +153,6 @@ pub(crate) static EVALUATION: Table = Table {
     ],
     exactly_one: &[],
 };
-
-pub(crate) const ROW: Shape = Shape::Quantity(&[Pixels], Range::between(0.0, 479.0));
-pub(crate) static ROW_ITEM: Shape = ROW;
-pub(crate) const ROWS: Shape = Shape::Tuple(&ROW_ITEM, &["first", "last"]);
-
-/// Settings of an analysis, in protocols and in schedules.
-pub(crate) static ANALYSIS: Table = Table {
-    name: "analysis",
-    doc: "Settings of the analysis; every key is optional.",
-    keys: &[
-        default(
-            "crop",
-            Shape::Map(&CROP),
-            "{}",
-            "Rows of each camera that are kept, both ends included.",
-        ),
-        default(
-            "window_before",
-            SPAN,
-            "50 ms",
-            "The press window begins this long before the measured contact.",
-        ),
-        default(
-            "window_after",
-            SPAN,
-            "50 ms",
-            "The press window ends this long after the measured release.",
-        ),
-        default(
-            "eps",
-            Shape::Quantity(&[Pixels], Range::above_zero(640.0)),
-            "10 px",
-            "Neighbourhood radius of DBSCAN.",
-        ),
-        default(
-            "min_samples",
-            count(1, 1_000_000),
-            "10",
-            "Core threshold of DBSCAN, events.",
-        ),
-        default(
-            "centroid",
-            Shape::Choice(CENTROIDS),
-            "largest_cluster",
-            "Which clustered events make the centroid of a press.",
-        ),
-        default(
-            "min_cluster_events",
-            count(0, 1_000_000),
-            "20",
-            "A press with fewer clustered events than this in either camera is excluded; 0 turns the rule off.",
-        ),
-        default(
-            "min_response_sigma",
-            Shape::Number(Range::from_zero(1000.0)),
-            "5",
-            "A press with fewer events than the idle rate predicts plus this many standard errors, in either camera, is excluded; 0 turns the rule off.",
-        ),
-        default(
-            "min_ray_sine",
-            Shape::Number(Range::from_zero(1.0)),
-            "0.05",
-            "A press whose rays meet at less than this sine is excluded as nearly parallel.",
-        ),
-        default(
-            "exclude_outside",
-            Shape::Flag,
-            "true",
-            "Leave estimates outside the outline out of the headline metrics; they are always counted.",
-        ),
-        default(
-            "calibration",
-            Shape::Choice(CALIBRATIONS),
-            "auto",
-            "Which parameters of the camera geometry are calibrated.",
-        ),
-        default(
-            "bootstrap_resamples",
-            count(1, 1_000_000),
-            "2000",
-            "Resamples of the bootstrap over locations.",
-        ),
-        default("seed", SEED, "1", "Seed of the bootstrap."),
-        default(
-            "rate_bin",
-            Shape::Quantity(&[Time], Range::above_zero(60.0)),
-            "10 ms",
-            "Width of the event-rate bins.",
-        ),
-    ],
-    exactly_one: &[],
-};
-
-pub(crate) static CROP: Table = Table {
-    name: "crop",
-    doc: "Rows that are kept, both ends included.",
-    keys: &[
-        default(
-            "camera1",
-            ROWS,
-            "[185 px, 360 px]",
-            "First and last row of camera 1.",
-        ),
-        default(
-            "camera2",
-            ROWS,
-            "[200 px, 355 px]",
-            "First and last row of camera 2.",
-        ),
-    ],
-    exactly_one: &[],
-};
-
-pub(crate) const CENTROIDS: &[Word] = &[
-    ("largest_cluster", "the largest cluster, as the paper says"),
-    (
-        "all_clusters",
-        "all events that are not noise, as the public code does",
-    ),
-];
-
-pub(crate) const CALIBRATIONS: &[Word] = &[
-    ("none", "use the nominal geometry as it is"),
-    ("positions", "both positions: 4 parameters"),
-    ("positions_skews", "positions and skews: 6 parameters"),
-    ("full", "positions, skews and distortions: the paper's 8"),
-    (
-        "full_scale",
-        "the 8 and a scale of the field of view per camera: 10",
-    ),
-    (
-        "auto",
-        "the smallest of them whose cross-validated error is within one standard error of the best",
-    ),
-];
 
 pub(crate) static CAMERAS: Table = Table {
     name: "cameras",

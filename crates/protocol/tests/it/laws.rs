@@ -29,12 +29,50 @@ fn absent_settings_are_the_documented_defaults() {
         "analysis.min_ray_sine=0.1",
         "analysis.exclude_outside=false",
         "analysis.calibration=positions_skews",
+        "analysis.window_anchor=middle",
+        "analysis.cluster_threshold=fixed",
+        "analysis.exclude_presses=[4, 17]",
+        "analysis.lens=stereographic",
+        "analysis.failure_penalty=30 mm",
+        "analysis.within=2.5 mm",
+        "analysis.bits_per_event=32",
+        "analysis.study_presses=7",
+        "analysis.reduction.max_power=3",
+        "analysis.reduction.seeds=4",
+        "analysis.reduction.min_samples=1",
+        "analysis.latency.bin=0.5 ms",
+        "analysis.latency.sigma=0.7 ms",
+        "analysis.latency.alpha=5",
+        "analysis.latency.consecutive=4",
+        "analysis.latency.thresholds.from=17",
+        "analysis.latency.thresholds.to=19",
+        "analysis.latency.thresholds.count=3",
+        "analysis.latency.target_rate=0.85",
+        "analysis.latency.window=20 ms",
+        "analysis.latency.background=after",
+        "analysis.cmre.cell=4 mm",
+        "analysis.cmre.sigma=2 mm",
+        "analysis.cmre.region=80 mm",
         "analysis.bootstrap_resamples=10",
         "analysis.seed=9",
         "analysis.rate_bin=20 ms",
     ])
     .analysis;
     insta::assert_debug_snapshot!("analysis", changed);
+}
+
+#[test]
+fn thresholds_run_upwards() {
+    let error = parse(
+        &shipped("demo.yaml"),
+        &["analysis.latency.thresholds.from=30"],
+    )
+    .unwrap_err();
+    assert!(
+        error.to_string().contains("no thresholds are left"),
+        "{error}"
+    );
+    assert!(error.to_string().contains("30 to 20"), "{error}");
 }
 
 #[test]

@@ -1,0 +1,378 @@
+//! Keys of the analysis, in protocols and in schedules.
+
+use super::{POSITIVE_LENGTH, SEED, SPAN, count, default, optional};
+use crate::quantity::Dimension::{Length, Pixels, Time};
+use crate::shape::{Range, Shape, Table, Word};
+
+pub(crate) const ROW: Shape = Shape::Quantity(&[Pixels], Range::between(0.0, 479.0));
+pub(crate) static ROW_ITEM: Shape = ROW;
+pub(crate) const ROWS: Shape = Shape::Tuple(&ROW_ITEM, &["first", "last"]);
+
+/// Settings of an analysis, in protocols and in schedules.
+pub(crate) static ANALYSIS: Table = Table {
+    name: "analysis",
+    doc: "Settings of the analysis; every key is optional.",
+    keys: &[
+        default(
+            "crop",
+            Shape::Map(&CROP),
+            "{}",
+            "Rows of each camera that are kept, both ends included.",
+        ),
+        default(
+            "window_before",
+            SPAN,
+            "50 ms",
+            "The press window begins this long before the measured contact.",
+        ),
+        default(
+            "window_after",
+            SPAN,
+            "50 ms",
+            "The press window ends this long after the measured release.",
+        ),
+        default(
+            "eps",
+            Shape::Quantity(&[Pixels], Range::above_zero(640.0)),
+            "10 px",
+            "Neighbourhood radius of DBSCAN.",
+        ),
+        default(
+            "min_samples",
+            count(1, 1_000_000),
+            "10",
+            "Core threshold of DBSCAN, events.",
+        ),
+        default(
+            "centroid",
+            Shape::Choice(CENTROIDS),
+            "largest_cluster",
+            "Which clustered events make the centroid of a press.",
+        ),
+        default(
+            "window_anchor",
+            Shape::Choice(ANCHORS),
+            "touch",
+            "Where the press window is anchored.",
+        ),
+        default(
+            "cluster_threshold",
+            Shape::Choice(THRESHOLDS),
+            "calibrated",
+            "How the least number of clustered events of a press is found.",
+        ),
+        default(
+            "min_cluster_events",
+            count(0, 1_000_000),
+            "20",
+            "A press with fewer clustered events than this in either camera is excluded; the least value of a calibrated threshold; 0 turns a fixed rule off.",
+        ),
+        default(
+            "exclude_presses",
+            Shape::List {
+                of: &PRESS,
+                min: 0,
+                max: 100_000,
+            },
+            "[]",
+            "Presses left out by hand, by their number in the report (from 0, sync presses counted).",
+        ),
+        default(
+            "min_response_sigma",
+            Shape::Number(Range::from_zero(1000.0)),
+            "5",
+            "A press with fewer events than the idle rate predicts plus this many standard errors, in either camera, is excluded; 0 turns the rule off.",
+        ),
+        default(
+            "min_ray_sine",
+            Shape::Number(Range::from_zero(1.0)),
+            "0.05",
+            "A press whose rays meet at less than this sine is excluded as nearly parallel.",
+        ),
+        default(
+            "exclude_outside",
+            Shape::Flag,
+            "true",
+            "Leave estimates outside the outline out of the headline metrics; they are always counted.",
+        ),
+        default(
+            "calibration",
+            Shape::Choice(CALIBRATIONS),
+            "auto",
+            "Which parameters of the camera geometry are calibrated.",
+        ),
+        default(
+            "lens",
+            Shape::Choice(LENSES),
+            "exponential",
+            "The lens that is calibrated: how the distance of a column from the middle becomes an angle.",
+        ),
+        optional(
+            "failure_penalty",
+            POSITIVE_LENGTH,
+            "The error that a failed press counts in the penalised RMSE; when absent the RMS distance of the scored presses from their mean: the error of an answer that knows nothing.",
+        ),
+        default(
+            "within",
+            POSITIVE_LENGTH,
+            "5 mm",
+            "Error up to which a press counts as within.",
+        ),
+        default(
+            "bits_per_event",
+            Shape::Number(Range::above_zero(1024.0)),
+            "21",
+            "Bits per event in the data rates; the paper's 21.",
+        ),
+        default(
+            "study_presses",
+            count(0, 100_000),
+            "300",
+            "Most scored presses whose events are kept for the studies of data reduction and latency, chosen at random; 0 leaves the studies out.",
+        ),
+        default(
+            "reduction",
+            Shape::Map(&REDUCTION),
+            "{}",
+            "The data-reduction study.",
+        ),
+        default(
+            "latency",
+            Shape::Map(&LATENCY),
+            "{}",
+            "The detection-latency study.",
+        ),
+        default(
+            "cmre",
+            Shape::Map(&CMRE),
+            "{}",
+            "The contact map reconstruction error; none of its values is published.",
+        ),
+        default(
+            "bootstrap_resamples",
+            count(1, 1_000_000),
+            "2000",
+            "Resamples of the bootstrap over locations.",
+        ),
+        default("seed", SEED, "1", "Seed of the bootstrap."),
+        default(
+            "rate_bin",
+            Shape::Quantity(&[Time], Range::above_zero(60.0)),
+            "10 ms",
+            "Width of the event-rate bins.",
+        ),
+    ],
+    exactly_one: &[],
+};
+
+pub(crate) static CROP: Table = Table {
+    name: "crop",
+    doc: "Rows that are kept, both ends included.",
+    keys: &[
+        default(
+            "camera1",
+            ROWS,
+            "[185 px, 360 px]",
+            "First and last row of camera 1.",
+        ),
+        default(
+            "camera2",
+            ROWS,
+            "[200 px, 355 px]",
+            "First and last row of camera 2.",
+        ),
+    ],
+    exactly_one: &[],
+};
+
+pub(crate) const CENTROIDS: &[Word] = &[
+    ("largest_cluster", "the largest cluster, as the paper says"),
+    (
+        "all_clusters",
+        "all events that are not noise, as the public code does",
+    ),
+];
+
+pub(crate) const CALIBRATIONS: &[Word] = &[
+    ("none", "use the nominal geometry as it is"),
+    ("positions", "both positions: 4 parameters"),
+    ("positions_skews", "positions and skews: 6 parameters"),
+    ("full", "positions, skews and distortions: the paper's 8"),
+    (
+        "full_scale",
+        "the 8 and a scale of the field of view per camera: 10",
+    ),
+    (
+        "auto",
+        "the smallest of them whose cross-validated error is within one standard error of the best",
+    ),
+];
+
+pub(crate) static PRESS: Shape = count(0, 10_000_000);
+
+pub(crate) const ANCHORS: &[Word] = &[
+    (
+        "touch",
+        "from before the measured contact to after the measured release",
+    ),
+    (
+        "middle",
+        "about the middle between contact and release, as the public code does",
+    ),
+];
+
+pub(crate) const THRESHOLDS: &[Word] = &[
+    ("calibrated", "chosen on the calibrating presses alone"),
+    ("fixed", "min_cluster_events as it is"),
+];
+
+pub(crate) const LENSES: &[Word] = &[
+    (
+        "exponential",
+        "the paper's: equidistant with an exponential falloff",
+    ),
+    ("equidistant", "angle proportional to distance (f-theta)"),
+    ("rectilinear", "pinhole"),
+    (
+        "stereographic",
+        "tangent of half the angle proportional to distance",
+    ),
+    (
+        "equisolid",
+        "sine of half the angle proportional to distance",
+    ),
+];
+
+pub(crate) static REDUCTION: Table = Table {
+    name: "reduction",
+    doc: "Localisation on thinned events.",
+    keys: &[
+        default(
+            "max_power",
+            count(0, 20),
+            "12",
+            "Thinning factors 1, 2, 4 ... up to 2 to this power; the paper's 10.",
+        ),
+        default(
+            "seeds",
+            count(1, 1000),
+            "10",
+            "Random seeds per factor and kind of thinning.",
+        ),
+        default(
+            "min_samples",
+            count(0, 1_000_000),
+            "0",
+            "Core threshold of DBSCAN at all factors; 0 takes that of the analysis. The public code: 1.",
+        ),
+    ],
+    exactly_one: &[],
+};
+
+pub(crate) static LATENCY: Table = Table {
+    name: "latency",
+    doc: "A one-sided CUSUM on the binned, smoothed event counts of both cameras.",
+    keys: &[
+        default(
+            "bin",
+            Shape::Quantity(&[Time], Range::between(1e-5, 0.01)),
+            "0.2 ms",
+            "Width of a bin.",
+        ),
+        default(
+            "sigma",
+            Shape::Quantity(&[Time], Range::from_zero(0.05)),
+            "0.5 ms",
+            "Standard deviation of the Gaussian kernel.",
+        ),
+        default(
+            "alpha",
+            Shape::Number(Range::between(1.01, 1000.0)),
+            "4",
+            "Rate increase that the detector is tuned to.",
+        ),
+        default(
+            "consecutive",
+            count(1, 1000),
+            "3",
+            "Bins in a row above the threshold.",
+        ),
+        default(
+            "thresholds",
+            Shape::Map(&GRID),
+            "{}",
+            "The thresholds h that are tried.",
+        ),
+        default(
+            "target_rate",
+            Shape::Number(Range::from_zero(1.0)),
+            "0.95",
+            "The threshold with the fewest false alarms is chosen among those that detect at least this share.",
+        ),
+        default(
+            "window",
+            Shape::Quantity(&[Time], Range::above_zero(10.0)),
+            "100 ms",
+            "A detection counts when it lies within this of the median onset.",
+        ),
+        default(
+            "background",
+            Shape::Choice(BACKGROUNDS),
+            "before",
+            "Where the background rate is taken from.",
+        ),
+    ],
+    exactly_one: &[],
+};
+
+pub(crate) static GRID: Table = Table {
+    name: "thresholds",
+    doc: "Evenly spaced thresholds, both ends included.",
+    keys: &[
+        default(
+            "from",
+            Shape::Number(Range::above_zero(1e6)),
+            "1",
+            "The first.",
+        ),
+        default(
+            "to",
+            Shape::Number(Range::above_zero(1e6)),
+            "20",
+            "The last.",
+        ),
+        default("count", count(1, 1000), "20", "How many."),
+    ],
+    exactly_one: &[],
+};
+
+pub(crate) const BACKGROUNDS: &[Word] = &[
+    ("before", "idle time before the press, as the paper says"),
+    ("after", "after the press, as the public code does"),
+];
+
+pub(crate) static CMRE: Table = Table {
+    name: "cmre",
+    doc: "Parameters of the contact map reconstruction error; none of them is published.",
+    keys: &[
+        default(
+            "cell",
+            Shape::Quantity(&[Length], Range::between(0.5, 100.0)),
+            "5 mm",
+            "Side of a square cell.",
+        ),
+        default(
+            "sigma",
+            POSITIVE_LENGTH,
+            "1 mm",
+            "Standard deviation of the estimate's Gaussian.",
+        ),
+        default(
+            "region",
+            POSITIVE_LENGTH,
+            "100 mm",
+            "Side of the sensing region in the weights (SR in the public code).",
+        ),
+    ],
+    exactly_one: &[],
+};
