@@ -202,6 +202,12 @@ pub(crate) fn root_mean_square(values: &mut [f64]) -> Option<f64> {
     (!values.is_empty()).then(|| (squares / values.len() as f64).sqrt())
 }
 
+/// The arithmetic mean; `None` without values.
+pub(crate) fn mean(values: &mut [f64]) -> Option<f64> {
+    let sum: f64 = values.iter().sum();
+    (!values.is_empty()).then(|| sum / values.len() as f64)
+}
+
 /// `statistic` of all values, with the percentile interval of a bootstrap that draws whole locations. Each value comes
 /// with its location, in any order; `statistic` may reorder what it gets.
 pub(crate) fn bootstrap_over_locations(

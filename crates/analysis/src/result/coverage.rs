@@ -12,16 +12,18 @@ pub struct Coverage {
     pub skin_mm2: f64,
     /// Area of the outline in the field of view of both cameras, mm².
     pub seen_by_both_mm2: f64,
-    /// Area that the locations stand for, mm²: the union of one cell per location, clipped to the outline.
-    pub probed_mm2: f64,
+    /// Area that the locations stand for, mm²: the union of one cell per location, clipped to the outline; `None` with
+    /// fewer than two locations.
+    pub probed_mm2: Option<f64>,
     /// Side of a cell, mm: the median distance of a location from its nearest neighbour.
     pub cell_mm: Option<f64>,
-    /// Locations probed.
+    /// Locations probed: with a scored press that was attempted.
     pub locations: u32,
-    /// The field of view of each camera within the outline, as a polygon, mm.
-    pub views: [Vec<Point2>; 2],
-    /// Their overlap.
-    pub overlap: Vec<Point2>,
+    /// The field of view of each camera within the outline, mm: convex polygons that touch but do not overlap, one as
+    /// long as a field of view spans less than 180°.
+    pub views: [Vec<Vec<Point2>>; 2],
+    /// Their overlap, in the same form.
+    pub overlap: Vec<Vec<Point2>>,
     /// Circles of radius RMSE that fill the skin's area: area / (pi RMSE²).
     pub taxels_skin: Estimate,
     /// The same over the probed area. Only there was the RMSE measured.

@@ -50,7 +50,7 @@ pub struct ReductionRow {
     pub factor: u32,
     /// Mean events per press and camera that are left.
     pub events_per_view: f64,
-    /// RMSE of the located presses, mm.
+    /// RMSE of the located presses, mm; its n: presses that at least one seed locates.
     pub rmse_mm: Estimate,
     /// Lowest and highest RMSE of a single seed, mm.
     pub rmse_of_seeds_mm: Option<(f64, f64)>,
@@ -58,10 +58,10 @@ pub struct ReductionRow {
     pub pass_rate: Estimate,
     /// Share of all presses within `within_mm`.
     pub within_rate: Estimate,
-    /// Share of all presses with an estimate.
+    /// Share of all presses that are located: an estimate that no location rule of the settings excludes.
     pub located_rate: Estimate,
     /// Bytes per second of both cameras during a press, at the stated bits per event.
     pub press_bytes_per_s: f64,
-    /// And while idle.
-    pub idle_bytes_per_s: f64,
+    /// And while idle; `None` when no press has idle time before it.
+    pub idle_bytes_per_s: Option<f64>,
 }
