@@ -14,11 +14,11 @@
 //! Distances are compared squared (`dx² + dy² <= eps * eps`), as scikit-learn's trees do.
 
 use crate::grid::PixelGrid;
+use crate::pixels::PixelSet;
 
 /// The label of events that belong to no cluster.
 pub const NOISE: u32 = u32::MAX;
 
-const NO_CORE: u16 = u16::MAX;
 const WIDTH: usize = PixelGrid::WIDTH;
 
 /// One cluster.
@@ -56,7 +56,6 @@ impl Cluster {
 /// Core pixels of one row with gaps of at most eps: always one cluster.
 #[derive(Debug, Clone, Copy)]
 struct Run {
-    row: usize,
     /// Range in `core_columns`.
     from: usize,
     to: usize,
@@ -74,13 +73,12 @@ pub struct Dbscan {
     /// Start of each row in `pixels`, one more than there are rows.
     row_start: Vec<usize>,
     prefix: Vec<u32>,
-    core: Vec<bool>,
+    core: PixelSet,
     core_columns: Vec<u16>,
     runs: Vec<Run>,
     run_start: Vec<usize>,
     parent: Vec<u32>,
     run_label: Vec<u32>,
-    nearest: Vec<u16>,
     labels: Vec<u32>,
     clusters: Vec<Cluster>,
 }
@@ -101,13 +99,12 @@ impl Dbscan {
             pixels: Vec::new(),
             row_start: Vec::new(),
             prefix: Vec::new(),
-            core: Vec::new(),
+            core: PixelSet::default(),
             core_columns: Vec::new(),
             runs: Vec::new(),
             run_start: Vec::new(),
             parent: Vec::new(),
             run_label: Vec::new(),
-            nearest: Vec::new(),
             labels: Vec::new(),
             clusters: Vec::new(),
         }
@@ -195,7 +192,7 @@ impl Dbscan {
 
     fn find_core(&mut self, grid: &PixelGrid) {
         let height = grid.height();
-        self.core.clear();
+        self.core.reset(height);
         for &pixel in &self.pixels {
             let (x, y) = (pixel as usize % WIDTH, pixel as usize / WIDTH);
             let in_row = |row: usize, half: usize| {
@@ -221,7 +218,9 @@ impl Dbscan {
                     }
                 }
             }
-            self.core.push(sum >= self.min_samples);
+            if sum >= self.min_samples {
+                self.core.insert(pixel as usize);
+            }
         }
     }
 
@@ -233,11 +232,8 @@ impl Dbscan {
         for row in 0..height {
             self.run_start.push(self.runs.len());
             let fresh = self.runs.len();
-            for i in self.row_start[row]..self.row_start[row + 1] {
-                if !self.core[i] {
-                    continue;
-                }
-                let x = (self.pixels[i] as usize % WIDTH) as u16;
+            for x in self.core.columns(row) {
+                let x = x as u16;
                 let at = self.core_columns.len();
                 self.core_columns.push(x);
                 match self.runs[fresh..].last_mut() {
@@ -246,7 +242,6 @@ impl Dbscan {
                         run.to = at + 1;
                     }
                     _ => self.runs.push(Run {
-                        row,
                         from: at,
                         to: at + 1,
                         first: x,
@@ -262,27 +257,34 @@ impl Dbscan {
         self.parent.clear();
         self.parent.extend(0..self.runs.len() as u32);
         let height = self.run_start.len() - 1;
-        for a in 0..self.runs.len() {
+        for row in 0..height {
+            // Near rows first: what they join need not be looked at again.
+            for dy in 1..self.half.len().min(height - row) {
+                self.join_rows(row, row + dy, self.half[dy] as u16);
+            }
+        }
+    }
+
+    /// Joins the runs of two rows that have core pixels at most `half` columns apart.
+    fn join_rows(&mut self, row: usize, below: usize, half: u16) {
+        let others = self.run_start[below]..self.run_start[below + 1];
+        let mut skip = others.start;
+        for a in self.run_start[row]..self.run_start[row + 1] {
             let run = self.runs[a];
-            for dy in 1..self.half.len() {
-                let row = run.row + dy;
-                if row >= height {
+            while skip < others.end && self.runs[skip].last + half < run.first {
+                skip += 1;
+            }
+            let mut ra = find(&mut self.parent, a);
+            for b in skip..others.end {
+                let other = self.runs[b];
+                if other.first > run.last + half {
                     break;
                 }
-                let half = self.half[dy] as u16;
-                let others = self.run_start[row]..self.run_start[row + 1];
-                let skip = self.runs[others.clone()]
-                    .partition_point(|b| b.last.saturating_add(half) < run.first);
-                for b in others.start + skip..others.end {
-                    let other = self.runs[b];
-                    if other.first > run.last.saturating_add(half) {
-                        break;
-                    }
-                    let (ra, rb) = (find(&mut self.parent, a), find(&mut self.parent, b));
-                    if ra != rb && self.touch(run, other, half) {
-                        // The smaller index is the root: it is the first run by row and column.
-                        self.parent[ra.max(rb)] = ra.min(rb) as u32;
-                    }
+                let rb = find(&mut self.parent, b);
+                if ra != rb && self.touch(run, other, half) {
+                    // The smaller index is the root: it is the first run by row and column.
+                    self.parent[ra.max(rb)] = ra.min(rb) as u32;
+                    ra = ra.min(rb);
                 }
             }
         }
@@ -294,15 +296,18 @@ impl Dbscan {
             &self.core_columns[a.from..a.to],
             &self.core_columns[b.from..b.to],
         );
-        let mut j = 0;
-        for &x in xs {
-            while j < ys.len() && ys[j] + half < x {
-                j += 1;
+        let (mut i, mut j) = (
+            xs.partition_point(|x| x + half < b.first),
+            ys.partition_point(|y| y + half < a.first),
+        );
+        while let (Some(x), Some(y)) = (xs.get(i), ys.get(j)) {
+            if x.abs_diff(*y) <= half {
+                return true;
             }
-            match ys.get(j) {
-                None => return false,
-                Some(&y) if y <= x + half => return true,
-                Some(_) => {}
+            if x < y {
+                i += 1;
+            } else {
+                j += 1;
             }
         }
         false
@@ -326,61 +331,50 @@ impl Dbscan {
     }
 
     fn label_pixels(&mut self, height: usize) {
-        if self.runs.is_empty() {
-            self.labels.resize(self.pixels.len(), NOISE);
-            return;
-        }
-        self.find_nearest(height);
-        let reach = self.half.len() - 1;
-        for (&pixel, &core) in self.pixels.iter().zip(&self.core) {
-            let (x, y) = (pixel as usize % WIDTH, pixel as usize / WIDTH);
-            if core {
-                self.labels.push(self.label_of_core(x as u16, y));
-                continue;
-            }
-            let mut best: Option<(usize, u16, usize)> = None;
-            for row in y.saturating_sub(reach)..=(y + reach).min(height - 1) {
-                if self.run_start[row] == self.run_start[row + 1] {
-                    continue;
+        // Core pixels come in the order of the runs.
+        let (mut core, mut run) = (0, 0);
+        for &pixel in &self.pixels {
+            let label = if self.core.contains(pixel as usize) {
+                if core == self.runs[run].to {
+                    run += 1;
                 }
-                let column = self.nearest[row * WIDTH + x];
-                let (dx, dy) = (x.abs_diff(usize::from(column)), y.abs_diff(row));
-                let distance = dx * dx + dy * dy;
-                if dx <= self.half[dy] && best.is_none_or(|(d, ..)| distance < d) {
-                    best = Some((distance, column, row));
-                }
-            }
-            let label = best.map_or(NOISE, |(_, column, row)| self.label_of_core(column, row));
+                core += 1;
+                self.run_label[run]
+            } else {
+                let (x, y) = (pixel as usize % WIDTH, pixel as usize / WIDTH);
+                self.nearest_core(x, y, height)
+                    .map_or(NOISE, |(x, y)| self.label_of_core(x, y))
+            };
             self.labels.push(label);
         }
     }
 
-    fn label_of_core(&self, x: u16, row: usize) -> u32 {
-        let range = self.run_start[row]..self.run_start[row + 1];
-        let i = self.runs[range.clone()].partition_point(|r| r.last < x);
-        self.run_label[range.start + i]
-    }
-
-    /// For each pixel of a row with core pixels, the column of the nearest of them, the left one of two.
-    fn find_nearest(&mut self, height: usize) {
-        self.nearest.resize(height * WIDTH, NO_CORE);
-        for row in 0..height {
-            let runs = &self.runs[self.run_start[row]..self.run_start[row + 1]];
-            let (Some(first), Some(last)) = (runs.first(), runs.last()) else {
-                continue;
-            };
-            let columns = &self.core_columns[first.from..last.to];
-            let nearest = &mut self.nearest[row * WIDTH..(row + 1) * WIDTH];
-            let mut from = 0;
-            for (i, &c) in columns.iter().enumerate() {
-                // Up to half way to the next core pixel, the middle included.
-                let to = columns
-                    .get(i + 1)
-                    .map_or(WIDTH, |&n| (usize::from(c) + usize::from(n)) / 2 + 1);
-                nearest[from..to].fill(c);
-                from = to;
+    /// Column and row of the core pixel nearest to a pixel and within reach, the first of equally near ones by row,
+    /// then column.
+    fn nearest_core(&self, x: usize, y: usize, height: usize) -> Option<(usize, usize)> {
+        // (distance squared, row, column)
+        let mut best: Option<(usize, usize, usize)> = None;
+        for (dy, &half) in self.half.iter().enumerate() {
+            if best.is_some_and(|(distance, ..)| dy * dy > distance) {
+                break;
+            }
+            let above = y.checked_sub(dy);
+            let below = (dy > 0).then_some(y + dy).filter(|row| *row < height);
+            for row in above.into_iter().chain(below) {
+                if let Some(column) = self.core.nearest(row, x, half) {
+                    let dx = x.abs_diff(column);
+                    let found = (dx * dx + dy * dy, row, column);
+                    best = Some(best.map_or(found, |b| b.min(found)));
+                }
             }
         }
+        best.map(|(_, row, column)| (column, row))
+    }
+
+    fn label_of_core(&self, x: usize, row: usize) -> u32 {
+        let range = self.run_start[row]..self.run_start[row + 1];
+        let i = self.runs[range.clone()].partition_point(|r| usize::from(r.last) < x);
+        self.run_label[range.start + i]
     }
 }
 

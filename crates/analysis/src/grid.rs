@@ -2,6 +2,8 @@
 
 use skinrig_model::{SENSOR_HEIGHT, SENSOR_WIDTH};
 
+use crate::pixels::PixelSet;
+
 /// Event counts per pixel: all columns, the rows of a crop.
 ///
 /// Counters are 32 bit wide and so is their sum; [`PixelGrid::add`] refuses the event that would overflow it.
@@ -9,7 +11,7 @@ use skinrig_model::{SENSOR_HEIGHT, SENSOR_WIDTH};
 pub struct PixelGrid {
     rows: (u16, u16),
     counts: Vec<u32>,
-    touched: Vec<u32>,
+    occupied: PixelSet,
     events: u32,
 }
 
@@ -25,7 +27,7 @@ impl PixelGrid {
         Self {
             rows,
             counts: vec![0; height * Self::WIDTH],
-            touched: Vec::new(),
+            occupied: PixelSet::new(height),
             events: 0,
         }
     }
@@ -58,20 +60,18 @@ impl PixelGrid {
         let Some(count) = self.counts.get_mut(index) else {
             return false;
         };
-        if *count == 0 {
-            self.touched.push(index as u32);
-        }
         *count += 1;
+        self.occupied.insert(index);
         self.events += 1;
         true
     }
 
     /// Empties the grid; costs as much as it held.
     pub fn clear(&mut self) {
-        for &index in &self.touched {
-            self.counts[index as usize] = 0;
+        for index in self.occupied.iter() {
+            self.counts[index] = 0;
         }
-        self.touched.clear();
+        self.occupied.reset(self.height());
         self.events = 0;
     }
 
@@ -79,13 +79,7 @@ impl PixelGrid {
     /// row, into `out`.
     pub fn sorted_pixels(&self, out: &mut Vec<u32>) {
         out.clear();
-        if self.touched.len() * 16 > self.counts.len() {
-            let occupied = self.counts.iter().enumerate().filter(|(_, c)| **c > 0);
-            out.extend(occupied.map(|(i, _)| i as u32));
-        } else {
-            out.extend_from_slice(&self.touched);
-            out.sort_unstable();
-        }
+        out.extend(self.occupied.iter().map(|index| index as u32));
     }
 
     /// Count of the pixel with this index.

@@ -28,6 +28,7 @@ mod keeper;
 pub mod kept;
 pub mod latency;
 pub mod metrics;
+mod pixels;
 pub mod rates;
 pub mod reduction;
 pub mod result;
