@@ -138,11 +138,14 @@ mod tests {
 
     #[test]
     fn a_window_about_the_middle_has_its_own_length() {
-        let settings = AnalysisSettings::default().with_reference_code();
+        let settings = AnalysisSettings {
+            window_anchor: WindowAnchor::Middle,
+            window_before_ms: 1500.0,
+            window_after_ms: 1400.0,
+            ..AnalysisSettings::default()
+        };
         let w = windows([(0, timing(4.0, 4.5))].into_iter(), &clock(0.0), &settings)[0];
-        let half: f64 = 0.5e6 * 868.0 / 289.0;
-        assert_eq!(w.start_us, (4.25e6 - half).ceil() as u64);
-        assert_eq!(w.end_us, (4.25e6 + half).ceil() as u64);
+        assert_eq!((w.start_us, w.end_us), (2_750_000, 5_650_000));
     }
 
     #[test]

@@ -51,7 +51,8 @@ pub enum Command {
     /// Analyse a session; write its results beside it and print them.
     #[command(
         after_help = "Examples:\n  skinrig analyze sessions/NAME.session.sqlite\n  \
-        skinrig analyze sessions/NAME.session.sqlite --set analysis.centroid=all_clusters --out other.json"
+        skinrig analyze sessions/NAME.session.sqlite --set analysis.centroid=all_clusters --out other.json\n  \
+        skinrig analyze sessions/NAME.session.sqlite --reference-code"
     )]
     Analyze(AnalyzeArgs),
 
@@ -205,6 +206,11 @@ pub struct AnalyzeArgs {
     /// Override one analysis setting of the session's protocol, for example `analysis.min_samples=5`.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub overrides: Vec<String>,
+
+    /// Make the choices of the public analysis code (docs/paper.md lists them) and report its numbers beside; `--set`
+    /// still wins.
+    #[arg(long)]
+    pub reference_code: bool,
 
     /// Where to write the results; beside the session when absent.
     #[arg(long, value_name = "FILE")]

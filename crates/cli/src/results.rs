@@ -48,11 +48,20 @@ impl Results {
     }
 }
 
+/// How to analyse a session.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Choices<'a> {
+    /// Overrides of the settings it was recorded with.
+    pub overrides: &'a [String],
+    /// Make the choices of the public code before them, and judge its way too.
+    pub reference_code: bool,
+}
+
 /// Analyses a session, with the settings it was recorded with or with others.
 ///
 /// # Errors
 /// [`Failure::input`] for files that are no readable session or settings that do not parse.
-pub fn analyze_session(path: &Path, overrides: &[String]) -> Result<Results, Failure> {
+pub fn analyze_session(path: &Path, choices: Choices<'_>) -> Result<Results, Failure> {
     let unreadable = |e: RecorderError| Failure::input(e);
     let reader = SessionReader::open(path).map_err(unreadable)?;
     let header = reader.header().map_err(unreadable)?;
@@ -63,11 +72,7 @@ pub fn analyze_session(path: &Path, overrides: &[String]) -> Result<Results, Fai
             path.display()
         ))
     })?;
-    let settings = if overrides.is_empty() {
-        document.analysis
-    } else {
-        overridden_settings(&header, overrides)?
-    };
+    let settings = settings(&header, document.analysis, choices)?;
     let input = session_input(&reader, settings, document.geometry).map_err(unreadable)?;
     let events = SessionEvents::new(path, header.stream_formats);
     let analysis = skinrig_analysis::analyze(&input, &events).map_err(Failure::input)?;
@@ -80,12 +85,14 @@ pub fn analyze_session(path: &Path, overrides: &[String]) -> Result<Results, Fai
     })
 }
 
-/// The analysis settings of the session's own protocol or schedule with more overrides.
-fn overridden_settings(
+/// The settings of the session's own protocol or schedule, with the choices.
+fn settings(
     header: &RunHeader,
-    overrides: &[String],
+    recorded: AnalysisSettings,
+    choices: Choices<'_>,
 ) -> Result<AnalysisSettings, Failure> {
-    if let Some(other) = overrides
+    if let Some(other) = choices
+        .overrides
         .iter()
         .find(|o| !o.trim_start().starts_with("analysis."))
     {
@@ -93,7 +100,14 @@ fn overridden_settings(
             "--set {other}: expected a key below `analysis.`; a recorded session's other values cannot change"
         )));
     }
-    let all: Vec<String> = header.overrides.iter().chain(overrides).cloned().collect();
+    if choices.overrides.is_empty() && !choices.reference_code {
+        return Ok(recorded);
+    }
+    let mut all = header.overrides.clone();
+    if choices.reference_code {
+        all.extend(skinrig_protocol::REFERENCE_CODE.map(str::to_owned));
+    }
+    all.extend_from_slice(choices.overrides);
     let text = header.protocol_text.as_bytes();
     let loader = |p: &Path| std::fs::read(p);
     if header.rig_kind == "imported" {
@@ -247,9 +261,22 @@ pub fn check_limit(results: &Results, max_rmse_mm: Option<f64>) -> Outcome {
 /// # Errors
 /// See [`analyze_session`], [`write_results`], [`check_limit`].
 pub fn analyze(args: &AnalyzeArgs, json: bool) -> Outcome {
-    let results = analyze_session(&args.session, &args.overrides)?;
-    let html = args.out.as_ref().map(|out| out.with_extension("html"));
-    let paths = write_results(&results, args.out.as_deref(), html.as_deref())?;
+    let choices = Choices {
+        overrides: &args.overrides,
+        reference_code: args.reference_code,
+    };
+    let results = analyze_session(&args.session, choices)?;
+    // The session's own results stay beside it.
+    let beside_own = || beside(&args.session, ".reference-code.results.json");
+    let out = args
+        .out
+        .clone()
+        .or_else(|| args.reference_code.then(beside_own));
+    let html = out.as_ref().map(|out| match args.out {
+        Some(_) => out.with_extension("html"),
+        None => beside(&args.session, ".reference-code.report.html"),
+    });
+    let paths = write_results(&results, out.as_deref(), html.as_deref())?;
     print_results(&results, json, &paths);
     check_limit(&results, args.max_rmse)
 }
@@ -259,7 +286,7 @@ pub fn analyze(args: &AnalyzeArgs, json: bool) -> Outcome {
 /// # Errors
 /// See [`analyze_session`], [`write_results`].
 pub fn report(args: &ReportArgs, json: bool) -> Outcome {
-    let results = analyze_session(&args.session, &[])?;
+    let results = analyze_session(&args.session, Choices::default())?;
     let paths = write_results(&results, None, args.out.as_deref())?;
     if json {
         crate::print_json(&serde_json::json!({ "report": paths.1, "results": paths.0 }));

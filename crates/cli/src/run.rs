@@ -244,7 +244,7 @@ pub fn conclude(
 }
 
 fn analyse(session: &Path, max_rmse_mm: Option<f64>, json: bool) -> Outcome {
-    let results = results::analyze_session(session, &[])?;
+    let results = results::analyze_session(session, results::Choices::default())?;
     let written = results::write_results(&results, None, None)?;
     results::print_results(&results, json, &written);
     results::check_limit(&results, max_rmse_mm)

@@ -262,48 +262,6 @@ impl Default for AnalysisSettings {
     }
 }
 
-impl AnalysisSettings {
-    /// Period of a press in the published recording, ms: 868 s / 289 (public code).
-    pub const PUBLISHED_PERIOD_MS: f64 = 868_000.0 / 289.0;
-
-    /// The choices of the public analysis code, each where it departs from the paper or from the defaults here
-    /// (`docs/paper.md` lists them): all clusters make the centroid, a press window is one whole period about the
-    /// middle of the press, no threshold and no response rule, data reduction with a core threshold of one event,
-    /// background after the press, thresholds 17 to 19. What `self` says about seeds and resamples stays.
-    #[must_use]
-    pub fn with_reference_code(self) -> Self {
-        Self {
-            crop_v: [(185, 360), (200, 355)],
-            window_anchor: WindowAnchor::Middle,
-            window_before_ms: Self::PUBLISHED_PERIOD_MS / 2.0,
-            window_after_ms: Self::PUBLISHED_PERIOD_MS / 2.0,
-            eps_px: 10.0,
-            min_samples: 10,
-            centroid: CentroidRule::AllClusters,
-            cluster_threshold: ThresholdRule::Fixed,
-            min_cluster_events: 0,
-            min_response_sigma: 0.0,
-            min_ray_sine: 0.0,
-            calibration: CalibrationModel::Full,
-            lens: LensKind::Exponential,
-            bits_per_event: 21.0,
-            reduction: ReductionSettings {
-                max_power: 10,
-                seeds: 10,
-                min_samples: 1,
-            },
-            latency: LatencySettings {
-                threshold_range: (17.0, 19.0),
-                thresholds: 3,
-                background: Background::After,
-                ..LatencySettings::default()
-            },
-            cmre: CmreSettings::default(),
-            ..self
-        }
-    }
-}
-
 /// What the rig looks like to an analysis: the part of `RunHeader::rig_json` that it needs.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct RigGeometry {

@@ -62,6 +62,12 @@ fn absent_settings_are_the_documented_defaults() {
 }
 
 #[test]
+fn the_public_codes_choices_can_be_selected() {
+    let settings = demo(&skinrig_protocol::REFERENCE_CODE).analysis;
+    insta::assert_debug_snapshot!("reference_code", settings);
+}
+
+#[test]
 fn thresholds_run_upwards() {
     let error = parse(
         &shipped("demo.yaml"),

@@ -1,0 +1,33 @@
+//! The choices of the public analysis code as overrides of a protocol's `analysis`.
+
+/// Overrides that select what the public code chose where it departs from the paper or from the defaults here: all
+/// clusters make the centroid, a press window is one whole period about the middle of the press, nothing is left
+/// out by a threshold, a response or an angle, the paper's eight parameters, data reduction with a core threshold of
+/// one event, the background after the press, thresholds 17 to 19. Each has its source in `docs/paper.md`.
+pub const REFERENCE_CODE: [&str; 25] = [
+    "analysis.crop.camera1=[185 px, 360 px]",
+    "analysis.crop.camera2=[200 px, 355 px]",
+    "analysis.window_anchor=middle",
+    "analysis.window_before=868 s / 578",
+    "analysis.window_after=868 s / 578",
+    "analysis.eps=10 px",
+    "analysis.min_samples=10",
+    "analysis.centroid=all_clusters",
+    "analysis.cluster_threshold=fixed",
+    "analysis.min_cluster_events=0",
+    "analysis.min_response_sigma=0",
+    "analysis.min_ray_sine=0",
+    "analysis.calibration=full",
+    "analysis.lens=exponential",
+    "analysis.bits_per_event=21",
+    "analysis.reduction.max_power=10",
+    "analysis.reduction.seeds=10",
+    "analysis.reduction.min_samples=1",
+    "analysis.latency.bin=0.2 ms",
+    "analysis.latency.sigma=0.5 ms",
+    "analysis.latency.alpha=4",
+    "analysis.latency.thresholds.from=17",
+    "analysis.latency.thresholds.to=19",
+    "analysis.latency.thresholds.count=3",
+    "analysis.latency.background=after",
+];
