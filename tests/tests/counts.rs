@@ -1,7 +1,7 @@
 //! planned = valid + missed + invalid + excluded, whatever is planned, whatever breaks, whenever it is stopped.
 
 use proptest::prelude::*;
-use skinrig::results::analyze_session;
+use skinrig::results::{Choices, analyze_session};
 use skinrig::source::Rescan;
 use skinrig_model::{CameraId, Record, SimLevel};
 use skinrig_recorder::{SessionReader, verify};
@@ -119,7 +119,7 @@ proptest! {
         prop_assert_eq!(totals.sync.planned, u64::from(sync));
         prop_assert_eq!((totals.presses.valid + totals.sync.valid) as usize, report.valid);
 
-        let counts = analyze_session(&path, &[]).unwrap().analysis.counts;
+        let counts = analyze_session(&path, Choices::default()).unwrap().analysis.counts;
         prop_assert!(counts.add_up(), "{counts:?}");
         prop_assert_eq!(u64::from(counts.planned), totals.presses.planned);
         prop_assert_eq!(u64::from(counts.sync), totals.sync.planned);
