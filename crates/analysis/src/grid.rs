@@ -6,7 +6,7 @@ use crate::pixels::PixelSet;
 
 /// Event counts per pixel: all columns, the rows of a crop.
 ///
-/// Counters are 32 bit wide and so is their sum; [`PixelGrid::add`] refuses the event that would overflow it.
+/// Counters are 32 bit wide and so is their sum; [`PixelGrid::add_many`] refuses what would overflow it.
 #[derive(Debug, Clone)]
 pub struct PixelGrid {
     rows: (u16, u16),
@@ -53,16 +53,28 @@ impl PixelGrid {
     /// Counts one event at column `u`, row `v`. False, and nothing counted, outside the crop or when the
     /// grid already holds `u32::MAX` events.
     pub fn add(&mut self, u: u16, v: u16) -> bool {
-        if u >= SENSOR_WIDTH || v < self.rows.0 || v > self.rows.1 || self.events == u32::MAX {
+        self.add_many(u, v, 1)
+    }
+
+    /// Counts `n` events at column `u`, row `v`. False, and nothing counted, outside the crop or when the grid
+    /// would then hold more than `u32::MAX` events.
+    #[inline]
+    pub fn add_many(&mut self, u: u16, v: u16, n: u32) -> bool {
+        if u >= SENSOR_WIDTH || v < self.rows.0 || v > self.rows.1 {
             return false;
         }
+        let Some(events) = self.events.checked_add(n) else {
+            return false;
+        };
         let index = usize::from(v - self.rows.0) * Self::WIDTH + usize::from(u);
         let Some(count) = self.counts.get_mut(index) else {
             return false;
         };
-        *count += 1;
-        self.occupied.insert(index);
-        self.events += 1;
+        *count += n;
+        if n > 0 {
+            self.occupied.insert(index);
+        }
+        self.events = events;
         true
     }
 

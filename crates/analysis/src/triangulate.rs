@@ -47,7 +47,8 @@ pub fn intersect(geometry: &StereoGeometry, angles_deg: [f64; 2]) -> Intersectio
     }
 }
 
-/// Locates a touch from the two viewing angles; NaN is a missing view.
+/// Locates a touch from the two viewing angles; NaN is a missing view. Numbers so large that the rays meet at no
+/// finite place give no location either.
 #[must_use]
 pub fn locate_angles(
     geometry: &StereoGeometry,
@@ -64,6 +65,8 @@ pub fn locate_angles(
         LocationOutcome::Parallel { sine }
     } else if range_mm.iter().any(|r| *r < 0.0) {
         LocationOutcome::Behind { sine }
+    } else if !(at.x_mm.is_finite() && at.y_mm.is_finite()) {
+        LocationOutcome::Missing
     } else if outline.contains(at) {
         LocationOutcome::Located { at, sine }
     } else {

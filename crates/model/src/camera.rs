@@ -92,16 +92,19 @@ impl CameraModel {
         -libm::atan2(ax * by - ay * bx, ax * bx + ay * by).to_degrees()
     }
 
-    /// The fractional column at which `p` appears, or `None` outside the field of view (columns 0..=640).
+    /// The fractional column at which `p` appears, or `None` outside the field of view (columns 0..=640). Where a
+    /// strong distortion folds the image, so that two columns show `p`, the one nearer the axis.
     #[must_use]
     pub fn column_of_point(&self, p: Point2) -> Option<f64> {
         let wanted = self.angle_of_point_deg(p) - self.skew_deg;
         let half = f64::from(SENSOR_WIDTH) / 2.0;
-        let (mut low, mut high) = (-1.0, 1.0);
-        if wanted < self.lens.angle_deg(low).0 || wanted > self.lens.angle_deg(high).0 {
+        let edge = self.fold();
+        let (mut low, mut high) = (-edge, edge);
+        let field = self.lens.angle_deg(low).0..=self.lens.angle_deg(high).0;
+        if !field.contains(&wanted) {
             return None;
         }
-        // The angle grows with s inside the sensor; bisection is exact to the last bits in 60 steps.
+        // The angle grows with s between the folds; bisection is exact to the last bits in 60 steps.
         for _ in 0..60 {
             let middle = 0.5 * (low + high);
             if self.lens.angle_deg(middle).0 < wanted {
@@ -111,6 +114,24 @@ impl CameraModel {
             }
         }
         Some(half + half * 0.5 * (low + high))
+    }
+
+    /// The `s` up to which the angle grows: 1, the sensor's edge, or where a strong distortion turns it back.
+    fn fold(&self) -> f64 {
+        let grows = |s: f64| self.lens.angle_deg(s).1 >= 0.0;
+        if grows(1.0) {
+            return 1.0;
+        }
+        let (mut low, mut high) = (0.0, 1.0);
+        for _ in 0..60 {
+            let middle = 0.5 * (low + high);
+            if grows(middle) {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        low
     }
 }
 

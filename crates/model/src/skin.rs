@@ -34,9 +34,13 @@ impl SkinOutline {
     };
 
     /// Signed distance-like clearance of `p` from the outline in mm: positive inside. Inside the outline it
-    /// is the exact distance to the nearest edge or arc; outside it is only known to be negative.
+    /// is the exact distance to the nearest edge or arc; outside it is only known to be negative. Negative infinity
+    /// for a point with a coordinate that is no number: it is nowhere, and not inside.
     #[must_use]
     pub fn clearance_mm(&self, p: Point2) -> f64 {
+        if p.x_mm.is_nan() || p.y_mm.is_nan() {
+            return f64::NEG_INFINITY; // the minima below would pass over it
+        }
         let (hx, hy) = (self.width_mm / 2.0, self.height_mm / 2.0);
         let x = p.x_mm - self.centre.x_mm;
         let y = (p.y_mm - self.centre.y_mm).abs(); // the outline is symmetric in y

@@ -1,0 +1,92 @@
+//! Every bound that a test of this suite holds, by its name in `docs/numerics.md`, and the worst error seen.
+
+use std::cell::RefCell;
+use std::fmt::Display;
+
+/// Half the distance of 1.0 from the next double.
+pub const UNIT: f64 = f64::EPSILON / 2.0;
+
+/// A promise: no error above the limit.
+pub struct Bound {
+    /// As in the table of the document.
+    pub name: &'static str,
+    /// In the unit that the document states.
+    pub limit: f64,
+}
+
+macro_rules! bounds {
+    ($($constant:ident: $name:literal <= $limit:literal;)*) => {
+        $(pub const $constant: Bound = Bound { name: $name, limit: $limit };)*
+        const ALL: &[(Bound, &str)] = &[$(($constant, stringify!($limit))),*];
+    };
+}
+
+bounds! {
+    SINE: "sine between the rays" <= 8.0;
+    MEET: "point where the rays meet" <= 10.0;
+    RANGE: "range along a ray" <= 10.0;
+    ROUND_TRIP: "point to angles and back" <= 4.0;
+    LENS_ANGLE: "angle of a column" <= 4.0;
+    LENS_BACKWARD: "column of an angle, backward" <= 8.0;
+    LENS_FOLD: "column of an angle at the fold" <= 1e-5;
+    POINT_ANGLE: "angle of a point" <= 3.0;
+    SCALE: "scale law" <= 2.0;
+    TRANSLATION: "translation law" <= 2.0;
+    CENTROID: "centroid of a cluster" <= 1.0;
+}
+
+/// Watches one bound: fails at the first error above it, and says at the end how near the worst one came.
+pub struct Watch {
+    bound: &'static Bound,
+    worst: RefCell<(f64, String)>,
+}
+
+impl Watch {
+    pub fn new(bound: &'static Bound) -> Self {
+        Self {
+            bound,
+            worst: RefCell::new((0.0, String::new())),
+        }
+    }
+
+    /// Judges one error; `at` is shown when it is too large. Not-a-number is too large.
+    pub fn see(&self, error: f64, at: impl Display) {
+        let Bound { name, limit } = self.bound;
+        assert!(error <= *limit, "{name}: {error:e} > {limit:e} at {at}");
+        if error > self.worst.borrow().0 {
+            *self.worst.borrow_mut() = (error, at.to_string());
+        }
+    }
+}
+
+impl Drop for Watch {
+    #[expect(
+        clippy::print_stderr,
+        reason = "the worst error is what a reader of the run wants to know"
+    )]
+    fn drop(&mut self) {
+        let (worst, at) = &*self.worst.borrow();
+        let Bound { name, limit } = self.bound;
+        eprintln!("{name}: worst {worst:.3e} of {limit:e}, at {at}");
+    }
+}
+
+#[test]
+fn the_document_states_the_bounds_that_are_held() {
+    let document = include_str!("../../../docs/numerics.md");
+    let row = |name: &str| {
+        let mut rows = document
+            .lines()
+            .filter(|l| l.starts_with(&format!("| {name} |")));
+        let row = rows.next().unwrap_or_else(|| panic!("no row for `{name}`"));
+        assert_eq!(rows.next(), None, "two rows for `{name}`");
+        row.to_owned()
+    };
+    for (bound, limit) in ALL {
+        let row = row(bound.name);
+        assert!(
+            row.contains(&format!("`{limit}`")),
+            "the limit {limit} is not in the row: {row}"
+        );
+    }
+}
