@@ -1,11 +1,9 @@
 //! The analysis as a whole: from a session's values and events to one [`Analysis`].
 
-use skinrig_model::{
-    CalibrationModel, CameraId, PressRole, PressTiming, PressVerdict, StereoGeometry,
-};
+use skinrig_model::{CameraId, PressRole, PressTiming, PressVerdict};
 
 use crate::accumulate::{Accumulated, Accumulator, SLACK_US, Wanted, rate_bin_us};
-use crate::calibrate::{affordable_model, calibrate, model_name};
+use crate::calibrate::{Calibrated, calibrated};
 use crate::clock::{PressSpan, SUSPICIOUS_DRIFT_PPM, fit_marks, fit_rates};
 use crate::closeups::{Closeups, keep_plans, zoom_plans};
 use crate::error::AnalysisError;
@@ -15,11 +13,11 @@ use crate::kept::{Keep, Kept, KeptPress};
 use crate::metrics::{Exclusions, metrics, penalised};
 use crate::rates::RateHistogram;
 use crate::result::{
-    ANALYSIS_VERSION, Activity, Analysis, CalibrationResult, ClockFit, ContactTiming, DepthResult,
-    LocationOutcome, PressPicture, PressResult, PressView, RateSeries, RateZoom,
+    ANALYSIS_VERSION, Activity, Analysis, ClockFit, ContactTiming, DepthResult, LocationOutcome,
+    PressPicture, PressResult, PressView, RateSeries, RateZoom,
 };
 use crate::segment::{Window, windows};
-use crate::sets::{CalibrationSet, ScoreSet};
+use crate::sets::ScoreSet;
 use crate::triangulate::locate;
 use crate::{audit, bit_rates, check, cmre, coverage, latency, reduction, verdict};
 
@@ -61,7 +59,11 @@ pub fn analyze_and_keep(
     let cameras = [one?, two?];
     let mut warnings: Vec<String> = Vec::new();
     let mut presses = rows(input, &cameras);
-    let (geometry, calibration) = calibrated(input, &presses, &mut warnings);
+    let Calibrated {
+        geometry,
+        calibration,
+        threshold,
+    } = calibrated(input, &mut presses, &mut warnings);
     for row in &mut presses {
         let column = |k: usize| row.views[k].and_then(|v| v.centroid_u);
         row.location_outcome = locate(&geometry, &input.rig.outline, [column(0), column(1)]);
@@ -140,7 +142,7 @@ pub fn analyze_and_keep(
         scored_without_exclusions,
         depths,
         penalised,
-        threshold: None,
+        threshold,
         coverage: None,
         cmre: None,
         bit_rates: None,
@@ -421,49 +423,4 @@ fn rows(input: &SessionInput, cameras: &[CameraResult; 2]) -> Vec<PressResult> {
             row
         })
         .collect()
-}
-
-/// The geometry that locates the presses, and how it was found.
-fn calibrated(
-    input: &SessionInput,
-    presses: &[PressResult],
-    warnings: &mut Vec<String>,
-) -> (StereoGeometry, Option<CalibrationResult>) {
-    let nominal = input.rig.nominal;
-    let wanted = match input.settings.calibration {
-        CalibrationModel::Auto => CalibrationModel::Full,
-        named => named,
-    };
-    if wanted == CalibrationModel::None {
-        return (nominal, None);
-    }
-    let set = CalibrationSet::from_presses(presses);
-    if set.sights().is_empty() {
-        warnings
-            .push("no usable calibrating press: the nominal camera geometry is used".to_owned());
-        return (nominal, None);
-    }
-    let model = affordable_model(&set, wanted);
-    if model != wanted {
-        warnings.push(format!(
-            "the calibrating presses touch too few places for the calibration `{}`: `{}` is used",
-            model_name(wanted),
-            model_name(model)
-        ));
-    }
-    let Some((geometry, result)) = calibrate(&set, &nominal, model, input.settings.seed) else {
-        if model != CalibrationModel::None {
-            warnings.push(
-                "the calibration found no plausible geometry: the nominal one is used".to_owned(),
-            );
-        }
-        return (nominal, None);
-    };
-    if result.rmse_after_mm > result.rmse_before_mm {
-        warnings.push(format!(
-            "the calibration does not lower the error of its own presses ({:.2} mm before, {:.2} mm after): outliers among them?",
-            result.rmse_before_mm, result.rmse_after_mm
-        ));
-    }
-    (geometry, Some(result))
 }

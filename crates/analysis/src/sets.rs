@@ -13,10 +13,14 @@ use crate::result::PressResult;
 pub struct Sight {
     /// Which press.
     pub press: PressId,
+    /// Location, from 0.
+    pub location: u32,
     /// Centroid column in each camera, px.
     pub columns: [f64; 2],
     /// The measured position.
     pub truth: Point2,
+    /// Clustered events of the camera that has fewer.
+    pub cluster_events: u32,
 }
 
 /// Presses that calibrate: seen by both cameras, truth measured, not missed, invalid or excluded.
@@ -34,14 +38,20 @@ impl CalibrationSet {
         Self(
             usable
                 .filter_map(|p| {
-                    let column = |k: usize| p.views[k].and_then(|v| v.centroid_u);
+                    let [one, two] = p.views;
+                    let (one, two) = (one?, two?);
                     Some(Sight {
                         press: p.press,
-                        columns: [column(0)?, column(1)?],
+                        location: p.location,
+                        columns: [one.centroid_u?, two.centroid_u?],
                         truth: p.truth?,
+                        cluster_events: one.cluster_events.min(two.cluster_events),
                     })
                 })
-                .filter(|s| s.columns.iter().all(|u| u.is_finite()))
+                .filter(|s| {
+                    let numbers = [s.columns[0], s.columns[1], s.truth.x_mm, s.truth.y_mm];
+                    numbers.iter().all(|n| n.is_finite())
+                })
                 .collect(),
         )
     }

@@ -27,18 +27,22 @@ pub struct Intersection {
 #[must_use]
 pub fn intersect(geometry: &StereoGeometry, angles_deg: [f64; 2]) -> Intersection {
     let [one, two] = geometry.cameras;
-    let d1 = one.direction(angles_deg[0]);
-    let d2 = two.direction(angles_deg[1]);
-    let w = [
-        two.position.x_mm - one.position.x_mm,
-        two.position.y_mm - one.position.y_mm,
-    ];
+    meet(
+        [one.position, two.position],
+        [one.direction(angles_deg[0]), two.direction(angles_deg[1])],
+    )
+}
+
+/// [`intersect`] for rays from `positions` along unit `directions`.
+pub(crate) fn meet(positions: [Point2; 2], directions: [[f64; 2]; 2]) -> Intersection {
+    let ([one, two], [d1, d2]) = (positions, directions);
+    let w = [two.x_mm - one.x_mm, two.y_mm - one.y_mm];
     let sine = cross(d1, d2);
     let (r1, r2) = (cross(w, d2) / sine, cross(w, d1) / sine);
     let (from, d, r) = if r1.abs() <= r2.abs() {
-        (one.position, d1, r1)
+        (one, d1, r1)
     } else {
-        (two.position, d2, r2)
+        (two, d2, r2)
     };
     Intersection {
         at: Point2::new(from.x_mm + r * d[0], from.y_mm + r * d[1]),

@@ -129,14 +129,9 @@ pub fn from_data(
             let rule = format!("no cluster ({camera})");
             return Judgement::excluded(rule.clone(), rule);
         };
-        if view.cluster_events < settings.min_cluster_events {
-            return Judgement::excluded(
-                format!("too few cluster events ({camera})"),
-                format!(
-                    "too few cluster events: {} < {} ({camera})",
-                    view.cluster_events, settings.min_cluster_events
-                ),
-            );
+        if let Some(judgement) = too_few_cluster_events(&view, settings.min_cluster_events, camera)
+        {
+            return judgement;
         }
         if let Some(idle) = idle_events(&view).filter(|idle| {
             f64::from(view.events)
@@ -153,6 +148,24 @@ pub fn from_data(
         }
     }
     Judgement::VALID
+}
+
+/// The rule that leaves out a press of which `camera` clustered fewer than `least` events.
+#[must_use]
+pub(crate) fn too_few_cluster_events(
+    view: &PressView,
+    least: u32,
+    camera: CameraId,
+) -> Option<Judgement> {
+    (view.cluster_events < least).then(|| {
+        Judgement::excluded(
+            format!("too few cluster events ({camera})"),
+            format!(
+                "too few cluster events: {} < {least} ({camera})",
+                view.cluster_events
+            ),
+        )
+    })
 }
 
 /// What a camera would have sent in the press window without a press.

@@ -1,48 +1,19 @@
 //! The geometry of a camera that looks sideways through the skin: from pixel column to ray and back.
 //!
-//! Lens of the paper (section "Geometric Triangulation", constants of the public code): with
-//! `s = (u - 320) / 320`, the viewing angle is `theta = s * 60° * exp(-W |s|) + skew`. A positive angle turns
-//! the camera's axis, which points at the skin centre, clockwise.
+//! With `s = (u - 320) / 320` the [lens](LensModel) gives the angle from the optical axis, and the viewing angle is
+//! that angle plus the skew. A positive angle turns the camera's axis, which points at the skin centre, clockwise.
 //!
 //! Transcendental functions come from the `libm` crate, so that simulated bytes are the same on every machine.
 
 use serde::{Deserialize, Serialize};
 
 use crate::frame::Point2;
+use crate::lens::LensModel;
 
 /// Columns of the sensor (EVK1 Gen3.1 VGA).
 pub const SENSOR_WIDTH: u16 = 640;
 /// Rows of the sensor.
 pub const SENSOR_HEIGHT: u16 = 480;
-
-/// How a column's distance from the middle becomes an angle.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "lens", rename_all = "snake_case")]
-pub enum LensModel {
-    /// The paper's: `theta = s * half_fov * exp(-w |s|)`; monotone for `|w s| < 1`.
-    Exponential {
-        /// Half of the horizontal field of view, degrees (paper: 60).
-        half_fov_deg: f64,
-        /// Distortion `W`, dimensionless.
-        w: f64,
-    },
-}
-
-impl LensModel {
-    /// Angle from the optical axis at `s` in -1..=1 (the sensor's edges), degrees, and its derivative by `s`.
-    #[must_use]
-    pub fn angle_deg(&self, s: f64) -> (f64, f64) {
-        match *self {
-            Self::Exponential { half_fov_deg, w } => {
-                let falloff = libm::exp(-w * s.abs());
-                (
-                    s * half_fov_deg * falloff,
-                    half_fov_deg * falloff * (1.0 - w * s.abs()),
-                )
-            }
-        }
-    }
-}
 
 /// One camera in the skin's plane.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

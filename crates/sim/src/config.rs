@@ -171,11 +171,8 @@ impl SimConfig {
             camera.position.x_mm += off(errors.position_mm);
             camera.position.y_mm += off(errors.position_mm);
             camera.skew_deg += off(errors.skew_deg);
-            let LensModel::Exponential { half_fov_deg, w } = drawn.lens;
-            camera.lens = LensModel::Exponential {
-                half_fov_deg,
-                w: w + off(errors.w),
-            };
+            let (half_fov_deg, w) = drawn.lens.coefficients();
+            camera.lens = drawn.lens.with(half_fov_deg, w + off(errors.w));
             camera
         });
         StereoGeometry { cameras }

@@ -1,7 +1,7 @@
 //! Puts a simulated rig together.
 
 use skinrig_device::{CameraSettings, EventCamera, Rig, TriggerBox};
-use skinrig_model::{CameraId, LensModel, RigGeometry, SimLevel, StereoGeometry};
+use skinrig_model::{CameraId, LensKind, RigGeometry, SimLevel, StereoGeometry};
 
 use crate::camera::{PixelFactory, SimCamera, TRIGGER_CHANNEL};
 use crate::clock::{Boxed, Paced};
@@ -84,14 +84,19 @@ pub fn describe(config: &SimConfig) -> String {
         g.cameras
             .iter()
             .map(|c| {
-                let LensModel::Exponential { half_fov_deg, w } = c.lens;
-                serde_json::json!({
+                let (half_fov_deg, w) = c.lens.coefficients();
+                let mut camera = serde_json::json!({
                     "position_mm": [c.position.x_mm, c.position.y_mm],
                     "aim_mm": [c.aim.x_mm, c.aim.y_mm],
                     "skew_deg": c.skew_deg,
                     "half_fov_deg": half_fov_deg,
                     "w": w,
-                })
+                });
+                // The paper's lens goes without saying.
+                if c.lens.kind() != LensKind::Exponential {
+                    camera["lens"] = serde_json::json!(c.lens.kind());
+                }
+                camera
             })
             .collect()
     };

@@ -6,18 +6,31 @@
 //! meet behind a camera or not at all counts c. c is 25 mm (a quarter of the skin) while the starts compete, then
 //! ten robust standard deviations of the best solution's errors, so that the last fit is ordinary least squares
 //! for all but outliers.
+//!
+//! [`calibrate`] fits one model; `choose` fits the nested ones, compares them by `crossval` and takes the
+//! smallest that does; `threshold` finds how many cluster events a press needs to be worth its place.
 
-mod covariance;
+mod choose;
+mod crossval;
+mod parameters;
 mod problem;
+mod solver;
+mod threshold;
+mod uncertainty;
 
-use levenberg_marquardt::{LevenbergMarquardt, TerminationReason};
-use nalgebra::{DMatrix, DVector};
-use skinrig_model::{CalibrationModel, LensKind, StereoGeometry};
+use rayon::prelude::*;
+use skinrig_model::{CalibrationModel, StereoGeometry};
 
 use crate::result::CalibrationResult;
 use crate::seeded;
 use crate::sets::{CalibrationSet, Sight};
-use problem::{PARAMETERS, Problem, parameters_of};
+pub(crate) use choose::{Calibrated, calibrated};
+use parameters::{
+    MODELS, NAMES, PARAMETERS, Parameters, SPREAD, is_plausible, parameters_of, with_parameters,
+};
+pub use parameters::{model_name, parameter_count};
+use problem::{Eyes, Problem};
+use solver::{Descent, minimise};
 
 /// Bound on an error vector while the starts compete, mm: a quarter of the skin's side.
 const COARSE_BOUND_MM: f64 = 25.0;
@@ -28,84 +41,50 @@ const LEAST_BOUND_MM: f64 = 1.0;
 /// Median of the length of a standard normal 2-vector, `sqrt(2 ln 2)`.
 const RAYLEIGH_MEDIAN: f64 = 1.177_410_022_515_474_7;
 /// Starts: the nominal geometry and perturbed ones.
-const STARTS: u64 = 10;
-/// Largest perturbation of a start: mm for positions, degrees for skews, 1 for W. About the half widths of the
-/// public code's search box (positions 5 to 10 mm, skews 5 degrees, W 1).
-const SPREAD: [f64; PARAMETERS] = [8.0, 8.0, 8.0, 8.0, 4.0, 4.0, 0.4, 0.4];
-/// A solution further than this from the start is not a calibration of this rig, mm.
-const FARTHEST_MM: f64 = 60.0;
-/// Error length charged to a press whose rays do not meet in front of both cameras, mm: the skin's diagonal
-/// (100 x 100 mm).
+const STARTS: u32 = 10;
+/// Starts whose RMSE differs by no more than this ended in the same optimum, mm.
+const SAME_OPTIMUM_MM: f64 = 1e-6;
+/// Error length charged to a press whose rays do not meet in front of both cameras, and the most that any press is
+/// charged, mm: the skin's diagonal (100 x 100 mm).
 const NO_FIX_ERROR_MM: f64 = 141.421_356_237_309_5;
-
-/// Names of the parameters, in order; models use the first 4, 6 or 8.
-const NAMES: [&str; PARAMETERS] = [
-    "camera 1 x (mm)",
-    "camera 1 y (mm)",
-    "camera 2 x (mm)",
-    "camera 2 y (mm)",
-    "camera 1 skew (deg)",
-    "camera 2 skew (deg)",
-    "camera 1 distortion W (1)",
-    "camera 2 distortion W (1)",
-];
-
-/// How many parameters a model fits.
-#[must_use]
-pub const fn parameter_count(model: CalibrationModel) -> usize {
-    match model {
-        CalibrationModel::None => 0,
-        CalibrationModel::Positions => 4,
-        CalibrationModel::PositionsSkews => 6,
-        CalibrationModel::Full | CalibrationModel::FullScale | CalibrationModel::Auto => PARAMETERS,
-    }
-}
-
-/// What a model is called in settings and messages.
-#[must_use]
-pub const fn model_name(model: CalibrationModel) -> &'static str {
-    match model {
-        CalibrationModel::None => "none",
-        CalibrationModel::Positions => "positions",
-        CalibrationModel::PositionsSkews => "positions_skews",
-        CalibrationModel::Full => "full",
-        CalibrationModel::FullScale => "full_scale",
-        CalibrationModel::Auto => "auto",
-    }
-}
+/// Places closer than this are one place, mm.
+const SAME_PLACE_MM: f64 = 0.1;
 
 /// The largest model of `wanted` and the smaller ones that the data can bear: at least as many different
 /// locations as parameters, that is two residuals per parameter.
 #[must_use]
 pub fn affordable_model(set: &CalibrationSet, wanted: CalibrationModel) -> CalibrationModel {
-    let mut places: Vec<(i64, i64)> = set
-        .sights()
-        .iter()
-        .map(|s| {
-            // Places closer than 0.1 mm are one place.
-            let tenth = |mm: f64| (mm * 10.0).round() as i64;
-            (tenth(s.truth.x_mm), tenth(s.truth.y_mm))
-        })
-        .collect();
-    places.sort_unstable();
-    places.dedup();
-    let smaller = [
-        CalibrationModel::Full,
-        CalibrationModel::PositionsSkews,
-        CalibrationModel::Positions,
-    ];
-    smaller
-        .into_iter()
-        .find(|&m| {
-            parameter_count(m) <= parameter_count(wanted) && parameter_count(m) <= places.len()
-        })
+    affordable(different_places(set.sights()), wanted)
+}
+
+fn affordable(places: usize, wanted: CalibrationModel) -> CalibrationModel {
+    let most = parameter_count(wanted).min(places);
+    let mut largest_first = MODELS.into_iter().rev();
+    largest_first
+        .find(|m| parameter_count(*m) <= most)
         .unwrap_or(CalibrationModel::None)
 }
 
-/// Fits `model` to the set, starting from `start` and from seeded perturbations of it.
+/// Different locations of the plan, or different measured positions when there are fewer of them.
+fn different_places(sights: &[Sight]) -> usize {
+    let cell = |mm: f64| (mm / SAME_PLACE_MM).round() as i64;
+    let mut places: Vec<_> = sights
+        .iter()
+        .map(|s| (cell(s.truth.x_mm), cell(s.truth.y_mm)))
+        .collect();
+    places.sort_unstable();
+    places.dedup();
+    let mut locations: Vec<u32> = sights.iter().map(|s| s.location).collect();
+    locations.sort_unstable();
+    locations.dedup();
+    places.len().min(locations.len())
+}
+
+/// Fits `model` (of `Auto`, all parameters) to the set, starting from `start` and from seeded perturbations of it.
 ///
-/// `None` when the model has no parameters, or no start led to a plausible geometry (positions within 60 mm of
-/// the start, |W| < 1 so that the lens stays monotone, |skew| < 45 degrees).
+/// `None` when the model has no parameters, there are fewer residuals than parameters, or no start led to a plausible
+/// geometry (positions within 60 mm of the start, |skew| < 45 degrees, lenses monotone). When the data do not
+/// determine all parameters - `rank` says so - what they leave open stays where it started.
 #[must_use]
 pub fn calibrate(
     set: &CalibrationSet,
@@ -113,135 +92,151 @@ pub fn calibrate(
     model: CalibrationModel,
     seed: u64,
 ) -> Option<(StereoGeometry, CalibrationResult)> {
-    let count = parameter_count(model);
-    let sights = set.sights();
-    if count == 0 || 2 * sights.len() < count {
-        return None;
-    }
-    let base = parameters_of(start);
-    let mut best: Option<Solution> = None;
-    for attempt in 0..STARTS {
-        let mut from = base;
-        if attempt > 0 {
-            let mut rng = seeded::generator(seed, attempt);
-            for (p, spread) in from.iter_mut().zip(SPREAD).take(count) {
-                *p += spread * seeded::signed_unit(&mut rng);
-            }
-        }
-        let solution = minimise(sights, start, &from[..count], COARSE_BOUND_MM);
-        if solution.is_plausible(&base) && best.as_ref().is_none_or(|b| solution.cost < b.cost) {
-            best = Some(solution);
-        }
-    }
-    let coarse = best?;
-    let bound = fine_bound(sights, &coarse.geometry);
-    let fine = minimise(sights, start, &coarse.parameters, bound);
-    let solution = if fine.is_plausible(&base) {
-        fine
-    } else {
-        coarse
-    };
-    let standard_errors = covariance::standard_errors(&solution.residuals, &solution.jacobian);
-    let result = CalibrationResult {
-        model,
-        lens: LensKind::Exponential,
-        correlation: Vec::new(),
-        condition: None,
-        rank: count as u32,
-        outliers: 0,
-        starts: STARTS as u32,
-        starts_agreeing: 0,
-        compared: Vec::new(),
-        start: *start,
-        names: NAMES[..count].iter().map(|n| (*n).to_owned()).collect(),
-        start_values: base[..count].to_vec(),
-        values: solution.parameters.clone(),
-        standard_errors,
-        rmse_before_mm: rmse_mm(sights, start),
-        rmse_after_mm: rmse_mm(sights, &solution.geometry),
-        n: sights.len() as u32,
-        termination: solution.termination,
-    };
-    Some((solution.geometry, result))
+    let fit = Fit::search(set.sights(), start, model, seed)?;
+    Some((fit.geometry, fit.result))
 }
 
-/// Root mean square error over all presses, mm; a press without a fix counts the skin's diagonal.
+/// A fitted model.
+struct Fit {
+    geometry: StereoGeometry,
+    parameters: Parameters,
+    result: CalibrationResult,
+}
+
+impl Fit {
+    fn search(
+        sights: &[Sight],
+        start: &StereoGeometry,
+        model: CalibrationModel,
+        seed: u64,
+    ) -> Option<Self> {
+        let count = parameter_count(model);
+        if count == 0 || 2 * sights.len() < count {
+            return None;
+        }
+        let problem = Problem {
+            sights,
+            base: start,
+            count,
+            bound_mm: COARSE_BOUND_MM,
+        };
+        let base = parameters_of(start);
+        let ends: Vec<Descent> = (0..STARTS)
+            .into_par_iter()
+            .map(|attempt| minimise(&problem, perturbed(base, count, attempt, seed)))
+            .collect();
+        let coarse = best(&ends, start)?;
+        let rmse = |d: &Descent| (d.cost / sights.len() as f64).sqrt();
+        let agreeing = ends
+            .iter()
+            .filter(|d| (rmse(d) - rmse(coarse)).abs() <= SAME_OPTIMUM_MM);
+        let starts_agreeing = agreeing.count() as u32;
+        let mut fit = Self::finish(&problem, coarse, model);
+        if (fit.result.rank as usize) < count && is_plausible(start, &ends[0].parameters) {
+            // Many solutions are equally good: the one that the unperturbed start slides into.
+            fit = Self::finish(&problem, &ends[0], model);
+        }
+        fit.result.starts_agreeing = starts_agreeing;
+        Some(fit)
+    }
+
+    /// The last fit from a solution of the coarse one, and what there is to say about it.
+    fn finish(problem: &Problem<'_>, coarse: &Descent, model: CalibrationModel) -> Self {
+        let Problem {
+            sights,
+            base: start,
+            count,
+            ..
+        } = *problem;
+        let problem = problem.with_fine_bound(&coarse.parameters);
+        let fine = minimise(&problem, coarse.parameters);
+        let end = if is_plausible(start, &fine.parameters) {
+            &fine
+        } else {
+            coarse
+        };
+        let geometry = with_parameters(start, &end.parameters);
+        let (residuals, jacobian) = problem.rows(&end.parameters);
+        let locations: Vec<u32> = sights.iter().map(|s| s.location).collect();
+        let said = uncertainty::uncertainty(&residuals, &jacobian, &locations);
+        let lengths = error_lengths(sights, &geometry);
+        let result = CalibrationResult {
+            model,
+            lens: start.cameras[0].lens.kind(),
+            start: *start,
+            names: NAMES[..count].iter().map(|n| (*n).to_owned()).collect(),
+            start_values: parameters_of(start).as_slice()[..count].to_vec(),
+            values: end.parameters.as_slice()[..count].to_vec(),
+            standard_errors: said.standard_errors,
+            correlation: said.correlation,
+            condition: said.condition,
+            rank: said.rank as u32,
+            rmse_before_mm: rmse_mm(sights, start),
+            rmse_after_mm: root_mean_square(&lengths),
+            n: sights.len() as u32,
+            // The weight `1 / (1 + (e / c)²)` is a half at e = c.
+            outliers: lengths.iter().filter(|e| **e > problem.bound_mm).count() as u32,
+            starts: STARTS,
+            starts_agreeing: 0,
+            termination: end.termination.to_owned(),
+            compared: Vec::new(),
+        };
+        Self {
+            geometry,
+            parameters: end.parameters,
+            result,
+        }
+    }
+}
+
+/// The first of the best plausible ends.
+fn best<'a>(ends: &'a [Descent], start: &StereoGeometry) -> Option<&'a Descent> {
+    ends.iter()
+        .filter(|d| d.cost.is_finite() && is_plausible(start, &d.parameters))
+        .min_by(|a, b| a.cost.total_cmp(&b.cost))
+}
+
+fn perturbed(base: Parameters, count: usize, attempt: u32, seed: u64) -> Parameters {
+    let mut from = base;
+    if attempt > 0 {
+        let mut rng = seeded::generator(seed, u64::from(attempt));
+        for p in 0..count.min(PARAMETERS) {
+            from[p] += SPREAD[p] * seeded::signed_unit(&mut rng);
+        }
+    }
+    from
+}
+
+impl<'a> Problem<'a> {
+    /// The same with the bound of the last fit, from the errors at `parameters`.
+    fn with_fine_bound(&self, parameters: &Parameters) -> Problem<'a> {
+        let mut lengths = error_lengths(self.sights, &with_parameters(self.base, parameters));
+        lengths.sort_unstable_by(f64::total_cmp);
+        let sigma = lengths[lengths.len() / 2] / RAYLEIGH_MEDIAN;
+        Problem {
+            bound_mm: (FINE_BOUND_SIGMAS * sigma).max(LEAST_BOUND_MM),
+            ..*self
+        }
+    }
+}
+
+/// Root mean square error over all presses, mm; a press without a fix counts the skin's diagonal, and none counts more.
 #[must_use]
 pub fn rmse_mm(sights: &[Sight], geometry: &StereoGeometry) -> f64 {
-    let squares: f64 = error_lengths(sights, geometry).map(|e| e * e).sum();
-    (squares / sights.len() as f64).sqrt()
+    root_mean_square(&error_lengths(sights, geometry))
 }
 
-fn error_lengths(sights: &[Sight], geometry: &StereoGeometry) -> impl Iterator<Item = f64> {
-    sights.iter().map(|s| {
-        problem::error_vector(geometry, s).map_or(NO_FIX_ERROR_MM, |[dx, dy]| {
+fn root_mean_square(lengths: &[f64]) -> f64 {
+    let squares: f64 = lengths.iter().map(|e| e * e).sum();
+    (squares / lengths.len() as f64).sqrt()
+}
+
+fn error_lengths(sights: &[Sight], geometry: &StereoGeometry) -> Vec<f64> {
+    let eyes = Eyes::of(geometry);
+    let length = |s: &Sight| {
+        eyes.error_vector(s).map_or(NO_FIX_ERROR_MM, |[dx, dy]| {
             libm::hypot(dx, dy).min(NO_FIX_ERROR_MM)
         })
-    })
-}
-
-fn fine_bound(sights: &[Sight], geometry: &StereoGeometry) -> f64 {
-    let mut lengths: Vec<f64> = error_lengths(sights, geometry).collect();
-    lengths.sort_unstable_by(f64::total_cmp);
-    let sigma = lengths[lengths.len() / 2] / RAYLEIGH_MEDIAN;
-    (FINE_BOUND_SIGMAS * sigma).max(LEAST_BOUND_MM)
-}
-
-struct Solution {
-    geometry: StereoGeometry,
-    parameters: Vec<f64>,
-    cost: f64,
-    termination: String,
-    residuals: DVector<f64>,
-    jacobian: DMatrix<f64>,
-}
-
-impl Solution {
-    fn is_plausible(&self, base: &[f64; PARAMETERS]) -> bool {
-        let p = parameters_of(&self.geometry);
-        let far = |i: usize| (p[i] - base[i]).abs() > FARTHEST_MM;
-        self.cost.is_finite()
-            && p.iter().all(|v| v.is_finite())
-            && !(0..4).any(far)
-            && p[4].abs().max(p[5].abs()) < 45.0
-            && p[6].abs().max(p[7].abs()) < 1.0
-    }
-}
-
-fn minimise(sights: &[Sight], start: &StereoGeometry, from: &[f64], bound_mm: f64) -> Solution {
-    let problem = Problem::new(sights, start, DVector::from_column_slice(from), bound_mm);
-    let (problem, report) = LevenbergMarquardt::new().minimize(problem);
-    let (residuals, jacobian) = problem.linearised();
-    Solution {
-        geometry: problem.geometry(),
-        parameters: problem.parameters().iter().copied().collect(),
-        cost: residuals.norm_squared(),
-        termination: in_words(&report.termination),
-        residuals,
-        jacobian,
-    }
-}
-
-fn in_words(reason: &TerminationReason) -> String {
-    match reason {
-        TerminationReason::ResidualsZero => "all residuals are zero".to_owned(),
-        TerminationReason::Orthogonal => "the gradient is zero".to_owned(),
-        TerminationReason::Converged { ftol, xtol } => match (ftol, xtol) {
-            (true, true) => "converged: neither error nor parameters change any more".to_owned(),
-            (true, false) => "converged: the error does not change any more".to_owned(),
-            _ => "converged: the parameters do not change any more".to_owned(),
-        },
-        TerminationReason::NoImprovementPossible(_) => {
-            "converged to the resolution of floating point".to_owned()
-        }
-        TerminationReason::LostPatience => "not converged: too many evaluations".to_owned(),
-        TerminationReason::Numerical(what) => {
-            format!("not converged: {what} is not a finite number")
-        }
-        TerminationReason::User(what) | TerminationReason::WrongDimensions(what) => {
-            format!("not converged: {what} could not be computed")
-        }
-        TerminationReason::NoParameters => "not converged: no parameters".to_owned(),
-        TerminationReason::NoResiduals => "not converged: no presses".to_owned(),
-    }
+    };
+    sights.iter().map(length).collect()
 }

@@ -1,222 +1,287 @@
-//! The least-squares problem: error vectors of the calibrating presses and their analytic derivatives.
+//! The least-squares problem: bounded error vectors of the calibrating presses and their analytic derivatives.
 
-use levenberg_marquardt::LeastSquaresProblem;
-use nalgebra::storage::Owned;
-use nalgebra::{DMatrix, DVector, Dyn};
-use skinrig_model::{CameraModel, LensModel, SENSOR_WIDTH, StereoGeometry};
+use nalgebra::{DMatrix, DVector, SMatrix};
+use skinrig_model::{CameraModel, LensAngle, SENSOR_WIDTH, StereoGeometry};
 
+use super::parameters::{PARAMETERS, Parameters, with_parameters};
 use crate::sets::Sight;
-use crate::triangulate::{PARALLEL_SINE, intersect};
+use crate::triangulate::{Intersection, PARALLEL_SINE, meet};
 
-/// Two positions, two skews, two distortions.
-pub const PARAMETERS: usize = 8;
+/// Errors longer than this many bounds have no slope left: it falls with the cube of the length.
+const SATURATED: f64 = 1e6;
 
-/// (x1, y1, x2, y2, skew 1, skew 2, W 1, W 2): the order in which nested models take parameters in.
-pub fn parameters_of(geometry: &StereoGeometry) -> [f64; PARAMETERS] {
-    let [a, b] = &geometry.cameras;
-    let w = |c: &CameraModel| match c.lens {
-        LensModel::Exponential { w, .. } => w,
-    };
-    [
-        a.position.x_mm,
-        a.position.y_mm,
-        b.position.x_mm,
-        b.position.y_mm,
-        a.skew_deg,
-        b.skew_deg,
-        w(a),
-        w(b),
-    ]
+/// One camera at given parameters, with what does not depend on the press.
+struct Eye {
+    camera: CameraModel,
+    /// Unit vector of the axis before skew, and the derivative of its counter-clockwise angle by x and y, rad/mm.
+    axis: [f64; 2],
+    axis_turn: [f64; 2],
+    /// Half field of view at scale 1, degrees.
+    half_fov_deg: f64,
 }
 
-/// `base` with its first parameters replaced.
-pub fn with_parameters(base: &StereoGeometry, parameters: &[f64]) -> StereoGeometry {
-    let mut p = parameters_of(base);
-    for (to, from) in p.iter_mut().zip(parameters) {
-        *to = *from;
-    }
-    let mut geometry = *base;
-    for (k, camera) in geometry.cameras.iter_mut().enumerate() {
-        camera.position.x_mm = p[2 * k];
-        camera.position.y_mm = p[2 * k + 1];
-        camera.skew_deg = p[4 + k];
-        match &mut camera.lens {
-            LensModel::Exponential { w, .. } => *w = p[6 + k],
-        }
-    }
-    geometry
-}
-
-/// Estimate minus truth, mm; `None` where the rays do not meet in front of both cameras.
-pub fn error_vector(geometry: &StereoGeometry, sight: &Sight) -> Option<[f64; 2]> {
-    let hit = intersect(geometry, angles(geometry, sight));
-    let fixed = hit.sine.abs() >= PARALLEL_SINE && hit.range_mm.iter().all(|r| *r >= 0.0);
-    let error = [
-        hit.at.x_mm - sight.truth.x_mm,
-        hit.at.y_mm - sight.truth.y_mm,
-    ];
-    (fixed && error.iter().all(|e| e.is_finite())).then_some(error)
-}
-
-fn angles(geometry: &StereoGeometry, sight: &Sight) -> [f64; 2] {
-    [0, 1].map(|k| geometry.cameras[k].angle_of_column_deg(sight.columns[k]))
-}
-
-/// Derivative of the intersection by all parameters, mm per unit: rows x and y.
-///
-/// With n_k the direction d_k turned by +90 degrees, the intersection X solves `n_k . (X - p_k) = 0`. Its
-/// differential is `n_k . dX = n_k . dp_k + r_k dphi_k`, where phi_k is the ray's counter-clockwise angle: the
-/// axis angle `atan2(aim - p_k)` minus theta_k.
-fn derivative(geometry: &StereoGeometry, sight: &Sight) -> [[f64; PARAMETERS]; 2] {
-    let theta = angles(geometry, sight);
-    let hit = intersect(geometry, theta);
-    let d = [0, 1].map(|k| geometry.cameras[k].direction(theta[k]));
-    let n = d.map(|d| [-d[1], d[0]]);
-    let mut out = [[0.0; PARAMETERS]; 2];
-    for k in 0..2 {
-        let camera = &geometry.cameras[k];
-        let axis = [
-            camera.aim.x_mm - camera.position.x_mm,
-            camera.aim.y_mm - camera.position.y_mm,
-        ];
-        let length_sq = axis[0] * axis[0] + axis[1] * axis[1];
-        let r = hit.range_mm[k];
-        let half = f64::from(SENSOR_WIDTH) / 2.0;
-        let s = (sight.columns[k] - half) / half;
-        let by_w = match camera.lens {
-            // d/dW of s * half_fov * exp(-W |s|), degrees.
-            LensModel::Exponential { .. } => -s.abs() * camera.lens.angle_deg(s).0,
-        };
-        let right_hand_sides = [
-            (2 * k, n[k][0] + r * axis[1] / length_sq),
-            (2 * k + 1, n[k][1] - r * axis[0] / length_sq),
-            (4 + k, -r * 1f64.to_radians()),
-            (6 + k, -r * by_w.to_radians()),
-        ];
-        // Solve [n_1; n_2] dX = b e_k: along the other ray, as n_1 . d_2 = s and n_2 . d_1 = -s.
-        let other = d[1 - k];
-        let sign = if k == 0 { 1.0 } else { -1.0 };
-        for (parameter, b) in right_hand_sides {
-            out[0][parameter] = sign * b * other[0] / hit.sine;
-            out[1][parameter] = sign * b * other[1] / hit.sine;
-        }
-    }
-    out
-}
-
-/// Bounded error vectors of all presses as functions of the first parameters.
-pub struct Problem<'a> {
-    sights: &'a [Sight],
-    base: &'a StereoGeometry,
-    parameters: DVector<f64>,
-    bound_mm: f64,
-}
-
-impl<'a> Problem<'a> {
-    pub fn new(
-        sights: &'a [Sight],
-        base: &'a StereoGeometry,
-        parameters: DVector<f64>,
-        bound_mm: f64,
-    ) -> Self {
+impl Eye {
+    fn new(camera: CameraModel, half_fov_deg: f64) -> Self {
+        let ax = camera.aim.x_mm - camera.position.x_mm;
+        let ay = camera.aim.y_mm - camera.position.y_mm;
+        let length = libm::hypot(ax, ay);
+        let axis = [ax / length, ay / length];
         Self {
-            sights,
-            base,
-            parameters,
-            bound_mm,
+            camera,
+            axis,
+            axis_turn: [axis[1] / length, -axis[0] / length],
+            half_fov_deg,
         }
     }
 
-    pub fn geometry(&self) -> StereoGeometry {
-        with_parameters(self.base, self.parameters.as_slice())
+    /// The lens's angle at this column and the unit direction of the ray: the axis turned clockwise by angle and skew.
+    fn ray(&self, column: f64) -> (LensAngle, [f64; 2]) {
+        let half = f64::from(SENSOR_WIDTH) / 2.0;
+        let s = (column - half) / half;
+        let angle = self.camera.lens.angle(s);
+        let (sin, cos) = libm::sincos((angle.deg + self.camera.skew_deg).to_radians());
+        let [ax, ay] = self.axis;
+        (angle, [ax * cos + ay * sin, ay * cos - ax * sin])
+    }
+}
+
+/// Both cameras at given parameters.
+pub struct Eyes([Eye; 2]);
+
+impl Eyes {
+    /// `base` at its own parameters.
+    pub fn of(base: &StereoGeometry) -> Self {
+        Self(base.cameras.map(|c| Eye::new(c, c.lens.coefficients().0)))
     }
 
-    pub fn parameters(&self) -> &DVector<f64> {
-        &self.parameters
+    fn at(base: &StereoGeometry, p: &Parameters) -> Self {
+        let moved = with_parameters(base, p);
+        Self([0, 1].map(|k| Eye::new(moved.cameras[k], base.cameras[k].lens.coefficients().0)))
     }
 
-    /// Residuals and Jacobian at the current parameters.
-    pub fn linearised(&self) -> (DVector<f64>, DMatrix<f64>) {
-        let geometry = self.geometry();
-        let count = self.parameters.len();
+    /// Estimate minus truth, mm; `None` where the rays do not meet in front of both cameras.
+    pub fn error_vector(&self, sight: &Sight) -> Option<[f64; 2]> {
+        let d = [0, 1].map(|k| self.0[k].ray(sight.columns[k]).1);
+        self.error_of(sight, &self.meet(d))
+    }
+
+    fn meet(&self, directions: [[f64; 2]; 2]) -> Intersection {
+        let positions = [0, 1].map(|k| self.0[k].camera.position);
+        meet(positions, directions)
+    }
+
+    fn error_of(&self, sight: &Sight, hit: &Intersection) -> Option<[f64; 2]> {
+        let fixed = hit.sine.abs() >= PARALLEL_SINE && hit.range_mm.iter().all(|r| *r >= 0.0);
+        let error = [
+            hit.at.x_mm - sight.truth.x_mm,
+            hit.at.y_mm - sight.truth.y_mm,
+        ];
+        (fixed && error.iter().all(|e| e.is_finite())).then_some(error)
+    }
+
+    /// Error vector and its derivative by all parameters, mm per unit: rows x and y.
+    ///
+    /// With n_k the direction d_k turned by +90 degrees, the intersection X solves `n_k . (X - p_k) = 0`. Its
+    /// differential is `n_k . dX = n_k . dp_k + r_k dphi_k`, where phi_k is the ray's counter-clockwise angle: the
+    /// axis angle `atan2(aim - p_k)` minus theta_k.
+    fn linearised(&self, sight: &Sight) -> Option<([f64; 2], [[f64; PARAMETERS]; 2])> {
+        let rays = [0, 1].map(|k| self.0[k].ray(sight.columns[k]));
+        let hit = self.meet(rays.map(|(_, d)| d));
+        let error = self.error_of(sight, &hit)?;
+        let mut slope = [[0.0; PARAMETERS]; 2];
+        for (k, eye) in self.0.iter().enumerate() {
+            let (angle, d) = rays[k];
+            let r = hit.range_mm[k];
+            let per_degree = -r * 1f64.to_radians();
+            // Solve [n_1; n_2] dX = b e_k: along the other ray, as n_1 . d_2 = s and n_2 . d_1 = -s.
+            let other = rays[1 - k].1;
+            let along = if k == 0 { 1.0 } else { -1.0 } / hit.sine;
+            let right_hand_sides = [
+                (2 * k, -d[1] + r * eye.axis_turn[0]),
+                (2 * k + 1, d[0] + r * eye.axis_turn[1]),
+                (4 + k, per_degree),
+                (6 + k, per_degree * angle.by_w),
+                (8 + k, per_degree * angle.by_half_fov * eye.half_fov_deg),
+            ];
+            for (parameter, b) in right_hand_sides {
+                slope[0][parameter] = along * b * other[0];
+                slope[1][parameter] = along * b * other[1];
+            }
+        }
+        Some((error, slope))
+    }
+}
+
+/// Sum of squared residuals, half of its gradient `Jᵀr`, and the normal matrix `JᵀJ`.
+pub struct Normal {
+    pub cost: f64,
+    pub gradient: Parameters,
+    pub matrix: SMatrix<f64, PARAMETERS, PARAMETERS>,
+}
+
+/// Bounded error vectors of presses as functions of the first `count` parameters.
+#[derive(Clone, Copy)]
+pub struct Problem<'a> {
+    pub sights: &'a [Sight],
+    pub base: &'a StereoGeometry,
+    pub count: usize,
+    /// What an error vector can count at most, mm.
+    pub bound_mm: f64,
+}
+
+impl Problem<'_> {
+    /// Everything that a step needs, in one pass over the presses and without allocation. Sums run in the order of the
+    /// presses.
+    pub fn normal(&self, p: &Parameters) -> Normal {
+        let eyes = Eyes::at(self.base, p);
+        let mut cost = 0.0;
+        let mut gradient = [0.0; PARAMETERS];
+        let mut matrix = [[0.0; PARAMETERS]; PARAMETERS];
+        for sight in self.sights {
+            let (residual, slope) = self.bounded(&eyes, sight);
+            cost += residual[0] * residual[0] + residual[1] * residual[1];
+            for i in 0..self.count {
+                let (x, y) = (slope[0][i], slope[1][i]);
+                gradient[i] += x * residual[0] + y * residual[1];
+                for j in 0..=i {
+                    matrix[i][j] += x * slope[0][j] + y * slope[1][j];
+                }
+            }
+        }
+        let entry = |i: usize, j: usize| matrix[i.max(j)][i.min(j)];
+        Normal {
+            cost,
+            gradient: Parameters::from(gradient),
+            matrix: SMatrix::from_fn(entry),
+        }
+    }
+
+    /// All residuals (x and y of each press in turn) and the whole Jacobian.
+    pub fn rows(&self, p: &Parameters) -> (DVector<f64>, DMatrix<f64>) {
+        let eyes = Eyes::at(self.base, p);
         let mut residuals = DVector::zeros(2 * self.sights.len());
-        let mut jacobian = DMatrix::zeros(2 * self.sights.len(), count);
+        let mut jacobian = DMatrix::zeros(2 * self.sights.len(), self.count);
         for (i, sight) in self.sights.iter().enumerate() {
-            let Some(e) = error_vector(&geometry, sight) else {
-                // No fix: the bound itself, without a slope to follow.
-                residuals[2 * i] = self.bound_mm * std::f64::consts::FRAC_1_SQRT_2;
-                residuals[2 * i + 1] = residuals[2 * i];
-                continue;
-            };
-            let c_sq = self.bound_mm * self.bound_mm;
-            let shrink = 1.0 / (1.0 + (e[0] * e[0] + e[1] * e[1]) / c_sq).sqrt();
-            let slope = derivative(&geometry, sight);
+            let (residual, slope) = self.bounded(&eyes, sight);
             for axis in 0..2 {
-                residuals[2 * i + axis] = e[axis] * shrink;
-                for p in 0..count {
-                    let radial = e[0] * slope[0][p] + e[1] * slope[1][p];
-                    jacobian[(2 * i + axis, p)] = shrink * slope[axis][p]
-                        - e[axis] * radial * (shrink * shrink * shrink) / c_sq;
+                residuals[2 * i + axis] = residual[axis];
+                for j in 0..self.count {
+                    jacobian[(2 * i + axis, j)] = slope[axis][j];
                 }
             }
         }
         (residuals, jacobian)
     }
-}
 
-impl LeastSquaresProblem<f64, Dyn, Dyn> for Problem<'_> {
-    type ResidualStorage = Owned<f64, Dyn>;
-    type JacobianStorage = Owned<f64, Dyn, Dyn>;
-    type ParameterStorage = Owned<f64, Dyn>;
-
-    fn set_params(&mut self, x: &DVector<f64>) {
-        self.parameters.copy_from(x);
-    }
-
-    fn params(&self) -> DVector<f64> {
-        self.parameters.clone()
-    }
-
-    fn residuals(&self) -> Option<DVector<f64>> {
-        Some(self.linearised().0)
-    }
-
-    fn jacobian(&self) -> Option<DMatrix<f64>> {
-        Some(self.linearised().1)
+    /// `e / sqrt(1 + (e / c)²)` and its slope. A press without a fix counts c and has no slope to follow.
+    fn bounded(&self, eyes: &Eyes, sight: &Sight) -> ([f64; 2], [[f64; PARAMETERS]; 2]) {
+        let flat = [[0.0; PARAMETERS]; 2];
+        let c = self.bound_mm;
+        let Some((e, mut slope)) = eyes.linearised(sight) else {
+            return ([c * std::f64::consts::FRAC_1_SQRT_2; 2], flat);
+        };
+        let length = libm::hypot(e[0], e[1]);
+        if length > SATURATED * c {
+            return ([e[0] / length * c, e[1] / length * c], flat);
+        }
+        let shrink = 1.0 / (1.0 + (length / c) * (length / c)).sqrt();
+        let bend = shrink * shrink * shrink / (c * c);
+        let [by_x, by_y] = &mut slope;
+        for (x, y) in by_x.iter_mut().zip(by_y).take(self.count) {
+            let radial = bend * (e[0] * *x + e[1] * *y);
+            *x = shrink * *x - e[0] * radial;
+            *y = shrink * *y - e[1] * radial;
+        }
+        ([e[0] * shrink, e[1] * shrink], slope)
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use skinrig_model::{Point2, PressId};
+    use skinrig_model::{LensKind, LensModel, Point2, PressId};
 
+    use super::super::parameters::parameters_of;
     use super::*;
 
-    #[test]
-    fn the_jacobian_is_the_slope_of_the_residuals() {
-        let sights: Vec<Sight> = (0u32..12)
+    fn sights() -> Vec<Sight> {
+        (0u32..12)
             .map(|i| Sight {
                 press: PressId(i),
+                location: i,
                 columns: [180.0 + 25.0 * f64::from(i), 410.0 - 9.0 * f64::from(i)],
                 truth: Point2::new(10.0, f64::from(i)),
+                cluster_events: 100,
             })
-            .collect();
-        let base = StereoGeometry::PAPER;
-        let p = DVector::from_column_slice(&parameters_of(&base));
-        let (_, jacobian) = Problem::new(&sights, &base, p.clone(), 25.0).linearised();
-        for k in 0..PARAMETERS {
-            let h = 1e-5;
-            let at = |delta: f64| {
-                let mut q = p.clone();
-                q[k] += delta;
-                Problem::new(&sights, &base, q, 25.0).linearised().0
+            .collect()
+    }
+
+    fn lens(kind: LensKind) -> StereoGeometry {
+        let mut base = StereoGeometry::PAPER;
+        for (camera, w) in base.cameras.iter_mut().zip([-0.17, 0.074]) {
+            camera.lens = LensModel::new(kind, 58.0, w);
+        }
+        base
+    }
+
+    #[test]
+    fn the_jacobian_is_the_slope_of_the_residuals_for_every_lens() {
+        use LensKind::{Equidistant, Equisolid, Exponential, Rectilinear, Stereographic};
+        let sights = sights();
+        for kind in [
+            Exponential,
+            Equidistant,
+            Rectilinear,
+            Stereographic,
+            Equisolid,
+        ] {
+            let base = lens(kind);
+            let p = parameters_of(&base);
+            let problem = Problem {
+                sights: &sights,
+                base: &base,
+                count: PARAMETERS,
+                bound_mm: 25.0,
             };
-            let slope = (at(h) - at(-h)) / (2.0 * h);
-            let worst = (slope - jacobian.column(k)).amax();
-            assert!(
-                worst < 1e-5 * (1.0 + jacobian.column(k).amax()),
-                "parameter {k}: {worst}"
-            );
+            let (_, jacobian) = problem.rows(&p);
+            for k in 0..PARAMETERS {
+                let h = 1e-6;
+                let at = |delta: f64| {
+                    let mut q = p;
+                    q[k] += delta;
+                    problem.rows(&q).0
+                };
+                let slope = (at(h) - at(-h)) / (2.0 * h);
+                let worst = (slope - jacobian.column(k)).amax();
+                assert!(
+                    worst < 1e-7 * (1.0 + jacobian.column(k).amax()),
+                    "{kind:?}, parameter {k}: {worst}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn the_normal_equations_are_those_of_the_rows() {
+        let (sights, base) = (sights(), lens(LensKind::Exponential));
+        let p = parameters_of(&base);
+        for count in [4, 6, 8, 10] {
+            let problem = Problem {
+                sights: &sights,
+                base: &base,
+                count,
+                bound_mm: 25.0,
+            };
+            let (r, j) = problem.rows(&p);
+            let normal = problem.normal(&p);
+            let close = |a: f64, b: f64| (a - b).abs() <= 1e-12 * (1.0 + b.abs());
+            assert!(close(normal.cost, r.norm_squared()));
+            let (gradient, matrix) = (j.transpose() * &r, j.transpose() * &j);
+            for i in 0..count {
+                assert!(close(normal.gradient[i], gradient[i]), "{i}");
+                for k in 0..count {
+                    assert!(close(normal.matrix[(i, k)], matrix[(i, k)]), "{i} {k}");
+                }
+            }
         }
     }
 }

@@ -1,0 +1,226 @@
+//! Leave-locations-out cross-validation: the errors of presses at places that a fit has never seen.
+
+use rayon::prelude::*;
+use skinrig_model::StereoGeometry;
+
+use super::parameters::{Parameters, is_plausible, parameters_of, with_parameters};
+use super::problem::Problem;
+use super::solver::minimise;
+use super::{COARSE_BOUND_MM, best, error_lengths};
+use crate::seeded;
+use crate::sets::Sight;
+
+/// Folds; with fewer locations each is a fold.
+const FOLDS: usize = 10;
+/// Stream of the seed that deals locations to folds; the starts of a calibration use the small ones.
+const STREAM: u64 = 1 << 32;
+
+/// Which presses are held out together: all those of a location.
+pub struct Folds {
+    of_sight: Vec<usize>,
+    count: usize,
+    /// Locations outside the largest fold.
+    least_kept: usize,
+}
+
+impl Folds {
+    /// Deals the locations to folds of equal size, in an order drawn from `seed`.
+    pub fn deal(sights: &[Sight], seed: u64) -> Self {
+        let mut locations: Vec<u32> = sights.iter().map(|s| s.location).collect();
+        locations.sort_unstable();
+        locations.dedup();
+        let n = locations.len();
+        let count = FOLDS.min(n);
+        let mut fold_of: Vec<usize> = (0..n).map(|i| i % count.max(1)).collect();
+        let mut rng = seeded::generator(seed, STREAM);
+        for i in (1..n).rev() {
+            fold_of.swap(i, seeded::index(&mut rng, i + 1));
+        }
+        let of = |s: &Sight| {
+            locations
+                .binary_search(&s.location)
+                .map_or(0, |i| fold_of[i])
+        };
+        Self {
+            of_sight: sights.iter().map(of).collect(),
+            count,
+            least_kept: n - n.div_ceil(count.max(1)),
+        }
+    }
+
+    /// How many locations every fit has at least.
+    pub fn least_kept(&self) -> usize {
+        self.least_kept
+    }
+
+    /// Error length of each press, mm, at the geometry fitted to the other folds; `None` when one of these fits fails.
+    ///
+    /// Every fold starts from `start` and from `full`, the solution for all presses. Where a descent begins does not
+    /// change where it ends, and the bound of the last fit comes from the fold's own presses: nothing is learnt from a
+    /// held-out press.
+    pub fn held_out_errors(
+        &self,
+        sights: &[Sight],
+        start: &StereoGeometry,
+        count: usize,
+        full: &Parameters,
+    ) -> Option<Vec<f64>> {
+        let folds: Vec<Option<Vec<f64>>> = (0..self.count)
+            .into_par_iter()
+            .map(|fold| {
+                let (held, kept): (Vec<_>, Vec<_>) =
+                    (0..sights.len()).partition(|i| self.of_sight[*i] == fold);
+                let pick = |rows: &[usize]| rows.iter().map(|i| sights[*i]).collect::<Vec<_>>();
+                let geometry = fitted(&pick(&kept), start, count, full)?;
+                Some(error_lengths(&pick(&held), &geometry))
+            })
+            .collect();
+        let mut folds: Vec<_> = folds.into_iter().map(|f| f.map(Vec::into_iter)).collect();
+        let next = |fold: &usize| folds[*fold].as_mut()?.next();
+        self.of_sight.iter().map(next).collect()
+    }
+}
+
+fn fitted(
+    sights: &[Sight],
+    start: &StereoGeometry,
+    count: usize,
+    full: &Parameters,
+) -> Option<StereoGeometry> {
+    if 2 * sights.len() < count {
+        return None;
+    }
+    let problem = Problem {
+        sights,
+        base: start,
+        count,
+        bound_mm: COARSE_BOUND_MM,
+    };
+    let ends = [*full, parameters_of(start)].map(|from| minimise(&problem, from));
+    let coarse = best(&ends, start)?;
+    let problem = problem.with_fine_bound(&coarse.parameters);
+    let fine = minimise(&problem, coarse.parameters).parameters;
+    is_plausible(start, &fine).then(|| with_parameters(start, &fine))
+}
+
+/// Mean of `a - b` over presses, and its standard error when whole locations are the independent units (ratio
+/// estimator: locations may have different numbers of presses); `None` with fewer than two locations.
+pub fn mean_difference(locations: &[u32], a: &[f64], b: &[f64]) -> (f64, Option<f64>) {
+    let mut rows: Vec<(u32, f64)> = locations
+        .iter()
+        .zip(a.iter().zip(b))
+        .map(|(l, (a, b))| (*l, a - b))
+        .collect();
+    rows.sort_by_key(|r| r.0);
+    let n = rows.len() as f64;
+    let mean = rows.iter().map(|r| r.1).sum::<f64>() / n;
+    let mut places = 0.0;
+    let mut squares = 0.0;
+    for group in rows.chunk_by(|a, b| a.0 == b.0) {
+        let off: f64 = group.iter().map(|r| r.1 - mean).sum();
+        squares += off * off;
+        places += 1.0;
+    }
+    let error = (squares * places / (places - 1.0)).sqrt() / n;
+    (mean, (places > 1.0).then_some(error))
+}
+
+#[cfg(test)]
+mod tests {
+    use skinrig_model::{Point2, PressId};
+
+    use super::*;
+
+    fn sights() -> Vec<Sight> {
+        let planted = StereoGeometry::paper_like([43.0, -33.0, 47.5, 38.0, -1.2, 0.4, -0.11, 0.03]);
+        let mut noise = seeded::generator(5, 0);
+        let mut out = Vec::new();
+        for i in 0..60u32 {
+            // 30 places, each touched twice.
+            let truth = Point2::new(
+                -15.0 + 9.0 * f64::from(i % 30 % 6),
+                -18.0 + 9.0 * f64::from(i % 30 / 6),
+            );
+            let columns = planted
+                .cameras
+                .map(|c| c.column_of_point(truth).unwrap() + 3.0 * seeded::signed_unit(&mut noise));
+            out.push(Sight {
+                press: PressId(i),
+                location: i % 30,
+                columns,
+                truth,
+                cluster_events: 100,
+            });
+        }
+        out
+    }
+
+    #[test]
+    fn locations_stay_together_and_folds_are_even() {
+        let folds = Folds::deal(&sights(), 3);
+        assert_eq!((folds.count, folds.least_kept()), (10, 27));
+        for i in 0..30 {
+            assert_eq!(folds.of_sight[i], folds.of_sight[i + 30]);
+        }
+        for fold in 0..10 {
+            assert_eq!(folds.of_sight.iter().filter(|f| **f == fold).count(), 6);
+        }
+        let few = Folds::deal(&sights()[..7], 3);
+        assert_eq!((few.count, few.least_kept()), (7, 6));
+        assert_eq!(Folds::deal(&[], 3).count, 0);
+    }
+
+    /// If the fits saw the held-out location, moving its truth would move where they place it.
+    #[test]
+    fn a_held_out_location_has_no_say_in_its_own_error() {
+        let start = StereoGeometry::PAPER;
+        let mut sights = sights();
+        let folds = Folds::deal(&sights, 3);
+        let errors = |sights: &[Sight]| {
+            let problem = Problem {
+                sights,
+                base: &start,
+                count: 8,
+                bound_mm: COARSE_BOUND_MM,
+            };
+            let full = minimise(&problem, parameters_of(&start)).parameters;
+            let geometry = |fold: usize| {
+                let kept: Vec<Sight> = (0..sights.len())
+                    .filter(|i| folds.of_sight[*i] != fold)
+                    .map(|i| sights[i])
+                    .collect();
+                fitted(&kept, &start, 8, &full).unwrap()
+            };
+            let held = folds.held_out_errors(sights, &start, 8, &full).unwrap();
+            (held, geometry(folds.of_sight[11]))
+        };
+        let (before, geometry) = errors(&sights);
+        for i in [11, 41] {
+            sights[i].truth.x_mm += 6.0;
+        }
+        let (after, same) = errors(&sights);
+        for (a, b) in geometry.cameras.iter().zip(&same.cameras) {
+            assert!(a.position.distance_mm(b.position) < 1e-6);
+        }
+        for i in [11, 41] {
+            let wanted = error_lengths(&sights[i..=i], &geometry)[0];
+            assert!((after[i] - wanted).abs() < 1e-6);
+            assert!((after[i] - before[i]).abs() > 1.0);
+        }
+        // The others learn from it.
+        assert!((0..60).any(|i| i % 30 != 11 && (after[i] - before[i]).abs() > 0.01));
+    }
+
+    #[test]
+    fn the_error_of_a_mean_counts_locations_not_presses() {
+        let zero = [0.0; 8];
+        let once = mean_difference(&[0, 1, 2, 3], &[1.0, 2.0, 3.0, 6.0], &zero[..4]);
+        let spread = (4.0f64 + 1.0 + 0.0 + 9.0) / 3.0;
+        assert_eq!(once.0, 3.0);
+        assert!((once.1.unwrap() - (spread / 4.0).sqrt()).abs() < 1e-12);
+        let twice = [1.0, 2.0, 3.0, 6.0, 1.0, 2.0, 3.0, 6.0];
+        let both = mean_difference(&[0, 1, 2, 3, 0, 1, 2, 3], &twice, &zero);
+        assert_eq!(both, once);
+        assert_eq!(mean_difference(&[7, 7], &[1.0, 2.0], &zero[..2]).1, None);
+    }
+}

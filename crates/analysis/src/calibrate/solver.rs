@@ -1,0 +1,201 @@
+//! Damped least squares (Levenberg 1944, Marquardt 1963) on normal equations of at most ten unknowns.
+//!
+//! Each step solves `(JᵀJ + lambda D) delta = -Jᵀr` with D the largest diagonal of JᵀJ met so far (Moré 1978), which
+//! makes it independent of the parameters' units; lambda follows the gain ratio (Nielsen 1999). Normal equations
+//! square the condition number, which is harmless here: gradient and cost are exact whatever the step, so that only
+//! the speed of the last digits suffers. Errors of parameters come from the Jacobian itself (`uncertainty`).
+
+use nalgebra::Cholesky;
+
+use super::parameters::{PARAMETERS, Parameters};
+use super::problem::{Normal, Problem};
+
+/// Most steps tried.
+const MOST_STEPS: usize = 200;
+/// First damping, relative to D.
+const FIRST_DAMPING: f64 = 1e-3;
+/// Least and most damping.
+const DAMPING: (f64, f64) = (1e-14, 1e16);
+/// Converged: the cosine between residuals and each column of the Jacobian is at most this.
+const FLAT: f64 = 1e-10;
+/// Converged: the relative reduction of the cost that a step promises is at most this, about the rounding of the sum.
+const NO_GAIN: f64 = 1e-15;
+/// A step counts when it reduces the cost by at least this share of what it promised.
+const LEAST_GAIN_RATIO: f64 = 1e-4;
+
+/// Where a descent ended.
+pub struct Descent {
+    pub parameters: Parameters,
+    pub cost: f64,
+    /// Why it ended.
+    pub termination: &'static str,
+}
+
+/// Goes downhill from `from`.
+pub fn minimise(problem: &Problem<'_>, from: Parameters) -> Descent {
+    let mut at = from;
+    let mut here = problem.normal(&at);
+    let mut scale = Parameters::repeat(0.0);
+    let (mut damping, mut growth) = (FIRST_DAMPING, 2.0);
+    let ended = |parameters, cost, termination| Descent {
+        parameters,
+        cost,
+        termination,
+    };
+    for _ in 0..MOST_STEPS {
+        if !here.cost.is_finite() {
+            return ended(at, here.cost, "not converged: the error is not a number");
+        }
+        if is_flat(&here, problem.count) {
+            return ended(at, here.cost, "converged: the gradient is zero");
+        }
+        for i in 0..PARAMETERS {
+            scale[i] = scale[i].max(here.matrix[(i, i)]);
+        }
+        let Some(step) = step(&here, &scale, damping) else {
+            damping *= growth;
+            growth *= 2.0;
+            if damping > DAMPING.1 {
+                return ended(at, here.cost, "not converged: no step can be computed");
+            }
+            continue;
+        };
+        let promised = damping * step.component_mul(&step).dot(&scale) - step.dot(&here.gradient);
+        if promised <= NO_GAIN * here.cost {
+            return ended(
+                at,
+                here.cost,
+                "converged: the error does not change any more",
+            );
+        }
+        let there = at + step;
+        let next = problem.normal(&there);
+        let ratio = (here.cost - next.cost) / promised;
+        if ratio > LEAST_GAIN_RATIO {
+            (at, here) = (there, next);
+            let slack = 2.0 * ratio - 1.0;
+            damping = (damping * (1.0 - slack * slack * slack).max(1.0 / 3.0)).max(DAMPING.0);
+            growth = 2.0;
+        } else {
+            damping *= growth;
+            growth *= 2.0;
+            if damping > DAMPING.1 {
+                return ended(
+                    at,
+                    here.cost,
+                    "converged to the resolution of floating point",
+                );
+            }
+        }
+    }
+    ended(at, here.cost, "not converged: too many steps")
+}
+
+fn is_flat(here: &Normal, count: usize) -> bool {
+    (0..count).all(|i| {
+        let slope = here.gradient[i];
+        slope * slope <= FLAT * FLAT * here.matrix[(i, i)] * here.cost
+    })
+}
+
+fn step(here: &Normal, scale: &Parameters, damping: f64) -> Option<Parameters> {
+    let mut matrix = here.matrix;
+    for i in 0..PARAMETERS {
+        // A parameter without any effect (or beyond the model's) stays where it is.
+        matrix[(i, i)] += if scale[i] > 0.0 {
+            damping * scale[i]
+        } else {
+            1.0
+        };
+    }
+    let step = -Cholesky::new(matrix)?.solve(&here.gradient);
+    step.iter().all(|v| v.is_finite()).then_some(step)
+}
+
+#[cfg(test)]
+mod tests {
+    use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
+    use nalgebra::storage::Owned;
+    use nalgebra::{DMatrix, DVector, Dyn};
+    use skinrig_model::{Point2, PressId, StereoGeometry};
+
+    use super::super::parameters::parameters_of;
+    use super::*;
+    use crate::seeded;
+    use crate::sets::Sight;
+
+    /// The same problem for the orthogonal (QR) solver of a library.
+    struct Reference<'a>(Problem<'a>, Parameters);
+
+    impl LeastSquaresProblem<f64, Dyn, Dyn> for Reference<'_> {
+        type ResidualStorage = Owned<f64, Dyn>;
+        type JacobianStorage = Owned<f64, Dyn, Dyn>;
+        type ParameterStorage = Owned<f64, Dyn>;
+
+        fn set_params(&mut self, x: &DVector<f64>) {
+            self.1.rows_mut(0, self.0.count).copy_from(x);
+        }
+        fn params(&self) -> DVector<f64> {
+            self.1.rows(0, self.0.count).into_owned()
+        }
+        fn residuals(&self) -> Option<DVector<f64>> {
+            Some(self.0.rows(&self.1).0)
+        }
+        fn jacobian(&self) -> Option<DMatrix<f64>> {
+            Some(self.0.rows(&self.1).1)
+        }
+    }
+
+    #[test]
+    fn it_ends_where_an_orthogonal_solver_ends() {
+        let planted = StereoGeometry::paper_like([43.0, -33.0, 47.5, 38.0, -1.2, 0.4, -0.11, 0.03]);
+        let mut noise = seeded::generator(2, 0);
+        let sights: Vec<Sight> = (0..80u32)
+            .map(|i| {
+                let at = [
+                    -20.0 + 6.0 * f64::from(i % 10),
+                    -20.0 + 6.0 * f64::from(i / 10),
+                ];
+                let truth = Point2::new(at[0], at[1]);
+                let column = |c: skinrig_model::CameraModel| c.column_of_point(truth).unwrap();
+                Sight {
+                    press: PressId(i),
+                    location: i,
+                    columns: planted
+                        .cameras
+                        .map(|c| column(c) + 6.0 * seeded::signed_unit(&mut noise)),
+                    truth,
+                    cluster_events: 100,
+                }
+            })
+            .collect();
+        let base = StereoGeometry::PAPER;
+        for (count, bound_mm) in [(4, 25.0), (6, 5.0), (8, 25.0), (10, 25.0), (10, 5.0)] {
+            let problem = Problem {
+                sights: &sights,
+                base: &base,
+                count,
+                bound_mm,
+            };
+            let start = parameters_of(&base);
+            let ours = minimise(&problem, start);
+            let (theirs, _) = LevenbergMarquardt::new().minimize(Reference(problem, start));
+            let cost = theirs.0.normal(&theirs.1).cost;
+            assert!(
+                ours.termination.starts_with("converged"),
+                "{}",
+                ours.termination
+            );
+            assert!(
+                (ours.cost - cost).abs() < 1e-10 * cost,
+                "{count}: {} {cost}",
+                ours.cost
+            );
+            for p in 0..PARAMETERS {
+                let off = (ours.parameters[p] - theirs.1[p]).abs();
+                assert!(off < 1e-4, "{count} parameters, number {p}: {off}");
+                assert!(p < count || ours.parameters[p] == start[p]);
+            }
+        }
+    }
+}
