@@ -4,15 +4,17 @@
 //! [`SLACK_US`]; later ones are counted as late and reported, never silently dropped.
 
 use skinrig_model::{
-    AnalysisSettings, CameraId, CdEvent, CentroidRule, Polarity, PressId, SENSOR_HEIGHT,
+    AnalysisSettings, CameraId, CdEvent, CentroidRule, Estimator, Polarity, PressId, SENSOR_HEIGHT,
     SENSOR_WIDTH,
 };
 
 use crate::activity::ActivityGrid;
-use crate::dbscan::{Cluster, Dbscan};
+use crate::dbscan::Dbscan;
 use crate::error::AnalysisError;
+use crate::estimators::{PressEstimator, Sighting, Thinning};
 use crate::grid::PixelGrid;
 use crate::keeper::{KeepPlan, Keeper};
+use crate::kept::KeptEvent;
 use crate::rates::RateHistogram;
 use crate::result::{Activity, PicturePixel, PressPicture, PressView, RateZoom};
 use crate::segment::Window;
@@ -61,7 +63,10 @@ pub struct Accumulator<'a> {
     quiet_until_us: u64,
     newest_us: u64,
     late: u64,
+    thinning: Thinning,
     dbscan: Dbscan,
+    /// An estimator other than clusters of single pixels, and the windows keep their events for it.
+    estimator: Option<PressEstimator>,
     zooms: Vec<(ZoomPlan, Vec<u32>, Vec<u32>)>,
     zoom_next: usize,
     keeper: Keeper,
@@ -80,6 +85,35 @@ struct Open {
     idle_events: u64,
     /// ON events per pixel, only for a pictured press.
     on: Option<PixelGrid>,
+    /// For an estimator that needs them; time after the start of the window.
+    events: Vec<KeptEvent>,
+}
+
+/// How many events a press has in one camera.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Tally {
+    /// In its window.
+    pub events: u32,
+    /// Of them ON.
+    pub on: u32,
+    /// In the idle time before it.
+    pub idle: u64,
+}
+
+/// What one camera saw of a press.
+pub fn press_view(window: &Window, tally: Tally, sighting: &Sighting) -> PressView {
+    let per_s = |n: f64, s: f64| if s > 0.0 { n / s } else { 0.0 };
+    PressView {
+        events: tally.events,
+        on_events: tally.on,
+        clusters: sighting.clusters,
+        cluster_events: sighting.events,
+        centroid_u: sighting.column,
+        centroid_v: sighting.row,
+        rate_per_s: per_s(f64::from(tally.events), window.length_s()),
+        idle_rate_per_s: per_s(tally.idle as f64, window.idle_s()),
+        idle_s: window.idle_s(),
+    }
 }
 
 /// What [`Accumulator::finish`] gives.
@@ -126,7 +160,10 @@ impl<'a> Accumulator<'a> {
             quiet_until_us: 0,
             newest_us: 0,
             late: 0,
+            thinning: Thinning::new(settings.thinning, camera, settings.seed),
             dbscan: Dbscan::new(settings.eps_px, settings.min_samples),
+            estimator: (settings.estimator != Estimator::Dbscan || settings.bin_px > 1)
+                .then(|| PressEstimator::new(settings, settings.crop_v[camera.index()])),
             zooms,
             zoom_next: 0,
             keeper: Keeper::new(kept),
@@ -173,25 +210,8 @@ impl<'a> Accumulator<'a> {
 
     fn count(&mut self, event: &CdEvent) {
         let on = event.polarity == Polarity::On;
-        for open in &mut self.open {
-            let w = &open.window;
-            if event.t_us >= w.start_us && event.t_us < w.end_us {
-                if !open.grid.add(event.x, event.y) {
-                    self.error = Some(AnalysisError::TooManyEvents {
-                        camera: self.camera,
-                        row: w.row,
-                    });
-                    return;
-                }
-                if on {
-                    open.on_events += 1;
-                    if let Some(grid) = &mut open.on {
-                        grid.add(event.x, event.y);
-                    }
-                }
-            } else if event.t_us >= w.idle_start_us && event.t_us < w.start_us {
-                open.idle_events += 1;
-            }
+        if self.thinning.keeps(event) {
+            self.count_in_windows(event, on);
         }
         self.keeper.take(event);
         for (plan, ons, offs) in &mut self.zooms[self.zoom_next..] {
@@ -201,6 +221,32 @@ impl<'a> Accumulator<'a> {
             let bin = ((event.t_us - plan.start_us) / self.bin_us) as usize;
             if let Some(count) = if on { ons } else { offs }.get_mut(bin) {
                 *count += 1;
+            }
+        }
+    }
+
+    fn count_in_windows(&mut self, event: &CdEvent, on: bool) {
+        let keep = self.estimator.is_some();
+        for open in &mut self.open {
+            let w = &open.window;
+            if event.t_us >= w.start_us && event.t_us < w.end_us {
+                let packed = keep.then(|| KeptEvent::pack(event, w.start_us));
+                if !open.grid.add(event.x, event.y) || packed == Some(None) {
+                    self.error = Some(AnalysisError::TooManyEvents {
+                        camera: self.camera,
+                        row: w.row,
+                    });
+                    return;
+                }
+                open.events.extend(packed.flatten());
+                if on {
+                    open.on_events += 1;
+                    if let Some(grid) = &mut open.on {
+                        grid.add(event.x, event.y);
+                    }
+                }
+            } else if event.t_us >= w.idle_start_us && event.t_us < w.start_us {
+                open.idle_events += 1;
             }
         }
     }
@@ -246,6 +292,7 @@ impl<'a> Accumulator<'a> {
             on_events: 0,
             idle_events: 0,
             on: None,
+            events: Vec::new(),
         });
         fresh.window = window;
         if self.pictured.iter().any(|(row, _)| *row == window.row) {
@@ -255,41 +302,31 @@ impl<'a> Accumulator<'a> {
     }
 
     fn close(&mut self, mut done: Open) {
-        self.dbscan.run(&done.grid);
-        let chosen = match self.settings.centroid {
-            CentroidRule::LargestCluster => self.dbscan.largest().map(|(_, c)| c),
-            CentroidRule::AllClusters => self
-                .dbscan
-                .clusters()
-                .iter()
-                .copied()
-                .reduce(Cluster::merged),
+        if self.estimator.is_none() || done.on.is_some() {
+            self.dbscan.run(&done.grid);
+        }
+        let sighting = match &mut self.estimator {
+            None => Sighting::of_clusters(&self.dbscan, self.settings.centroid, 1),
+            Some(estimator) => {
+                done.events.sort_unstable();
+                estimator.sight(&done.events, 0)
+            }
         };
-        let centroid = chosen.and_then(|c| c.centroid());
-        let per_s = |n: f64, s: f64| if s > 0.0 { n / s } else { 0.0 };
+        let tally = Tally {
+            events: done.grid.events(),
+            on: done.on_events,
+            idle: done.idle_events,
+        };
         let window = done.window;
-        let events = done.grid.events();
-        self.views.push((
-            window.row,
-            PressView {
-                events,
-                on_events: done.on_events,
-                clusters: self.dbscan.clusters().len() as u32,
-                // The grid holds at most u32::MAX events.
-                cluster_events: chosen.map_or(0, |c| c.events) as u32,
-                centroid_u: centroid.map(|(u, _)| u),
-                centroid_v: centroid.map(|(_, v)| v),
-                rate_per_s: per_s(f64::from(events), window.length_s()),
-                idle_rate_per_s: per_s(done.idle_events as f64, window.idle_s()),
-                idle_s: window.idle_s(),
-            },
-        ));
+        self.views
+            .push((window.row, press_view(&window, tally, &sighting)));
         if let Some(on) = done.on.take()
             && let Some((_, press)) = self.pictured.iter().find(|(row, _)| *row == window.row)
         {
             self.pictures.push(self.picture(*press, &done.grid, &on));
         }
         done.grid.clear();
+        done.events.clear();
         done.on_events = 0;
         done.idle_events = 0;
         self.spare.push(done);
@@ -297,7 +334,10 @@ impl<'a> Accumulator<'a> {
 
     fn picture(&self, press: PressId, grid: &PixelGrid, on: &PixelGrid) -> PressPicture {
         let largest = self.dbscan.largest().map(|(label, _)| label);
+        let clusters = self.settings.estimator == Estimator::Dbscan;
         let makes_centroid = |label: u32| match self.settings.centroid {
+            // Every event has a say where nothing is clustered.
+            _ if !clusters => true,
             CentroidRule::LargestCluster => Some(label) == largest,
             CentroidRule::AllClusters => label != crate::dbscan::NOISE,
         };

@@ -3,6 +3,7 @@
 use skinrig_model::{AnalysisSettings, CameraId, SENSOR_HEIGHT};
 
 use crate::error::AnalysisError;
+use crate::estimators::BIN_SIDES_PX;
 use crate::input::SessionInput;
 
 /// Largest DBSCAN radius, px.
@@ -118,6 +119,31 @@ fn settings(input: &SessionInput) -> Result<(), AnalysisError> {
         positive(s.bits_per_event, 1024.0),
         "a number above 0 and up to 1024",
         s.bits_per_event,
+    )?;
+    number(
+        "forget_ms",
+        s.forget_ms >= 0.1 && s.forget_ms <= 60_000.0,
+        "a time between 0.1 ms and 60 s",
+        s.forget_ms,
+    )?;
+    number(
+        "thinning",
+        (1..=1 << 20).contains(&s.thinning),
+        "a factor from 1 to 1048576",
+        f64::from(s.thinning),
+    )?;
+    number(
+        "bin_px",
+        BIN_SIDES_PX.contains(&s.bin_px),
+        "1, 2, 4, 8 or 16 px",
+        f64::from(s.bin_px),
+    )?;
+    number(
+        "window_after_contact_ms",
+        s.window_after_contact_ms
+            .is_none_or(|v| positive(v, 60_000.0)),
+        "a time above 0 and up to 60 s",
+        s.window_after_contact_ms.unwrap_or(0.0),
     )?;
     studies(s, &number)?;
     for (from, to) in s.crop_v {

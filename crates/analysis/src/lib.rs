@@ -21,6 +21,7 @@ pub mod cmre;
 pub mod coverage;
 pub mod dbscan;
 mod error;
+pub mod estimators;
 pub mod grid;
 mod hash;
 pub mod input;

@@ -16,7 +16,7 @@ pub struct Window {
     pub row: usize,
     /// `window_before_ms` before the contact (or before the middle of the press).
     pub start_us: u64,
-    /// `window_after_ms` after the release (or after the middle).
+    /// `window_after_ms` after the release (or after the middle); at most `window_after_contact_ms` after the contact.
     pub end_us: u64,
     /// The idle time before it: at most 0.5 s, up to the end of any earlier window. Equal to `start_us` when
     /// less than 20 ms is free.
@@ -56,7 +56,7 @@ pub fn windows(
 ) -> Vec<Window> {
     // Before the camera's zero there are no events, so a window may begin there.
     let tick = |us: f64| us.ceil().max(0.0) as u64;
-    let mut windows: Vec<Window> = timings
+    let mut windows: Vec<(Window, u64)> = timings
         .map(|(row, timing)| {
             let contact = clock.camera_us_of_host(timing.contact);
             let release = clock.camera_us_of_host(timing.release);
@@ -66,24 +66,30 @@ pub fn windows(
             };
             let start_us = tick(first - settings.window_before_ms * 1e3);
             let end_us = tick(last + settings.window_after_ms * 1e3).max(start_us);
-            Window {
+            let cut_us = settings
+                .window_after_contact_ms
+                .map_or(u64::MAX, |ms| tick(contact + ms * 1e3));
+            let window = Window {
                 row,
                 start_us,
                 end_us,
                 idle_start_us: start_us,
-            }
+            };
+            (window, cut_us)
         })
         .collect();
-    windows.sort_by_key(|w| (w.start_us, w.row));
+    windows.sort_by_key(|(w, _)| (w.start_us, w.row));
     let mut earlier_end = 0;
-    for window in &mut windows {
+    for (window, cut_us) in &mut windows {
         let from = window.start_us.saturating_sub(IDLE_US).max(earlier_end);
         if from + LEAST_IDLE_US <= window.start_us {
             window.idle_start_us = from;
         }
+        // A window that is cut short leaves the rest of its press, which is not idle time.
         earlier_end = earlier_end.max(window.end_us);
+        window.end_us = window.end_us.min(*cut_us).max(window.start_us);
     }
-    windows
+    windows.into_iter().map(|(window, _)| window).collect()
 }
 
 #[cfg(test)]
@@ -146,6 +152,19 @@ mod tests {
         };
         let w = windows([(0, timing(4.0, 4.5))].into_iter(), &clock(0.0), &settings)[0];
         assert_eq!((w.start_us, w.end_us), (2_750_000, 5_650_000));
+    }
+
+    #[test]
+    fn a_window_cut_after_the_contact_leaves_the_idle_time_as_it_was() {
+        let presses = || [(0, timing(1.0, 1.5)), (1, timing(1.7, 1.75))].into_iter();
+        let whole = windows(presses(), &clock(0.0), &AnalysisSettings::default());
+        let settings = AnalysisSettings {
+            window_after_contact_ms: Some(200.0),
+            ..AnalysisSettings::default()
+        };
+        let cut = windows(presses(), &clock(0.0), &settings);
+        assert_eq!(cut[0].end_us, 1_200_000);
+        assert_eq!((cut[0].start_us, cut[1]), (whole[0].start_us, whole[1]));
     }
 
     #[test]

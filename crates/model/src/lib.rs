@@ -32,8 +32,9 @@ pub use record::{
 };
 pub use scene::{SceneNeed, SimLevel};
 pub use settings::{
-    AnalysisSettings, Background, CalibrationModel, CentroidRule, CmreSettings, LatencySettings,
-    LensKind, ReductionSettings, RigGeometry, ThresholdRule, WindowAnchor,
+    AnalysisSettings, Background, CalibrationModel, CentroidRule, CmreSettings, Estimator,
+    LatencySettings, LensKind, Precision, ReductionSettings, RigGeometry, ThresholdRule,
+    WindowAnchor,
 };
 pub use skin::SkinOutline;
 pub use stream::{ChunkFacts, RawChunk, StreamFormat};

@@ -16,6 +16,32 @@ pub enum CentroidRule {
     AllClusters,
 }
 
+/// What turns the events of a press in one camera into a column.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Estimator {
+    /// Mean of clustered events, as the paper says.
+    #[default]
+    Dbscan,
+    /// Median column of all events.
+    ColumnMedian,
+    /// Peak of the smoothed histogram of columns, between pixels.
+    HistogramPeak,
+    /// A histogram of 40 columns that forgets, updated event by event in constant memory.
+    Streaming,
+}
+
+/// Width of the floating-point numbers of an estimator. Estimators that count in whole numbers know no difference.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Precision {
+    /// 64 bits.
+    #[default]
+    F64,
+    /// 32 bits.
+    F32,
+}
+
 /// Which nested camera model is calibrated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -186,6 +212,19 @@ pub struct AnalysisSettings {
     pub min_samples: u32,
     /// Which clustered events make the centroid.
     pub centroid: CentroidRule,
+    /// What turns the events of a press into a column.
+    pub estimator: Estimator,
+    /// Width of the estimator's floating-point numbers.
+    pub precision: Precision,
+    /// After this time the streaming estimator has forgotten all but 1/e of an event, ms.
+    pub forget_ms: f64,
+    /// Only one event in this many is used, chosen at random (1: all).
+    pub thinning: u32,
+    /// Side of the square bins of pixels that the estimator sees, px: 1, 2, 4, 8 or 16.
+    pub bin_px: u16,
+    /// The press window ends this long after the measured contact, ms, if it is not over before; `None`: only the
+    /// release and `window_after_ms` end it.
+    pub window_after_contact_ms: Option<f64>,
     /// Where the press window is anchored.
     pub window_anchor: WindowAnchor,
     /// How the least number of clustered events is found.
@@ -239,6 +278,12 @@ impl Default for AnalysisSettings {
             eps_px: 10.0,
             min_samples: 10,
             centroid: CentroidRule::LargestCluster,
+            estimator: Estimator::Dbscan,
+            precision: Precision::F64,
+            forget_ms: 100.0,
+            thinning: 1,
+            bin_px: 1,
+            window_after_contact_ms: None,
             window_anchor: WindowAnchor::Touch,
             cluster_threshold: ThresholdRule::Calibrated,
             min_cluster_events: 20,

@@ -4,7 +4,7 @@
 /// clusters make the centroid, a press window is one whole period about the middle of the press, nothing is left
 /// out by a threshold, a response or an angle, the paper's eight parameters, data reduction with a core threshold of
 /// one event, the background after the press, thresholds 17 to 19. Each has its source in `docs/paper.md`.
-pub const REFERENCE_CODE: [&str; 25] = [
+pub const REFERENCE_CODE: [&str; 29] = [
     "analysis.crop.camera1=[185 px, 360 px]",
     "analysis.crop.camera2=[200 px, 355 px]",
     "analysis.window_anchor=middle",
@@ -13,6 +13,10 @@ pub const REFERENCE_CODE: [&str; 25] = [
     "analysis.eps=10 px",
     "analysis.min_samples=10",
     "analysis.centroid=all_clusters",
+    "analysis.estimator=dbscan",
+    "analysis.thinning=1",
+    "analysis.bin=1 px",
+    "analysis.window_after_contact=60 s",
     "analysis.cluster_threshold=fixed",
     "analysis.min_cluster_events=0",
     "analysis.min_response_sigma=0",

@@ -1,8 +1,8 @@
 //! The keys of `analysis` as settings of the analysis.
 
 use skinrig_model::{
-    AnalysisSettings, Background, CalibrationModel, CentroidRule, CmreSettings, LatencySettings,
-    LensKind, ReductionSettings, ThresholdRule, WindowAnchor,
+    AnalysisSettings, Background, CalibrationModel, CentroidRule, CmreSettings, Estimator,
+    LatencySettings, LensKind, Precision, ReductionSettings, ThresholdRule, WindowAnchor,
 };
 
 use crate::diagnostic::Collector;
@@ -34,6 +34,18 @@ pub(crate) fn analysis(f: &Field, out: &mut Collector) -> Option<AnalysisSetting
     let [Some(one), Some(two)] = crop_v else {
         return None;
     };
+    let bin = f.get("bin")?;
+    let bin_px = f.quantity("bin")?;
+    if ![1.0, 2.0, 4.0, 8.0, 16.0].contains(&bin_px) {
+        out.error(
+            bin.span,
+            bin.path.as_str(),
+            "bins that do not divide the sensor",
+        )
+        .expected("1, 2, 4, 8 or 16 px")
+        .found(format!("{bin_px} px"));
+        return None;
+    }
     Some(AnalysisSettings {
         crop_v: [one, two],
         window_before_ms: milliseconds(f.quantity("window_before")?),
@@ -52,6 +64,20 @@ pub(crate) fn analysis(f: &Field, out: &mut Collector) -> Option<AnalysisSetting
             "fixed" => ThresholdRule::Fixed,
             _ => ThresholdRule::Calibrated,
         },
+        estimator: match f.word("estimator")? {
+            "column_median" => Estimator::ColumnMedian,
+            "histogram_peak" => Estimator::HistogramPeak,
+            "streaming" => Estimator::Streaming,
+            _ => Estimator::Dbscan,
+        },
+        precision: match f.word("precision")? {
+            "f32" => Precision::F32,
+            _ => Precision::F64,
+        },
+        forget_ms: milliseconds(f.quantity("forget")?),
+        thinning: f.count("thinning")?,
+        bin_px: bin_px as u16,
+        window_after_contact_ms: f.quantity("window_after_contact").map(milliseconds),
         min_cluster_events: f.count("min_cluster_events")?,
         min_response_sigma: f.number("min_response_sigma")?,
         min_ray_sine: f.number("min_ray_sine")?,

@@ -50,6 +50,41 @@ pub(crate) static ANALYSIS: Table = Table {
             "Which clustered events make the centroid of a press.",
         ),
         default(
+            "estimator",
+            Shape::Choice(ESTIMATORS),
+            "dbscan",
+            "What turns the events of a press into a column; `skinrig tradeoff` measures what each is worth.",
+        ),
+        default(
+            "precision",
+            Shape::Choice(PRECISIONS),
+            "f64",
+            "Width of the estimator's floating-point numbers; `dbscan` and `column_median` count in whole numbers and know no difference.",
+        ),
+        default(
+            "forget",
+            Shape::Quantity(&[Time], Range::between(0.0001, 60.0)),
+            "100 ms",
+            "After this time the streaming estimator has forgotten all but 1/e of an event.",
+        ),
+        default(
+            "thinning",
+            count(1, 1 << 20),
+            "1",
+            "Only one event in this many is used, chosen at random; 1: all.",
+        ),
+        default(
+            "bin",
+            Shape::Quantity(&[Pixels], Range::between(1.0, 16.0)),
+            "1 px",
+            "Side of the square bins of pixels that the estimator sees: 1, 2, 4, 8 or 16 px.",
+        ),
+        optional(
+            "window_after_contact",
+            Shape::Quantity(&[Time], Range::above_zero(60.0)),
+            "The press window ends this long after the measured contact, if it is not over before; when absent only the release ends it.",
+        ),
+        default(
             "window_anchor",
             Shape::Choice(ANCHORS),
             "touch",
@@ -184,6 +219,21 @@ pub(crate) static CROP: Table = Table {
     ],
     exactly_one: &[],
 };
+
+const ESTIMATORS: &[Word] = &[
+    ("dbscan", "mean of the clustered events, as the paper says"),
+    ("column_median", "median column of all events"),
+    (
+        "histogram_peak",
+        "peak of the histogram of columns, smoothed by `eps`",
+    ),
+    (
+        "streaming",
+        "a running histogram of 40 columns that forgets, in constant memory",
+    ),
+];
+
+const PRECISIONS: &[Word] = &[("f64", "64 bits"), ("f32", "32 bits")];
 
 pub(crate) const CENTROIDS: &[Word] = &[
     ("largest_cluster", "the largest cluster, as the paper says"),

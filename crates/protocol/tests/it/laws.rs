@@ -55,6 +55,12 @@ fn absent_settings_are_the_documented_defaults() {
         "analysis.cmre.region=80 mm",
         "analysis.bootstrap_resamples=10",
         "analysis.seed=9",
+        "analysis.estimator=streaming",
+        "analysis.precision=f32",
+        "analysis.forget=70 ms",
+        "analysis.thinning=8",
+        "analysis.bin=4 px",
+        "analysis.window_after_contact=100 ms",
         "analysis.rate_bin=20 ms",
     ])
     .analysis;

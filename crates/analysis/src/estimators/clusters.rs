@@ -1,0 +1,64 @@
+//! Mean column of the largest cluster, or of all of them.
+
+use skinrig_model::{AnalysisSettings, CentroidRule};
+
+use super::{Sighting, column_px};
+use crate::dbscan::{Cluster, Dbscan};
+use crate::grid::PixelGrid;
+use crate::kept::KeptEvent;
+
+/// DBSCAN on bins of pixels. The radius is that of the settings in bins; the core threshold counts events, which
+/// larger bins do not change. A radius below one bin joins only events of the same bin.
+#[derive(Debug, Clone)]
+pub struct Clusters {
+    side_px: u16,
+    shift: u32,
+    rule: CentroidRule,
+    grid: PixelGrid,
+    dbscan: Dbscan,
+}
+
+impl Clusters {
+    /// For the kept rows `rows.0..=rows.1` of a camera.
+    #[must_use]
+    pub fn new(settings: &AnalysisSettings, rows: (u16, u16)) -> Self {
+        let side = settings.bin_px.max(1);
+        Self {
+            side_px: side,
+            shift: side.trailing_zeros(),
+            rule: settings.centroid,
+            grid: PixelGrid::new((rows.0 / side, rows.1 / side)),
+            dbscan: Dbscan::new(settings.eps_px / f64::from(side), settings.min_samples),
+        }
+    }
+
+    /// See [`super::PressEstimator::sight`].
+    pub fn sight(&mut self, events: &[KeptEvent]) -> Sighting {
+        for event in events {
+            self.grid
+                .add(event.x() >> self.shift, event.y() >> self.shift);
+        }
+        self.dbscan.run(&self.grid);
+        self.grid.clear();
+        Sighting::of_clusters(&self.dbscan, self.rule, self.side_px)
+    }
+}
+
+impl Sighting {
+    /// What the last run says, on bins of side `side_px`.
+    #[must_use]
+    pub fn of_clusters(dbscan: &Dbscan, rule: CentroidRule, side_px: u16) -> Self {
+        let chosen = match rule {
+            CentroidRule::LargestCluster => dbscan.largest().map(|(_, c)| c),
+            CentroidRule::AllClusters => dbscan.clusters().iter().copied().reduce(Cluster::merged),
+        };
+        let centroid = chosen.and_then(|c| c.centroid());
+        Self {
+            column: centroid.map(|(u, _)| column_px(u, side_px)),
+            row: centroid.map(|(_, v)| column_px(v, side_px)),
+            clusters: dbscan.clusters().len() as u32,
+            // The grid holds at most u32::MAX events.
+            events: chosen.map_or(0, |c| c.events) as u32,
+        }
+    }
+}

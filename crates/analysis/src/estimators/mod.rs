@@ -1,0 +1,105 @@
+//! What turns the events of one press in one camera into a column: clusters, median, histogram peak, running histogram.
+//!
+//! All of them take the events of the window in order of time and give the same answer for the same events, whatever
+//! the machine. They see square bins of pixels: bin `b` of side `s` px lies about column `s b + (s - 1) / 2`.
+
+mod clusters;
+mod columns;
+mod peak;
+mod real;
+mod streaming;
+mod thinning;
+
+pub use clusters::Clusters;
+pub use columns::{ColumnCounts, Median};
+pub use peak::Peak;
+pub use real::Real;
+pub use streaming::Streaming;
+pub use thinning::Thinning;
+
+use skinrig_model::{AnalysisSettings, Estimator, Precision};
+
+use crate::kept::KeptEvent;
+
+/// Sides of the bins that pixels can be put together to, px: they divide both sides of the sensor.
+pub const BIN_SIDES_PX: [u16; 5] = [1, 2, 4, 8, 16];
+
+/// What an estimator says.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Sighting {
+    /// The column, px; `None` when the estimator found nothing.
+    pub column: Option<f64>,
+    /// The row, px, where the estimator looks at rows.
+    pub row: Option<f64>,
+    /// Clusters found; without clustering 1 when there is a column.
+    pub clusters: u32,
+    /// Events that the column stands on; a running histogram: its weight, in events.
+    pub events: u32,
+}
+
+impl Sighting {
+    const fn at(column: f64, events: u32) -> Self {
+        Self {
+            column: Some(column),
+            row: None,
+            clusters: 1,
+            events,
+        }
+    }
+}
+
+/// An estimator with its buffers, to be used for press after press.
+#[derive(Debug, Clone)]
+pub struct PressEstimator(Kind);
+
+#[derive(Debug, Clone)]
+enum Kind {
+    Clusters(Box<Clusters>),
+    Median(Box<Median>),
+    Peak64(Box<Peak<f64>>),
+    Peak32(Box<Peak<f32>>),
+    Streaming64(Box<Streaming<f64>>),
+    Streaming32(Box<Streaming<f32>>),
+}
+
+impl PressEstimator {
+    /// The estimator of these settings for a camera whose rows `rows.0..=rows.1` are kept. The settings are in range.
+    #[must_use]
+    pub fn new(settings: &AnalysisSettings, rows: (u16, u16)) -> Self {
+        let (side, eps) = (settings.bin_px, settings.eps_px);
+        let wide = settings.precision == Precision::F64;
+        Self(match settings.estimator {
+            Estimator::Dbscan => Kind::Clusters(Box::new(Clusters::new(settings, rows))),
+            Estimator::ColumnMedian => Kind::Median(Box::new(Median::new(side))),
+            Estimator::HistogramPeak if wide => Kind::Peak64(Box::new(Peak::new(side, eps))),
+            Estimator::HistogramPeak => Kind::Peak32(Box::new(Peak::new(side, eps))),
+            Estimator::Streaming if wide => {
+                Kind::Streaming64(Box::new(Streaming::new(side, settings.forget_ms)))
+            }
+            Estimator::Streaming => {
+                Kind::Streaming32(Box::new(Streaming::new(side, settings.forget_ms)))
+            }
+        })
+    }
+
+    /// The sighting of a window that begins at `from_us`, from its events in order of time.
+    pub fn sight(&mut self, events: &[KeptEvent], from_us: u32) -> Sighting {
+        match &mut self.0 {
+            Kind::Clusters(e) => e.sight(events),
+            Kind::Median(e) => e.sight(events),
+            Kind::Peak64(e) => e.sight(events),
+            Kind::Peak32(e) => e.sight(events),
+            Kind::Streaming64(e) => e.sight(events, from_us),
+            Kind::Streaming32(e) => e.sight(events, from_us),
+        }
+    }
+}
+
+/// The column of a place among bins of this side, px.
+fn column_px(bin: f64, side_px: u16) -> f64 {
+    let side = f64::from(side_px);
+    side * bin + (side - 1.0) / 2.0
+}
+
+#[cfg(test)]
+mod tests;
