@@ -39,12 +39,15 @@ pub enum Fault {
     NoEvents,
     /// There are no trigger edges where the rig has a trigger line.
     NoTriggers,
-    /// There are no measured positions.
+    /// There are no measured positions, or no measured times.
     NoTruth,
     /// Many planned presses are not in the recording.
     PressesMissing,
     /// A clock runs far from its nominal rate, or the alignment is wrong.
     ClockWrong,
+    /// The journal contradicts itself: moments out of order or before the session, presses that overlap or are
+    /// listed twice.
+    JournalContradictory,
     /// The robot did not do what was commanded.
     RobotOff,
     /// Skin, camera or light moved between repetitions.

@@ -1,0 +1,250 @@
+//! Law: position, depth and speed are as commanded.
+
+use std::collections::BTreeSet;
+
+use skinrig_model::{Point2, PressRole};
+
+use super::finding;
+use super::statistics::median;
+use super::touch::Touch;
+use crate::input::SessionInput;
+use crate::result::{Fault, Finding, Law};
+
+/// Positions off by more than this in the median are no settling errors, mm: a tenth of the paper's tip.
+const MOST_OFF_MM: f64 = 1.0;
+/// Depths off by more than this in the median, mm,
+const MOST_DEPTH_OFF_MM: f64 = 0.25;
+/// and by more than this share of the depth, are not as commanded.
+const MOST_DEPTH_SHARE: f64 = 0.15;
+/// An indentation this many times as long or as short as the usual one at its depth was not made at its speed.
+const MOST_SPEED_FACTOR: f64 = 2.0;
+/// Above this share of presses that were off, the robot is.
+const MOST_PRESSES: f64 = 0.2;
+/// A statement needs this many presses.
+const LEAST_PRESSES: usize = 4;
+/// Factors between units of length that are in use: m and cm for mm, inches, and the reverse.
+const FACTORS: [f64; 6] = [1e-3, 0.1, 1.0 / 25.4, 1e3, 10.0, 25.4];
+/// A path smaller than this share of the skin is in another unit when the centroids say that it is not small.
+const SMALL_PATH: f64 = 0.01;
+/// Columns that scatter by more than this in the median do not come from such a small path, px.
+const MOVING_PX: f64 = 20.0;
+/// Largest shift of the press list that is looked for.
+const MOST_SHIFT: i32 = 5;
+
+pub fn findings(input: &SessionInput, touches: &[Touch<'_>]) -> Vec<Finding> {
+    let path: Vec<&Touch<'_>> = touches
+        .iter()
+        .filter(|t| t.role != PressRole::Sync && t.done())
+        .collect();
+    let mut found = Vec::new();
+    found.extend(unit(input, &path));
+    found.extend(position(input, &path));
+    found.extend(depth(&path));
+    found.extend(speed(&path));
+    found.extend(refused(touches));
+    found
+}
+
+/// Planned and measured positions agree, but no skin is that large, or that small.
+fn unit(input: &SessionInput, path: &[&Touch<'_>]) -> Option<Finding> {
+    let outline = &input.rig.outline;
+    let points: Vec<Point2> = path.iter().filter_map(|t| t.truth).collect();
+    if points.len() < LEAST_PRESSES {
+        return None;
+    }
+    let size_mm = outline.width_mm.max(outline.height_mm);
+    let extent = extent_mm(&points);
+    let distinct: BTreeSet<(u64, u64)> = points
+        .iter()
+        .map(|p| (p.x_mm.to_bits(), p.y_mm.to_bits()))
+        .collect();
+    let small = distinct.len() >= LEAST_PRESSES
+        && extent < SMALL_PATH * size_mm
+        && (0..2).any(|k| moves(path, k));
+    let outside = points.iter().filter(|p| !outline.box_contains(**p)).count();
+    let large = 2 * outside > points.len() && extent > 2.0 * size_mm;
+    (small || large).then(|| {
+        let evidence = format!(
+            "expected measured positions on a skin of {size_mm} mm, found them {extent:.3} mm wide with {outside} of {} beside it",
+            points.len()
+        );
+        finding(Law::AsCommanded, Fault::UnitOfPositions, None, evidence)
+    })
+}
+
+fn moves(path: &[&Touch<'_>], camera: usize) -> bool {
+    let columns: Vec<f64> = path
+        .iter()
+        .filter_map(|t| t.sights[camera].column)
+        .collect();
+    let Some(middle) = median(columns.clone()) else {
+        return false;
+    };
+    let scatter = median(columns.iter().map(|c| (c - middle).abs()).collect());
+    columns.len() >= LEAST_PRESSES && scatter.is_some_and(|s| s > MOVING_PX)
+}
+
+fn extent_mm(points: &[Point2]) -> f64 {
+    let range = |of: fn(&Point2) -> f64| {
+        let low = points.iter().map(of).fold(f64::INFINITY, f64::min);
+        let high = points.iter().map(of).fold(f64::NEG_INFINITY, f64::max);
+        high - low
+    };
+    range(|p| p.x_mm).max(range(|p| p.y_mm))
+}
+
+/// Measured against planned positions: the fault is the reading of the plan that gives the measurement.
+fn position(input: &SessionInput, path: &[&Touch<'_>]) -> Option<Finding> {
+    let measured = path.iter().filter(|t| t.truth.is_some()).count();
+    if measured < LEAST_PRESSES {
+        return None;
+    }
+    let off = residual_mm(path, 0, |p| p)?.0;
+    if off <= MOST_OFF_MM {
+        return None;
+    }
+    let centre = input.rig.outline.centre;
+    let mut readings: Vec<(Fault, String, Option<(f64, f64)>)> = Vec::new();
+    for factor in FACTORS {
+        let scaled = |p: Point2| Point2::new(factor * p.x_mm, factor * p.y_mm);
+        let what = format!("the planned ones times {factor:.3}");
+        readings.push((Fault::UnitOfPositions, what, residual_mm(path, 0, scaled)));
+    }
+    for (about, name) in [(Point2::default(), "0"), (centre, "the skin's centre")] {
+        for (x, y, axes) in [
+            (true, false, "x"),
+            (false, true, "y"),
+            (true, true, "x and y"),
+        ] {
+            let flip = |v: f64, c: f64, yes: bool| if yes { 2.0 * c - v } else { v };
+            let mirrored =
+                |p: Point2| Point2::new(flip(p.x_mm, about.x_mm, x), flip(p.y_mm, about.y_mm, y));
+            let what = format!("the planned ones with {axes} mirrored about {name}");
+            readings.push((Fault::AxisMirrored, what, residual_mm(path, 0, mirrored)));
+        }
+    }
+    for by in (1..=MOST_SHIFT).flat_map(|k| [k, -k]) {
+        let what = format!("the planned ones {by:+} rows on");
+        readings.push((Fault::IndexShifted, what, residual_mm(path, by, |p| p)));
+    }
+    // A reading fits when what is left is small against the positions that it predicts.
+    let fits = |(_, _, r): &(Fault, String, Option<(f64, f64)>)| {
+        r.is_some_and(|(left, extent)| left < MOST_OFF_MM && left < 0.1 * extent)
+    };
+    let best = readings
+        .into_iter()
+        .filter(fits)
+        .min_by(|a, b| left_of(a.2).total_cmp(&left_of(b.2)));
+    let n = measured;
+    Some(match best {
+        Some((fault, what, left)) => {
+            let left = left_of(left);
+            let evidence = format!(
+                "expected measured positions within {MOST_OFF_MM} mm of the planned ones, found them {off:.2} mm off in the \
+                 median, and {left:.3} mm off {what} (n {n})"
+            );
+            finding(Law::AsCommanded, fault, None, evidence)
+        }
+        None => {
+            let evidence = format!(
+                "expected measured positions within {MOST_OFF_MM} mm of the planned ones, found them {off:.2} mm off in the median (n {n})"
+            );
+            finding(Law::AsCommanded, Fault::RobotOff, None, evidence)
+        }
+    })
+}
+
+fn left_of(residual: Option<(f64, f64)>) -> f64 {
+    residual.map_or(f64::INFINITY, |r| r.0)
+}
+
+/// Median distance of the measured positions from a reading of the planned ones `by` rows on, and the extent of
+/// that reading, mm; `None` without numbers.
+fn residual_mm(
+    path: &[&Touch<'_>],
+    by: i32,
+    reading: impl Fn(Point2) -> Point2,
+) -> Option<(f64, f64)> {
+    let pairs: Vec<(Point2, Point2)> = path
+        .iter()
+        .enumerate()
+        .filter_map(|(i, touch)| {
+            let there = usize::try_from(i as i64 + i64::from(by)).ok()?;
+            Some((touch.truth?, reading(path.get(there)?.planned)))
+        })
+        .filter(|(_, p)| super::touch::is_number(*p))
+        .collect();
+    let predicted: Vec<Point2> = pairs.iter().map(|p| p.1).collect();
+    let left = median(pairs.iter().map(|(a, b)| a.distance_mm(*b)).collect())?;
+    (pairs.len() >= LEAST_PRESSES).then(|| (left, extent_mm(&predicted)))
+}
+
+fn depth(path: &[&Touch<'_>]) -> Option<Finding> {
+    let pairs: Vec<(f64, f64)> = path
+        .iter()
+        .filter_map(|t| Some((t.outcome.measured_depth_mm?, t.depth_mm)))
+        .filter(|(measured, planned)| measured.is_finite() && planned.is_finite())
+        .collect();
+    let off = |(measured, planned): &(f64, f64)| (measured - planned).abs();
+    let wrong = pairs
+        .iter()
+        .filter(|p| off(p) > MOST_DEPTH_OFF_MM.max(MOST_DEPTH_SHARE * p.1.abs()))
+        .count();
+    let n = pairs.len();
+    if n < LEAST_PRESSES || wrong as f64 <= MOST_PRESSES * n as f64 {
+        return None;
+    }
+    let usual = median(pairs.iter().map(|(m, p)| m - p).collect())?;
+    let evidence = format!(
+        "expected the commanded depths within {MOST_DEPTH_OFF_MM} mm, found {wrong} of {n} off, {usual:+.2} mm in the median"
+    );
+    Some(finding(Law::AsCommanded, Fault::RobotOff, None, evidence))
+}
+
+/// The commanded speed is not part of the plan of presses, but the same depth takes the same time.
+fn speed(path: &[&Touch<'_>]) -> Option<Finding> {
+    let lasted = |t: &Touch<'_>| {
+        let timing = t.timing?;
+        let s = (timing.at_depth - timing.contact).as_secs_f64();
+        (s > 0.0).then_some((t.place.1, s))
+    };
+    let all: Vec<(u64, f64)> = path.iter().filter_map(|t| lasted(t)).collect();
+    let n = all.len();
+    if n < LEAST_PRESSES {
+        return None;
+    }
+    let usual = |depth: u64| {
+        let same = all.iter().filter(|(d, _)| *d == depth).map(|(_, s)| *s);
+        median(same.collect())
+    };
+    let depths: BTreeSet<u64> = all.iter().map(|(d, _)| *d).collect();
+    let usual: Vec<(u64, f64)> = depths
+        .into_iter()
+        .filter_map(|d| Some((d, usual(d)?)))
+        .collect();
+    let strange = |(depth, s): &&(u64, f64)| {
+        let own = usual.iter().find(|(d, _)| d == depth);
+        own.is_some_and(|(_, u)| *s > MOST_SPEED_FACTOR * u || *s < u / MOST_SPEED_FACTOR)
+    };
+    let wrong = all.iter().filter(strange).count();
+    (wrong as f64 > MOST_PRESSES * n as f64).then(|| {
+        let evidence = format!(
+            "expected indentations of equal depth to take equal time, found {wrong} of {n} off by more than a factor of {MOST_SPEED_FACTOR}"
+        );
+        finding(Law::AsCommanded, Fault::RobotOff, None, evidence)
+    })
+}
+
+/// Presses that the journal itself calls not as planned.
+fn refused(touches: &[Touch<'_>]) -> Option<Finding> {
+    let invalid =
+        |t: &&Touch<'_>| matches!(t.outcome.verdict, skinrig_model::PressVerdict::Invalid(_));
+    let (wrong, n) = (touches.iter().filter(invalid).count(), touches.len());
+    let example = touches.iter().find(invalid)?.outcome.verdict.reason()?;
+    (n >= LEAST_PRESSES && wrong as f64 > MOST_PRESSES * n as f64).then(|| {
+        let evidence = format!(
+            "expected presses as planned, found {wrong} of {n} that the journal calls invalid, the first one: {example}"
+        );
+        finding(Law::AsCommanded, Fault::RobotOff, None, evidence)
+    })
+}

@@ -1,0 +1,179 @@
+//! Law: the data that a session of this kind has are there, and the journal does not contradict itself.
+
+use std::collections::BTreeSet;
+
+use skinrig_model::{CameraId, PressRole, PressVerdict};
+
+use super::finding;
+use super::touch::is_number;
+use crate::input::SessionInput;
+use crate::result::{Analysis, ClockMethod, Fault, Finding, Law};
+
+/// Above this share of planned presses that were never attempted, the session is incomplete.
+const MOST_MISSED: f64 = 0.1;
+/// Above this share of attempted presses without a measured time or position, there is no truth.
+const MOST_WITHOUT_TRUTH: f64 = 0.2;
+/// Below this share of the marks sent that a clock fit could use, the trigger line does not work.
+const LEAST_MARKS: f64 = 0.5;
+
+pub fn findings(input: &SessionInput, analysis: &Analysis) -> Vec<Finding> {
+    let mut found = Vec::new();
+    found.extend(contradiction(input));
+    found.extend(events(analysis));
+    found.extend(truth(input));
+    found.extend(missed(input));
+    found.extend(triggers(input, analysis));
+    found
+}
+
+/// Times that cannot be: moments out of order or before the session, presses that overlap or stand twice.
+fn contradiction(input: &SessionInput) -> Option<Finding> {
+    let mut spans = Vec::new();
+    let (mut disordered, mut negative) = (0u32, 0u32);
+    for outcome in input.outcomes.iter().flatten() {
+        let Some(t) = outcome.timing else { continue };
+        let moments = [
+            t.approach, t.contact, t.at_depth, t.retract, t.release, t.clear,
+        ];
+        negative += u32::from(t.approach.0 < 0);
+        disordered += u32::from(moments.windows(2).any(|w| w[0] > w[1]) || t.contact == t.release);
+        spans.push((t.contact, t.release));
+    }
+    spans.sort_unstable();
+    let overlapping = spans.windows(2).filter(|w| w[1].0 < w[0].1 || w[0] == w[1]);
+    let overlapping = overlapping.count();
+    let distinct: BTreeSet<u32> = input.planned.iter().map(|p| p.id.0).collect();
+    let doubled = input.planned.len() - distinct.len();
+    if disordered == 0 && negative == 0 && overlapping == 0 && doubled == 0 {
+        return None;
+    }
+    let evidence = format!(
+        "expected each press once, its moments in order and after the last press's, found {disordered} of {n} presses \
+         with moments out of order, {negative} before the session, {overlapping} overlapping another, {doubled} listed twice",
+        n = spans.len()
+    );
+    Some(finding(
+        Law::Complete,
+        Fault::JournalContradictory,
+        None,
+        evidence,
+    ))
+}
+
+fn events(analysis: &Analysis) -> Vec<Finding> {
+    let counted = |camera: CameraId| {
+        let series = &analysis.rates[camera.index()].mean_per_s;
+        series.iter().any(|rate| *rate > 0.0)
+    };
+    let elsewhere = |camera: CameraId| {
+        let activity = analysis.activity.iter().find(|a| a.camera == camera);
+        activity.map_or(0, |a| a.counts.iter().sum::<u64>())
+    };
+    let silent: Vec<CameraId> = CameraId::ALL.into_iter().filter(|c| !counted(*c)).collect();
+    if silent.len() == 2 && silent.iter().all(|c| elsewhere(*c) == 0) {
+        let evidence = "expected events of two cameras, found none of either (the kinematic simulation makes none)";
+        return vec![finding(
+            Law::Complete,
+            Fault::NoEvents,
+            None,
+            evidence.to_owned(),
+        )];
+    }
+    let named = silent.into_iter().map(|camera| {
+        let (first, last) = analysis.settings.crop_v[camera.index()];
+        match elsewhere(camera) {
+            0 => finding(
+                Law::Complete,
+                Fault::NoEvents,
+                Some(camera),
+                format!("expected events of {camera}, found none in the whole recording"),
+            ),
+            others => finding(
+                Law::Complete,
+                Fault::CameraBlind,
+                Some(camera),
+                format!("expected events of {camera} in rows {first} to {last}, found none there and {others} elsewhere"),
+            ),
+        }
+    });
+    named.collect()
+}
+
+fn truth(input: &SessionInput) -> Option<Finding> {
+    let attempted = || {
+        let outcomes = input.outcomes.iter().flatten();
+        outcomes.filter(|o| o.verdict == PressVerdict::Valid)
+    };
+    let n = attempted().count();
+    let without = |lacks: &dyn Fn(&skinrig_model::PressOutcome) -> bool| {
+        attempted().filter(|o| lacks(o)).count()
+    };
+    let positions = without(&|o| !o.measured_at.is_some_and(is_number));
+    let times = without(&|o| o.timing.is_none());
+    let too_many = |count: usize| count as f64 > MOST_WITHOUT_TRUTH * n as f64;
+    (too_many(positions) || too_many(times)).then(|| {
+        let evidence = format!(
+            "expected a measured time and position of each press done, found {positions} of {n} without a \
+             position and {times} of {n} without times"
+        );
+        finding(Law::Complete, Fault::NoTruth, None, evidence)
+    })
+}
+
+fn missed(input: &SessionInput) -> Option<Finding> {
+    let rows = input.planned.iter().zip(&input.outcomes);
+    let rows = rows.filter(|(p, _)| p.role != PressRole::Sync);
+    let (mut planned, mut missed) = (0u32, 0u32);
+    for (_, outcome) in rows {
+        planned += 1;
+        let verdict = outcome.as_ref().map(|o| &o.verdict);
+        missed += u32::from(matches!(verdict, None | Some(PressVerdict::Missed(_))));
+    }
+    (planned == 0 || f64::from(missed) > MOST_MISSED * f64::from(planned)).then(|| {
+        let evidence = if planned == 0 {
+            "expected presses besides the sync presses in the plan, found none".to_owned()
+        } else {
+            format!("expected {planned} presses, found {missed} of them never attempted")
+        };
+        finding(Law::Complete, Fault::PressesMissing, None, evidence)
+    })
+}
+
+/// Marks were sent on the line, and hardly any came through.
+fn triggers(input: &SessionInput, analysis: &Analysis) -> Vec<Finding> {
+    let Some(channel) = input.rig.trigger_channel else {
+        return Vec::new();
+    };
+    let sent = input.marks.len();
+    if sent == 0 {
+        return Vec::new();
+    }
+    let lost = |camera: CameraId| {
+        let clock = analysis.clocks[camera.index()];
+        let used = clock.filter(|c| c.method == ClockMethod::TriggerMarks);
+        let used = used.map_or(0, |c| c.n);
+        let edges = input.edges[camera.index()].iter();
+        let edges = edges.filter(|e| e.channel == channel).count();
+        (f64::from(used) < LEAST_MARKS * sent as f64).then_some((edges, used))
+    };
+    let found: Vec<_> = CameraId::ALL
+        .into_iter()
+        .filter_map(|c| Some((c, lost(c)?)))
+        .collect();
+    let camera = match found[..] {
+        [(camera, _)] => Some(camera),
+        _ => None,
+    };
+    let seen = found
+        .iter()
+        .map(|(camera, (edges, used))| format!("{edges} edges and {used} usable marks ({camera})"));
+    let seen: Vec<String> = seen.collect();
+    if seen.is_empty() {
+        return Vec::new();
+    }
+    let evidence = format!(
+        "expected the {sent} marks sent on trigger channel {channel}, found {}",
+        seen.join(" and ")
+    );
+    vec![finding(Law::Complete, Fault::NoTriggers, camera, evidence)]
+}

@@ -1,0 +1,67 @@
+//! Law: a camera clock is aligned with the host's, and drifts no more than a crystal does.
+
+use skinrig_model::CameraId;
+
+use super::finding;
+use super::statistics::median;
+use crate::input::SessionInput;
+use crate::result::{Analysis, Fault, Finding, Law, RateSeries};
+
+/// Largest plausible rate difference between two clocks, ppm: the tolerance that Ethernet allows a crystal
+/// (IEEE 802.3, 100BASE-X: 125 MHz within 100 ppm). Crystals on boards are sold within 10 to 50 ppm, so that even
+/// two of them at opposite ends stay below.
+pub const MOST_DRIFT_PPM: f64 = 100.0;
+/// A drift counts as above the bound when this many standard errors are left.
+const SIGMAS: f64 = 3.0;
+/// An alignment needs this many presses with times (`clock::fit_rates`).
+const LEAST_PRESSES: usize = 4;
+
+pub fn findings(input: &SessionInput, analysis: &Analysis) -> Vec<Finding> {
+    let timed = input
+        .outcomes
+        .iter()
+        .flatten()
+        .filter(|o| o.timing.is_some());
+    let timed = timed.count();
+    let judge = |camera: CameraId| -> Option<Finding> {
+        let Some(fit) = analysis.clocks[camera.index()] else {
+            // Too few presses are no fault of the clock.
+            if timed < LEAST_PRESSES {
+                return None;
+            }
+            let fault = if has_bursts(&analysis.rates[camera.index()]) {
+                Fault::ClockWrong
+            } else {
+                Fault::CameraBlind
+            };
+            let evidence = format!(
+                "expected {timed} presses to show in the events of {camera}, found no alignment of the clocks in which they do"
+            );
+            return Some(finding(Law::ClockDrift, fault, Some(camera), evidence));
+        };
+        let (size, error) = (fit.drift_ppm.abs(), fit.drift_se_ppm);
+        // Of a single line through three points the error is not known: `NaN` is no evidence.
+        (size - SIGMAS * error > MOST_DRIFT_PPM).then(|| {
+            let evidence = format!(
+                "expected the clock of {camera} within {MOST_DRIFT_PPM} ppm of the host's, found {:.1} ± {error:.1} ppm (n {})",
+                fit.drift_ppm, fit.n
+            );
+            finding(Law::ClockDrift, Fault::ClockWrong, Some(camera), evidence)
+        })
+    };
+    CameraId::ALL.into_iter().filter_map(judge).collect()
+}
+
+/// True when the busiest hundredth of the session stands out of the median by Poisson noise.
+pub fn has_bursts(series: &RateSeries) -> bool {
+    let counts = series
+        .mean_per_s
+        .iter()
+        .map(|r| f64::from(*r) * series.bin_s);
+    let mut counts: Vec<f64> = counts.collect();
+    let Some(usual) = median(counts.clone()) else {
+        return false;
+    };
+    let busy = crate::metrics::quantile(&mut counts, 0.99).unwrap_or(usual);
+    busy > usual + 6.0 * (usual + 1.0).sqrt()
+}

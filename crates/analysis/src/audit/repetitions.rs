@@ -1,0 +1,90 @@
+//! Law: repetitions at one place agree.
+
+use std::collections::BTreeMap;
+
+use skinrig_model::CameraId;
+
+use super::finding;
+use super::statistics::median;
+use super::touch::Touch;
+use crate::result::{Fault, Finding, Law};
+
+/// Repetitions that differ by less than this in the median are not worth a remark, px: the radius of a cluster.
+const LEAST_MOVE_PX: f64 = 10.0;
+/// A move is sure when it is this many standard errors of the median.
+const SIGMAS: f64 = 5.0;
+/// Pairs of presses that a statement needs.
+const LEAST_PAIRS: usize = 6;
+/// Repetitions disagree when a place differs from itself by more than this share of what places differ.
+const MOST_SHARE: f64 = 0.5;
+/// Standard error of a median over the median absolute deviation and the root of n: 1.4826 sqrt(pi / 2).
+const MEDIAN_ERROR: f64 = 1.858;
+
+pub fn findings(touches: &[Touch<'_>]) -> Vec<Finding> {
+    CameraId::ALL
+        .into_iter()
+        .filter_map(|camera| disagreement(touches, camera))
+        .collect()
+}
+
+fn disagreement(touches: &[Touch<'_>], camera: CameraId) -> Option<Finding> {
+    let mut first: BTreeMap<(u32, u64), (u32, f64)> = BTreeMap::new();
+    let mut moves: BTreeMap<u32, Vec<f64>> = BTreeMap::new();
+    for touch in touches
+        .iter()
+        .filter(|t| t.role != skinrig_model::PressRole::Sync)
+    {
+        let Some(column) = touch.sights[camera.index()].column else {
+            continue;
+        };
+        let (repetition, before) = *first
+            .entry(touch.place)
+            .or_insert((touch.repetition, column));
+        if touch.repetition != repetition {
+            moves
+                .entry(touch.repetition)
+                .or_default()
+                .push(column - before);
+        }
+    }
+    let columns: Vec<f64> = first.values().map(|(_, column)| *column).collect();
+    let middle = median(columns.clone())?;
+    let between = median(columns.iter().map(|c| (c - middle).abs()).collect())?;
+    for (repetition, moves) in &moves {
+        let n = moves.len();
+        if n < LEAST_PAIRS {
+            continue;
+        }
+        let moved = median(moves.clone())?;
+        let scatter = median(moves.iter().map(|m| (m - moved).abs()).collect())?;
+        let error = MEDIAN_ERROR * scatter / (n as f64).sqrt();
+        if moved.abs() > LEAST_MOVE_PX && moved.abs() > SIGMAS * error {
+            let evidence = format!(
+                "expected centroids at the same columns in each repetition, found repetition {} moved by {moved:.1} ± {error:.1} px \
+                 ({camera}, n {n})",
+                repetition + 1
+            );
+            return Some(finding(
+                Law::RepetitionsAgree,
+                Fault::RigMoved,
+                Some(camera),
+                evidence,
+            ));
+        }
+        let within = median(moves.iter().map(|m| m.abs()).collect())?;
+        if within > LEAST_MOVE_PX && within > MOST_SHARE * between {
+            let evidence = format!(
+                "expected repetitions of a place to agree, found repetition {} off by {within:.1} px in the median, where \
+                 places differ by {between:.1} px from their middle ({camera}, n {n})",
+                repetition + 1
+            );
+            return Some(finding(
+                Law::RepetitionsAgree,
+                Fault::Unknown,
+                Some(camera),
+                evidence,
+            ));
+        }
+    }
+    None
+}

@@ -1,0 +1,359 @@
+//! The plausibility audit: silent on sound sessions of many rigs, and right about planted faults.
+
+mod rigs;
+
+use rayon::prelude::*;
+use rigs::{Random, Session, Wishes, session, sound};
+use skinrig_analysis::result::{Fault, Finding};
+use skinrig_analysis::{Analysis, SessionInput, analyze};
+use skinrig_model::{HostTime, Point2, PressVerdict};
+
+fn run(session: &Session) -> Analysis {
+    analyze(&session.input, &session.events).unwrap()
+}
+
+fn named(findings: &[Finding]) -> Vec<Fault> {
+    findings.iter().map(|f| f.fault).collect()
+}
+
+/// Sessions with a fault that are tried.
+const SEEDS: u64 = 40;
+
+/// At least 95 % of the seeds lead with `fault`, and name nothing else in 90 %.
+fn names(fault: Fault, plant: impl Fn(u64) -> Session + Sync) {
+    let all: Vec<Vec<Finding>> = (0..SEEDS)
+        .into_par_iter()
+        .map(|seed| run(&plant(seed)).findings)
+        .collect();
+    let share = |count: usize| count as f64 / SEEDS as f64;
+    let leads = all
+        .iter()
+        .filter(|f| f.first().is_some_and(|f| f.fault == fault));
+    let alone = all.iter().filter(|f| named(f) == [fault]);
+    let (leads, alone) = (share(leads.count()), share(alone.count()));
+    let others: Vec<(usize, &Vec<Finding>)> = all
+        .iter()
+        .enumerate()
+        .filter(|(_, f)| named(f) != [fault])
+        .collect();
+    assert!(
+        leads >= 0.95 && alone >= 0.9,
+        "{fault:?}: leads {leads}, alone {alone}, else {others:#?}"
+    );
+}
+
+fn edit(seed: u64, wishes: Wishes, change: impl Fn(&mut SessionInput)) -> Session {
+    let mut session = session(seed, wishes);
+    change(&mut session.input);
+    session
+}
+
+fn positions(
+    input: &mut SessionInput,
+    also_planned: bool,
+    mut change: impl FnMut(Point2) -> Point2,
+) {
+    for outcome in input.outcomes.iter_mut().flatten() {
+        outcome.measured_at = outcome.measured_at.map(&mut change);
+    }
+    if also_planned {
+        input.planned.iter_mut().for_each(|p| p.at = change(p.at));
+    }
+}
+
+#[test]
+fn sound_sessions_are_silent() {
+    let alarms: Vec<(u64, Vec<Finding>)> = (0..200)
+        .into_par_iter()
+        .map(|seed| (seed, run(&sound(seed)).findings))
+        .filter(|(_, findings)| !findings.is_empty())
+        .collect();
+    assert!(alarms.len() <= 2, "{} of 200: {alarms:#?}", alarms.len());
+}
+
+#[test]
+fn exchanged_cameras() {
+    names(Fault::CamerasSwapped, |seed| {
+        let mut s = sound(seed);
+        s.events.0.swap(0, 1);
+        s.input.edges.swap(0, 1);
+        s
+    });
+}
+
+#[test]
+fn a_mirrored_axis() {
+    for (x, y) in [(-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)] {
+        names(Fault::AxisMirrored, |seed| {
+            // About 0 or the skin's centre; against the plan too, or together with it.
+            let about = [Point2::new(0.0, 0.0), Point2::new(10.0, 2.0)][(seed % 2) as usize];
+            edit(seed, Wishes::default(), |input| {
+                positions(input, seed % 4 < 3, |p| {
+                    let flip = |v: f64, c: f64, sign: f64| c + sign * (v - c);
+                    Point2::new(flip(p.x_mm, about.x_mm, x), flip(p.y_mm, about.y_mm, y))
+                });
+            })
+        });
+    }
+}
+
+#[test]
+fn a_shifted_press_list() {
+    for by in [1, -1, 3] {
+        names(Fault::IndexShifted, |seed| {
+            edit(seed, Wishes::default(), |input| shift(input, by, true))
+        });
+    }
+    // Against its own plan.
+    names(Fault::IndexShifted, |seed| {
+        edit(seed, Wishes::default(), |input| shift(input, 1, false))
+    });
+}
+
+/// The positions stand `by` rows too early; the rows without a neighbour keep their own.
+fn shift(input: &mut SessionInput, by: i32, also_planned: bool) {
+    let planned: Vec<Point2> = input.planned.iter().map(|p| p.at).collect();
+    let there = |i: usize| usize::try_from(i as i64 + i64::from(by)).ok();
+    for i in 3..planned.len() {
+        let Some(at) = there(i).filter(|t| *t >= 3).and_then(|t| planned.get(t)) else {
+            continue;
+        };
+        input.outcomes[i].as_mut().unwrap().measured_at = Some(*at);
+        if also_planned {
+            input.planned[i].at = *at;
+        }
+    }
+}
+
+#[test]
+fn another_unit_of_length() {
+    for factor in [1e-3, 1e3] {
+        names(Fault::UnitOfPositions, |seed| {
+            edit(seed, Wishes::default(), |input| {
+                // Together with the plan, or against it.
+                positions(input, seed % 2 == 0, |p| {
+                    Point2::new(factor * p.x_mm, factor * p.y_mm)
+                });
+            })
+        });
+    }
+}
+
+#[test]
+fn a_clock_that_is_no_crystals() {
+    let fast = Wishes {
+        drift_ppm: Some(300.0),
+        ..Wishes::default()
+    };
+    let with_line = Wishes {
+        line: Some(true),
+        ..fast
+    };
+    names(Fault::ClockWrong, |seed| session(seed, with_line));
+    // By the presses alone a drift shows in long sessions only.
+    let long = Wishes {
+        line: Some(false),
+        places: 20,
+        repetitions: 4,
+        ..fast
+    };
+    names(Fault::ClockWrong, |seed| session(seed, long));
+}
+
+#[test]
+fn missing_data() {
+    names(Fault::NoEvents, |seed| {
+        let mut s = sound(seed);
+        s.events.0[(seed % 2) as usize].clear();
+        s
+    });
+    let line = Wishes {
+        line: Some(true),
+        ..Wishes::default()
+    };
+    names(Fault::NoTriggers, |seed| {
+        edit(seed, line, |input| input.edges = [Vec::new(), Vec::new()])
+    });
+    names(Fault::NoTruth, |seed| {
+        edit(seed, Wishes::default(), |input| {
+            let outcomes = input.outcomes.iter_mut().flatten();
+            outcomes.for_each(|o| o.measured_at = None);
+        })
+    });
+    names(Fault::NoTruth, |seed| {
+        edit(seed, Wishes::default(), |input| {
+            let no_number = [f64::NAN, f64::INFINITY][(seed % 2) as usize];
+            positions(input, false, |p| Point2::new(p.x_mm, no_number));
+        })
+    });
+    // Half the presses were never made; or made, and the recording ended before.
+    names(Fault::PressesMissing, |seed| {
+        edit(seed, Wishes::default(), |input| {
+            let half = input.outcomes.len() / 2;
+            input.outcomes[half..].fill(None);
+        })
+    });
+    let ended = Wishes {
+        end_at: Some(0.6),
+        ..line
+    };
+    names(Fault::PressesMissing, |seed| session(seed, ended));
+}
+
+#[test]
+fn a_camera_that_does_not_see_the_presses() {
+    let line = Wishes {
+        line: Some(true),
+        ..Wishes::default()
+    };
+    // Its events come at any time.
+    names(Fault::CameraBlind, |seed| {
+        let mut s = session(seed, line);
+        let events = &mut s.events.0[(seed % 2) as usize];
+        let (from, to) = (events[0].t_us, events[events.len() - 1].t_us);
+        let mut random = Random::new(seed);
+        for e in events.iter_mut() {
+            e.t_us = from + ((to - from) as f64 * random.unit()) as u64;
+        }
+        events.sort_by_key(|e| e.t_us);
+        s
+    });
+
+    // It goes dark half-way.
+    let dark = Wishes {
+        dark_from: Some(0.6),
+        ..line
+    };
+    names(Fault::CameraBlind, |seed| session(seed, dark));
+    // It bursts, on one pixel.
+    names(Fault::CameraBlind, |seed| {
+        let mut s = sound(seed);
+        s.events
+            .0
+            .iter_mut()
+            .flatten()
+            .for_each(|e| (e.x, e.y) = (320, 270));
+        s
+    });
+}
+
+#[test]
+fn a_robot_that_goes_elsewhere() {
+    names(Fault::RobotOff, |seed| {
+        let mut random = Random::new(seed);
+        let mut s = sound(seed);
+        positions(&mut s.input, false, |p| {
+            Point2::new(
+                p.x_mm + 6.0 * random.normal(),
+                p.y_mm + 6.0 * random.normal(),
+            )
+        });
+        s
+    });
+    names(Fault::RobotOff, |seed| {
+        edit(seed, Wishes::default(), |input| {
+            let outcomes = input.outcomes.iter_mut().flatten();
+            outcomes.for_each(|o| o.measured_depth_mm = Some(0.9));
+        })
+    });
+    names(Fault::RobotOff, |seed| {
+        edit(seed, Wishes::default(), |input| {
+            for outcome in input.outcomes.iter_mut().flatten().step_by(3) {
+                let timing = outcome.timing.as_mut().unwrap();
+                timing.at_depth = HostTime(timing.contact.0 + 30_000_000);
+            }
+        })
+    });
+}
+
+#[test]
+fn a_camera_that_moved_between_repetitions() {
+    let moved = Wishes {
+        move_px: 30.0,
+        places: 9,
+        ..Wishes::default()
+    };
+    names(Fault::RigMoved, |seed| session(seed, moved));
+}
+
+#[test]
+fn a_journal_that_contradicts_itself() {
+    let timings = |input: &mut SessionInput, change: &dyn Fn(HostTime) -> HostTime| {
+        for outcome in input.outcomes.iter_mut().flatten() {
+            let t = outcome.timing.as_mut().unwrap();
+            for moment in [
+                &mut t.approach,
+                &mut t.contact,
+                &mut t.at_depth,
+                &mut t.retract,
+                &mut t.release,
+                &mut t.clear,
+            ] {
+                *moment = change(*moment);
+            }
+        }
+    };
+    let journal = |change: &(dyn Fn(&mut SessionInput) + Sync)| {
+        names(Fault::JournalContradictory, |seed| {
+            edit(seed, Wishes::default(), change)
+        });
+    };
+    journal(&|input| timings(input, &|_| HostTime(0)));
+    journal(&|input| timings(input, &|t| HostTime(t.0 - 3_600_000_000_000)));
+    journal(&|input| timings(input, &|t| HostTime(-t.0)));
+    // Every press takes as long as four.
+    journal(&|input| {
+        for outcome in input.outcomes.iter_mut().flatten() {
+            let t = outcome.timing.as_mut().unwrap();
+            t.release = HostTime(t.release.0 + 4_000_000_000);
+            t.clear = HostTime(t.clear.0 + 4_000_000_000);
+        }
+    });
+    // A press stands twice in plan and journal.
+    journal(&|input| {
+        input.planned.push(*input.planned.last().unwrap());
+        input.outcomes.push(input.outcomes.last().unwrap().clone());
+    });
+}
+
+#[test]
+fn sessions_too_small_to_judge_are_not_accused() {
+    // One press and its sync presses: sound, as far as anybody can tell.
+    for seed in 0..20 {
+        let one = edit(seed, Wishes::default(), |input| {
+            input.planned.truncate(4);
+            input.outcomes.truncate(4);
+        });
+        assert_eq!(named(&run(&one).findings), [], "seed {seed}");
+        let alone = edit(seed, Wishes::default(), |input| {
+            input.planned.drain(..3);
+            input.outcomes.drain(..3);
+            input.planned.truncate(1);
+            input.outcomes.truncate(1);
+        });
+        assert_eq!(named(&run(&alone).findings), [], "seed {seed}");
+    }
+    let nothing = edit(0, Wishes::default(), |input| {
+        input.planned.clear();
+        input.outcomes.clear();
+    });
+    assert_eq!(named(&run(&nothing).findings), [Fault::PressesMissing]);
+    let refused = edit(0, Wishes::default(), |input| {
+        for outcome in input.outcomes.iter_mut().flatten() {
+            outcome.verdict = PressVerdict::Invalid("settled 0.3 mm from plan".to_owned());
+        }
+    });
+    assert_eq!(named(&run(&refused).findings), [Fault::RobotOff]);
+}
+
+#[test]
+fn a_stream_out_of_order_is_named() {
+    let mut s = sound(3);
+    s.events.0.iter_mut().for_each(|events| events.reverse());
+    let analysis = run(&s);
+    assert!(
+        analysis.warnings.iter().any(|w| w.contains("out of order")),
+        "{:?}",
+        analysis.warnings
+    );
+}

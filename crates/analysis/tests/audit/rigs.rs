@@ -1,0 +1,354 @@
+//! Small sound sessions of many rigs, drawn from a seed: geometry, path, repetitions, clocks, strength, noise.
+
+use skinrig_analysis::{EventSource, SessionInput};
+use skinrig_model::{
+    AnalysisSettings, AttemptId, CalibrationModel, CameraId, CdEvent, HostTime, LensModel, Mark,
+    MarkKind, PlannedPress, Point2, Polarity, PressId, PressOutcome, PressRole, PressTiming,
+    PressVerdict, PulseTrain, RigGeometry, SentMark, SkinOutline, StereoGeometry, TriggerEdge,
+};
+
+/// Events in memory.
+pub struct Memory(pub [Vec<CdEvent>; 2]);
+
+impl EventSource for Memory {
+    fn for_each_slice(
+        &self,
+        camera: CameraId,
+        each: &mut dyn FnMut(&[CdEvent]),
+    ) -> Result<(), String> {
+        self.0[camera.index()].chunks(4096).for_each(each);
+        Ok(())
+    }
+}
+
+/// A session and what it was made of.
+pub struct Session {
+    pub input: SessionInput,
+    pub events: Memory,
+}
+
+/// SplitMix64.
+pub struct Random(u64);
+
+impl Random {
+    pub fn new(seed: u64) -> Self {
+        Self(seed)
+    }
+
+    pub fn unit(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    pub fn within(&mut self, half: f64) -> f64 {
+        half * (2.0 * self.unit() - 1.0)
+    }
+
+    /// Roughly normal, unit variance.
+    pub fn normal(&mut self) -> f64 {
+        (0..12).map(|_| self.unit()).sum::<f64>() - 6.0
+    }
+
+    pub fn below(&mut self, n: usize) -> usize {
+        (self.unit() * n as f64) as usize
+    }
+}
+
+/// What is planted into a session on top of its seed.
+#[derive(Clone, Copy, Default)]
+pub struct Wishes {
+    /// With a trigger line (`None`: the seed decides).
+    pub line: Option<bool>,
+    /// Clock drift of camera 1, ppm (`None`: within ±50).
+    pub drift_ppm: Option<f64>,
+    /// At least this many places.
+    pub places: usize,
+    /// This many repetitions (0: the seed decides).
+    pub repetitions: u32,
+    /// Columns of camera 2 move by this much in the second repetition, px.
+    pub move_px: f64,
+    /// Camera 2 sends no events while the share of the session from this on runs.
+    pub dark_from: Option<f64>,
+    /// Neither camera sends events from this share of the session on.
+    pub end_at: Option<f64>,
+}
+
+/// Camera positions of the rigs, each looking at the skin's centre.
+const RIGS: [[(f64, f64); 2]; 4] = [
+    [(45.0, -38.0), (45.0, 42.0)],
+    [(52.0, -46.0), (50.0, 50.0)],
+    [(-32.0, -36.0), (48.0, -40.0)],
+    [(62.0, -20.0), (20.0, 58.0)],
+];
+
+fn camera(at: (f64, f64), skew_deg: f64, w: f64) -> skinrig_model::CameraModel {
+    skinrig_model::CameraModel {
+        position: Point2::new(at.0, at.1),
+        aim: SkinOutline::PAPER.centre,
+        skew_deg,
+        lens: LensModel::Exponential {
+            half_fov_deg: 60.0,
+            w,
+        },
+    }
+}
+
+/// A meander of `n` x `n` places or as many on two circles, about the skin's centre.
+fn path(random: &mut Random, least: usize) -> Vec<Point2> {
+    let kinds = [3usize, 4, 5];
+    let n = kinds[random.below(3)];
+    let n = if n * n < least { 5 } else { n };
+    let c = SkinOutline::PAPER.centre;
+    if random.below(4) == 0 && least < 20 {
+        let on = |i: usize| {
+            let angle = std::f64::consts::TAU * i as f64 / 8.0;
+            let radius = if i < 8 { 22.0 } else { 11.0 };
+            Point2::new(
+                c.x_mm - 6.0 + radius * angle.cos(),
+                c.y_mm + radius * angle.sin(),
+            )
+        };
+        return (0..16).map(on).collect();
+    }
+    let pitch = 44.0 / (n - 1) as f64;
+    let at = |i: usize| {
+        let (row, step) = (i / n, i % n);
+        let step = if row % 2 == 0 { step } else { n - 1 - step };
+        Point2::new(
+            c.x_mm - 28.0 + pitch * row as f64,
+            c.y_mm - 22.0 + pitch * step as f64,
+        )
+    };
+    (0..n * n).map(at).collect()
+}
+
+/// The sound session of this seed.
+pub fn sound(seed: u64) -> Session {
+    session(seed, Wishes::default())
+}
+
+/// The session of this seed with `wishes`.
+pub fn session(seed: u64, wishes: Wishes) -> Session {
+    let mut random = Random::new(seed);
+    let at = RIGS[random.below(4)];
+    let nominal = StereoGeometry {
+        cameras: at.map(|p| camera(p, 0.0, 0.0)),
+    };
+    let truth = StereoGeometry {
+        cameras: at.map(|p| {
+            let place = (p.0 + random.within(1.5), p.1 + random.within(1.5));
+            camera(place, random.within(1.5), random.within(0.08))
+        }),
+    };
+    let path = path(&mut random, wishes.places);
+    let drawn = 2 + random.below(2) as u32;
+    let repetitions = if wishes.repetitions > 0 {
+        wishes.repetitions
+    } else {
+        drawn
+    };
+    let line = wishes.line.unwrap_or(random.below(3) > 0);
+    let strength = [60, 120, 200][random.below(3)];
+    let miss = [0.0, 0.03, 0.08][random.below(3)];
+    let period_s = 1.1 + 0.8 * random.unit();
+    let idle_per_s = [50.0, 200.0, 500.0][random.below(3)];
+    let hot = random.below(3) == 0;
+    let clocks = [0, 1].map(|k| {
+        let drift = wishes.drift_ppm.filter(|_| k == 0);
+        let drawn = random.within(50.0);
+        (4e6 + 1e7 * random.unit(), drift.unwrap_or(drawn))
+    });
+    let camera_us = |k: usize, host_s: f64| {
+        let (offset, ppm): (f64, f64) = clocks[k];
+        offset + host_s * 1e6 * (1.0 + ppm * 1e-6)
+    };
+
+    let mut planned: Vec<(PressRole, u32, u32, Point2, f64)> = (0..3)
+        .map(|i| {
+            (
+                PressRole::Sync,
+                0,
+                0,
+                SkinOutline::PAPER.centre,
+                1.0 + f64::from(i),
+            )
+        })
+        .collect();
+    let mut begin_s = 6.0;
+    for repetition in 0..repetitions {
+        let role = if repetition == 0 {
+            PressRole::Calibrate
+        } else {
+            PressRole::Score
+        };
+        for (place, at) in path.iter().enumerate() {
+            planned.push((role, repetition, place as u32, *at, begin_s));
+            begin_s += period_s;
+        }
+        begin_s += 1.0;
+    }
+    let end_s = begin_s + 1.0;
+    let mut input = SessionInput {
+        planned: Vec::new(),
+        outcomes: Vec::new(),
+        edges: [Vec::new(), Vec::new()],
+        marks: Vec::new(),
+        gaps: [Vec::new(), Vec::new()],
+        rig: RigGeometry {
+            outline: SkinOutline::PAPER,
+            nominal,
+            trigger_channel: line.then_some(0),
+        },
+        settings: AnalysisSettings {
+            bootstrap_resamples: 0,
+            calibration: CalibrationModel::None,
+            study_presses: 0,
+            ..AnalysisSettings::default()
+        },
+    };
+    let mut events = [Vec::new(), Vec::new()];
+    for (i, (role, repetition, location, at, contact)) in planned.into_iter().enumerate() {
+        let id = PressId(i as u32);
+        input.planned.push(PlannedPress {
+            id,
+            role,
+            repetition,
+            location,
+            at,
+            depth_mm: 2.0,
+        });
+        let (outcome, timing) = outcome(id, at, contact, &mut random);
+        input.outcomes.push(Some(outcome));
+        if line {
+            for (kind, t) in [
+                (MarkKind::Contact, timing.contact),
+                (MarkKind::Release, timing.release),
+            ] {
+                send(
+                    &mut input,
+                    Mark { kind, press: id },
+                    t,
+                    &camera_us,
+                    &mut random,
+                );
+            }
+        }
+        for (k, events) in events.iter_mut().enumerate() {
+            let Some(u) = truth.cameras[k].column_of_point(at) else {
+                continue;
+            };
+            let late = |share: Option<f64>| share.is_some_and(|s| contact > s * end_s);
+            if late(wishes.end_at) || (k == 1 && late(wishes.dark_from)) {
+                continue;
+            }
+            let moved = if k == 1 && repetition == 1 {
+                wishes.move_px
+            } else {
+                0.0
+            };
+            let missed = role != PressRole::Sync && random.unit() < miss;
+            let centre = u + moved + 3.0 * random.normal();
+            for n in 0..if missed { 0 } else { strength } {
+                let after = if 3 * n < 2 * strength {
+                    0.1 * random.unit()
+                } else {
+                    0.3 + 0.15 * random.unit()
+                };
+                events.push(CdEvent {
+                    t_us: camera_us(k, contact + after) as u64,
+                    x: (centre + 8.0 * random.normal()).clamp(0.0, 639.0) as u16,
+                    y: (270.0 + 6.0 * random.normal()) as u16,
+                    polarity: Polarity::from_bit(n % 3 == 0),
+                });
+            }
+        }
+    }
+    for (k, events) in events.iter_mut().enumerate() {
+        let dark = (k == 1).then_some(wishes.dark_from).flatten();
+        let until_s = end_s * dark.or(wishes.end_at).unwrap_or(1.0);
+        let mut noise = |per_s: f64, at: Option<(u16, u16)>| {
+            for _ in 0..(per_s * until_s) as usize {
+                let drawn = (
+                    (640.0 * random.unit()) as u16,
+                    (480.0 * random.unit()) as u16,
+                );
+                let (x, y) = at.unwrap_or(drawn);
+                events.push(CdEvent {
+                    t_us: camera_us(k, until_s * random.unit()) as u64,
+                    x,
+                    y,
+                    polarity: Polarity::from_bit(random.unit() < 0.5),
+                });
+            }
+        };
+        noise(idle_per_s, None);
+        if hot {
+            noise(15.0, Some((400, 250)));
+        }
+        events.sort_by_key(|e| e.t_us);
+    }
+    Session {
+        input,
+        events: Memory(events),
+    }
+}
+
+fn outcome(
+    press: PressId,
+    at: Point2,
+    contact: f64,
+    random: &mut Random,
+) -> (PressOutcome, PressTiming) {
+    let h = HostTime::from_secs_f64;
+    let late = 0.005 * random.unit();
+    let timing = PressTiming {
+        approach: h(contact - 0.1),
+        contact: h(contact),
+        at_depth: h(contact + 0.1 + late),
+        retract: h(contact + 0.3 + late),
+        release: h(contact + 0.45 + late),
+        clear: h(contact + 0.6 + late),
+    };
+    let outcome = PressOutcome {
+        attempt: AttemptId { press, number: 1 },
+        verdict: PressVerdict::Valid,
+        timing: Some(timing),
+        measured_at: Some(Point2::new(
+            at.x_mm + 0.02 * random.normal(),
+            at.y_mm + 0.02 * random.normal(),
+        )),
+        measured_depth_mm: Some(2.0 + 0.02 * random.normal()),
+        peak_force_n: None,
+        scheduled: false,
+    };
+    (outcome, timing)
+}
+
+fn send(
+    input: &mut SessionInput,
+    mark: Mark,
+    t: HostTime,
+    camera_us: &dyn Fn(usize, f64) -> f64,
+    random: &mut Random,
+) {
+    input.marks.push(SentMark {
+        mark,
+        t,
+        uncertainty_ns: 500,
+    });
+    for (k, edges) in input.edges.iter_mut().enumerate() {
+        let seen = camera_us(k, t.as_secs_f64()) + 5.0 * random.unit();
+        for (rise, width) in PulseTrain::new(mark).unwrap().pulses() {
+            for (after, rising) in [(rise, true), (rise + width, false)] {
+                edges.push(TriggerEdge {
+                    t_us: seen.round() as u64 + after,
+                    channel: 0,
+                    rising,
+                });
+            }
+        }
+    }
+}
