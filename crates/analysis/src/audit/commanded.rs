@@ -93,6 +93,9 @@ fn extent_mm(points: &[Point2]) -> f64 {
     range(|p| p.x_mm).max(range(|p| p.y_mm))
 }
 
+/// The fault of a reading of the plan, the reading in words, and its [`residual_mm`].
+type Reading = (Fault, String, Option<(f64, f64)>);
+
 /// Measured against planned positions: the fault is the reading of the plan that gives the measurement.
 fn position(input: &SessionInput, path: &[&Touch<'_>]) -> Option<Finding> {
     let measured = path.iter().filter(|t| t.truth.is_some()).count();
@@ -104,7 +107,7 @@ fn position(input: &SessionInput, path: &[&Touch<'_>]) -> Option<Finding> {
         return None;
     }
     let centre = input.rig.outline.centre;
-    let mut readings: Vec<(Fault, String, Option<(f64, f64)>)> = Vec::new();
+    let mut readings: Vec<Reading> = Vec::new();
     for factor in FACTORS {
         let scaled = |p: Point2| Point2::new(factor * p.x_mm, factor * p.y_mm);
         let what = format!("the planned ones times {factor:.3}");
@@ -128,7 +131,7 @@ fn position(input: &SessionInput, path: &[&Touch<'_>]) -> Option<Finding> {
         readings.push((Fault::IndexShifted, what, residual_mm(path, by, |p| p)));
     }
     // A reading fits when what is left is small against the positions that it predicts.
-    let fits = |(_, _, r): &(Fault, String, Option<(f64, f64)>)| {
+    let fits = |(_, _, r): &Reading| {
         r.is_some_and(|(left, extent)| left < MOST_OFF_MM && left < 0.1 * extent)
     };
     let best = readings

@@ -1,7 +1,7 @@
 //! The presses as the audit sees them: where the tip was, what each camera saw, and whether it could see it.
 
 use skinrig_model::{
-    CameraId, LensModel, Point2, PressId, PressOutcome, PressRole, PressTiming, PressVerdict,
+    CameraId, Point2, PressId, PressOutcome, PressRole, PressTiming, PressVerdict,
 };
 
 use crate::input::SessionInput;
@@ -99,9 +99,9 @@ pub fn is_number(p: Point2) -> bool {
 
 fn is_visible(input: &SessionInput, camera: CameraId, at: Point2) -> bool {
     let model = &input.rig.nominal.cameras[camera.index()];
-    let LensModel::Exponential { half_fov_deg, .. } = model.lens;
-    let off_axis = (model.angle_of_point_deg(at) - model.skew_deg).abs();
-    off_axis < half_fov_deg - FIELD_MARGIN_DEG
+    let angle = model.angle_of_point_deg(at) - model.skew_deg;
+    let (left, right) = (model.lens.angle_deg(-1.0).0, model.lens.angle_deg(1.0).0);
+    angle > left + FIELD_MARGIN_DEG && angle < right - FIELD_MARGIN_DEG
 }
 
 fn sight(input: &SessionInput, view: Option<PressView>, visible: bool) -> Sight {

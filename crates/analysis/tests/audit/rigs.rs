@@ -197,6 +197,7 @@ pub fn session(seed: u64, wishes: Wishes) -> Session {
         edges: [Vec::new(), Vec::new()],
         marks: Vec::new(),
         gaps: [Vec::new(), Vec::new()],
+        pose_interval_us: None,
         rig: RigGeometry {
             outline: SkinOutline::PAPER,
             nominal,
