@@ -1,0 +1,115 @@
+//! Event counts in bins of equal width about a contact, on host time.
+
+use crate::kept::{KeptEvent, KeptView};
+use crate::result::ClockFit;
+
+/// Share of a bin by which a window may fall short of a whole bin and still hold it: 0.6 s are 3000 bins of 0.2 ms
+/// whatever the binary fractions say.
+const ROUNDING: f64 = 1e-6;
+
+/// Consecutive bins; bin 0 begins at the contact, so that no bin mixes what was before it with what was after.
+///
+/// A bin includes its start and excludes its end. (numpy's histogram closes the last bin; here an event at the end of
+/// a window belongs to what follows, so that adjoining windows count every event once.)
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Grid {
+    /// Number of the first bin; negative before the contact.
+    pub first: i64,
+    /// How many bins.
+    pub len: usize,
+}
+
+impl Grid {
+    /// The whole bins of `bin_us` between two host times after the contact, µs.
+    #[must_use]
+    pub fn within(from_us: f64, to_us: f64, bin_us: f64) -> Self {
+        let first = (from_us / bin_us - ROUNDING).ceil() as i64;
+        let end = (to_us / bin_us + ROUNDING).floor() as i64;
+        Self {
+            first,
+            len: (end - first).max(0) as usize,
+        }
+    }
+
+    /// Number of the first bin after it.
+    #[must_use]
+    pub const fn end(&self) -> i64 {
+        self.first + self.len as i64
+    }
+
+    /// The middle of the bin at `index`, ms after the contact.
+    #[must_use]
+    pub fn centre_ms(&self, index: usize, bin_ms: f64) -> f64 {
+        ((self.first + index as i64) as f64 + 0.5) * bin_ms
+    }
+
+    /// Its length, s.
+    #[must_use]
+    pub fn length_s(&self, bin_ms: f64) -> f64 {
+        self.len as f64 * bin_ms * 1e-3
+    }
+}
+
+/// The events of one camera, placed on host time after the contact.
+#[derive(Debug, Clone, Copy)]
+pub struct Sight<'a> {
+    view: &'a KeptView,
+    /// Camera µs per host µs.
+    rate: f64,
+}
+
+impl<'a> Sight<'a> {
+    /// A view and the clock of its camera.
+    #[must_use]
+    pub fn new(view: &'a KeptView, clock: &ClockFit) -> Self {
+        Self {
+            view,
+            rate: 1.0 + clock.drift_ppm * 1e-6,
+        }
+    }
+
+    /// Host time after the contact of a camera time after the view's start, µs.
+    #[must_use]
+    pub fn host_us(&self, camera_us: f64) -> f64 {
+        (camera_us - self.view.contact_us) / self.rate
+    }
+
+    /// The view.
+    #[must_use]
+    pub const fn view(&self) -> &'a KeptView {
+        self.view
+    }
+
+    /// Where an event lies, in bins after the contact.
+    fn position(&self, event: KeptEvent, bin_us: f64) -> f64 {
+        (f64::from(event.t_us()) - self.view.contact_us) / (self.rate * bin_us)
+    }
+
+    /// The events in the bins of `grid`.
+    #[must_use]
+    pub fn within(&self, grid: Grid, bin_us: f64) -> &'a [KeptEvent] {
+        let before = |edge: i64| {
+            let edge = edge as f64;
+            let events = &self.view.events;
+            events.partition_point(|e| self.position(*e, bin_us) < edge)
+        };
+        let (from, to) = (before(grid.first), before(grid.end()));
+        &self.view.events[from..to.max(from)]
+    }
+
+    /// Adds events that lie in `grid`.
+    pub fn count(
+        &self,
+        events: impl Iterator<Item = KeptEvent>,
+        grid: Grid,
+        bin_us: f64,
+        counts: &mut [u32],
+    ) {
+        for event in events {
+            let bin = self.position(event, bin_us).floor() as i64 - grid.first;
+            if let Some(count) = usize::try_from(bin).ok().and_then(|b| counts.get_mut(b)) {
+                *count = count.saturating_add(1);
+            }
+        }
+    }
+}

@@ -1,0 +1,124 @@
+//! Estimates of a detector at one threshold, with bootstrap intervals over locations.
+
+use rayon::prelude::*;
+
+use super::sweep::Hits;
+use crate::metrics::quantile;
+use crate::result::Estimate;
+use crate::seeded;
+
+/// Share of a 95 % interval that lies outside on each side.
+const TAIL: f64 = 0.025;
+/// Quantities with an interval, in the order of [`Figures`].
+const COUNT: usize = 7;
+/// (value, n) of each: detected share, width, median, false alarms per second, 5th percentile, median and 95th percentile
+/// after contact.
+type Figures = [(Option<f64>, u32); COUNT];
+
+/// One trial at one threshold.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Outcome {
+    /// Its location.
+    pub location: u32,
+    /// Onset after the contact, ms.
+    pub onset_ms: Option<f64>,
+    /// False alarms in its background.
+    pub alarms: u32,
+    /// Length of the background, s.
+    pub background_s: f64,
+}
+
+/// What is estimated.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Estimates {
+    /// Share of trials with an onset that counts; n: trials.
+    pub detected_rate: Estimate,
+    /// Width of the onsets that count, ms; n: those.
+    pub width_ms: Estimate,
+    /// Median of all onsets, ms; n: those.
+    pub median_ms: Estimate,
+    /// False alarms per second; n: backgrounds.
+    pub false_alarms_per_s: Estimate,
+    /// 5th, 50th and 95th percentile of the onsets not before the contact, ms; n: those.
+    pub from_contact_ms: [Estimate; 3],
+}
+
+/// How to estimate.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Plan {
+    /// An onset counts within this of the median, ms.
+    pub window_ms: f64,
+    /// An onset earlier than this is before the contact, ms.
+    pub earliest_ms: f64,
+    /// Resamples of the bootstrap.
+    pub resamples: u32,
+    /// Its seed.
+    pub seed: u64,
+}
+
+impl Plan {
+    /// The estimates, with intervals of a bootstrap that draws whole locations. Threshold and cool-down stay what they
+    /// were chosen to be.
+    #[must_use]
+    pub fn estimate(&self, outcomes: &[Outcome]) -> Estimates {
+        let mut sorted = outcomes.to_vec();
+        sorted.sort_by_key(|o| o.location);
+        let places: Vec<&[Outcome]> = sorted.chunk_by(|a, b| a.location == b.location).collect();
+        let figures = self.figures(&places);
+        let samples: Vec<Figures> = if places.len() > 1 && self.resamples > 1 {
+            let draw = |sample: u32| {
+                let mut rng = seeded::generator(self.seed, u64::from(sample));
+                let one = |_| places[seeded::index(&mut rng, places.len())];
+                let drawn: Vec<&[Outcome]> = (0..places.len()).map(one).collect();
+                self.figures(&drawn)
+            };
+            (0..self.resamples).into_par_iter().map(draw).collect()
+        } else {
+            Vec::new()
+        };
+        let estimate = |k: usize| {
+            let (value, n) = figures[k];
+            let mut values: Vec<f64> = samples.iter().filter_map(|s| s[k].0).collect();
+            let mut end = |q| value.and_then(|_| quantile(&mut values, q));
+            Estimate {
+                value,
+                low: end(TAIL),
+                high: end(1.0 - TAIL),
+                n,
+            }
+        };
+        Estimates {
+            detected_rate: estimate(0),
+            width_ms: estimate(1),
+            median_ms: estimate(2),
+            false_alarms_per_s: estimate(3),
+            from_contact_ms: [estimate(4), estimate(5), estimate(6)],
+        }
+    }
+
+    fn figures(&self, places: &[&[Outcome]]) -> Figures {
+        let all = || places.iter().flat_map(|p| p.iter());
+        let trials = all().count() as u32;
+        let onsets: Vec<f64> = all().filter_map(|o| o.onset_ms).collect();
+        let mut late: Vec<f64> = onsets.clone();
+        late.retain(|t| *t >= self.earliest_ms);
+        let hits = Hits::of(onsets, self.window_ms);
+        let alarms: u64 = all().map(|o| u64::from(o.alarms)).sum();
+        let background_s: f64 = all().map(|o| o.background_s).sum();
+        let share = (trials > 0).then(|| f64::from(hits.count) / f64::from(trials));
+        let n = late.len() as u32;
+        let mut after = |q| (quantile(&mut late, q), n);
+        [
+            (share, trials),
+            (hits.width_ms, hits.count),
+            (hits.median_ms, hits.onsets),
+            (
+                (background_s > 0.0).then(|| alarms as f64 / background_s),
+                trials,
+            ),
+            after(0.05),
+            after(0.5),
+            after(0.95),
+        ]
+    }
+}

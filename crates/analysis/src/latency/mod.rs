@@ -1,0 +1,258 @@
+//! When the cameras know of a touch: the detection-latency study.
+//!
+//! The method is the paper's ("Data Ablation and Latency Distribution Analysis"): the events of both cameras, binned
+//! and smoothed, a one-sided CUSUM tuned to a rate increase over the background, an onset where it stays above a
+//! threshold for some bins, the threshold chosen by detections against false alarms. Three things differ. Both cameras
+//! are placed on host time by their own clock fits. Rates are events over the length of a window, with a floor. And
+//! where the contact was measured, onsets are also reported as latencies from it, with their uncertainty.
+//!
+//! [`spans`] says which time is trial and which background, [`bins`] counts, [`smooth`] smooths, [`cusum`] detects,
+//! [`sweep`] chooses the threshold, [`interval`] estimates, [`course`] is for drawing.
+
+pub mod bins;
+pub mod course;
+pub mod cusum;
+pub mod interval;
+pub mod smooth;
+pub mod spans;
+pub mod sweep;
+pub mod thin;
+pub mod trial;
+
+use rayon::prelude::*;
+use skinrig_model::{Background, PressRole, PressVerdict};
+
+use self::bins::Sight;
+use self::interval::{Estimates, Outcome, Plan};
+use self::smooth::Edges;
+use self::spans::{Neighbours, Spans};
+use self::trial::{Detector, Label, Trial};
+use crate::kept::{Kept, KeptPress};
+use crate::metrics::quantile;
+use crate::result::{
+    Analysis, ClockFit, ClockMethod, ContactLatency, Latency, ReducedLatency, ThresholdRow,
+};
+use crate::seeded;
+
+/// Thinning factor of the reduced study (paper).
+const REDUCED_FACTOR: u32 = 1024;
+/// Thresholds of the reduced study: first, last, how many (public code).
+const REDUCED_THRESHOLDS: (f64, f64, u32) = (3.0, 8.0, 6);
+/// Share that the reduced study's threshold should detect (public code).
+const REDUCED_TARGET: f64 = 0.85;
+/// Streams of random numbers from here on thin events; the bootstrap counts from 0.
+const THINNING: u64 = 1 << 40;
+
+/// When the cameras know of a touch: over the scored presses among `kept` that were done as planned.
+/// `None` without any scored press or without a clock for both cameras.
+#[must_use]
+pub fn study(analysis: &Analysis, kept: &Kept) -> Option<Latency> {
+    let [Some(one), Some(two)] = analysis.clocks else {
+        return None;
+    };
+    let clocks = [one, two];
+    let settings = &analysis.settings.latency;
+    let role = |p: &&KeptPress| analysis.presses.get(p.row).map(|r| r.role);
+    let presses = kept.presses.iter();
+    let presses: Vec<&KeptPress> = presses
+        .filter(|p| role(p) == Some(PressRole::Score))
+        .collect();
+    if presses.is_empty() {
+        return None;
+    }
+    let usable = usable(analysis, &clocks, &presses);
+    let edges = match settings.background {
+        Background::Before => Edges::Renormalised,
+        Background::After => Edges::ZeroPadded,
+    };
+    let grid = sweep::thresholds(settings.threshold_range, settings.thresholds);
+    let detector = Detector::new(settings, edges, grid);
+    let trials = look(&usable, &detector, None);
+    let found = Found::new(analysis, &detector, settings.target_rate, &trials);
+
+    let (first, last, count) = REDUCED_THRESHOLDS;
+    let few = Detector::new(settings, edges, sweep::thresholds((first, last), count));
+    let thinning = Some((REDUCED_FACTOR, analysis.settings.seed));
+    let thinned = look(&usable, &few, thinning);
+    let reduced = Found::new(analysis, &few, REDUCED_TARGET, &thinned);
+
+    let onset = |t: &Trial| found.chosen.and_then(|i| t.onsets_ms[i]);
+    let mut rates: Vec<f64> = trials.iter().map(|t| t.background_per_s).collect();
+    let covered = |f: fn(&Spans) -> f64| {
+        usable
+            .iter()
+            .map(|u| f(&u.spans))
+            .fold(f64::INFINITY, f64::min)
+    };
+    let covered_us = (covered(|s| -s.trial_us.0), covered(|s| s.trial_us.1));
+    Some(Latency {
+        settings: settings.clone(),
+        trials: trials.len() as u32,
+        unusable: (presses.len() - trials.len()) as u32,
+        shortened: usable.iter().filter(|u| u.spans.shortened).count() as u32,
+        covered_ms: if usable.is_empty() {
+            (0.0, 0.0)
+        } else {
+            (covered_us.0 * 1e-3, covered_us.1 * 1e-3)
+        },
+        zero_padded: edges == Edges::ZeroPadded,
+        decision_delay_ms: decision_delay_ms(&detector),
+        background_s: trials.iter().map(|t| t.background_s).sum(),
+        background_rate_per_s: quantile(&mut rates, 0.5).unwrap_or(0.0),
+        detected_rate: found.estimates.detected_rate,
+        width_ms: found.estimates.width_ms,
+        median_ms: found.estimates.median_ms,
+        false_alarms_per_s: found.estimates.false_alarms_per_s,
+        from_contact: from_contact(analysis, &clocks, &detector, &trials, &found),
+        reduced: Some(ReducedLatency {
+            factor: REDUCED_FACTOR,
+            thresholds: REDUCED_THRESHOLDS,
+            target_rate: REDUCED_TARGET,
+            threshold: reduced.chosen.map(|i| few.thresholds[i]),
+            detected_rate: reduced.estimates.detected_rate,
+            width_ms: reduced.estimates.width_ms,
+            false_alarms_per_s: reduced.estimates.false_alarms_per_s,
+        }),
+        course: course::course(&trials, detector.bin_ms),
+        onsets: trials.iter().map(|t| (t.label.press, onset(t))).collect(),
+        chosen: found.chosen.map(|i| i as u32),
+        sweep: found.rows,
+    })
+}
+
+/// A press with all that the study needs.
+struct Usable<'a> {
+    row: usize,
+    label: Label,
+    sights: [Sight<'a>; 2],
+    spans: Spans,
+}
+
+fn usable<'a>(
+    analysis: &Analysis,
+    clocks: &[ClockFit; 2],
+    presses: &[&'a KeptPress],
+) -> Vec<Usable<'a>> {
+    let neighbours = Neighbours::of(&analysis.presses);
+    let broken = [
+        PressVerdict::Invalid(String::new()),
+        PressVerdict::Missed(String::new()),
+    ];
+    let one = |kept: &&'a KeptPress| {
+        let press = &analysis.presses[kept.row];
+        if broken.iter().any(|v| v.name() == press.verdict) {
+            return None;
+        }
+        let sights = [0, 1].map(|k| Sight::new(&kept.views[k], &clocks[k]));
+        let background = analysis.settings.latency.background;
+        Some(Usable {
+            row: kept.row,
+            label: Label {
+                press: kept.press,
+                location: press.location,
+            },
+            spans: Spans::of(&sights, neighbours[kept.row]?, background)?,
+            sights,
+        })
+    };
+    presses.iter().filter_map(one).collect()
+}
+
+/// All trials, on all events or on one in `factor` of them, chosen anew for each `(factor, seed)`.
+fn look(usable: &[Usable<'_>], detector: &Detector, thinning: Option<(u32, u64)>) -> Vec<Trial> {
+    let one = |u: &Usable<'_>| {
+        let stream = THINNING + u.row as u64;
+        let thinning = thinning.map(|(k, seed)| (k, seeded::generator(seed, stream)));
+        detector.look_at(u.label, &u.sights, &u.spans, thinning)
+    };
+    let found: Vec<Option<Trial>> = usable.par_iter().map(one).collect();
+    found.into_iter().flatten().collect()
+}
+
+/// A detector at the threshold that was chosen for it.
+struct Found {
+    rows: Vec<ThresholdRow>,
+    chosen: Option<usize>,
+    estimates: Estimates,
+}
+
+impl Found {
+    fn new(analysis: &Analysis, detector: &Detector, target_rate: f64, trials: &[Trial]) -> Self {
+        let settings = &analysis.settings;
+        let rows = sweep::sweep(trials, detector, settings.latency.window_ms);
+        let chosen = sweep::choose(&rows, target_rate);
+        let cool_down = chosen.map_or(0, |i| sweep::cool_down(rows[i].width_ms, detector.bin_ms));
+        let outcome = |t: &Trial| Outcome {
+            location: t.label.location,
+            onset_ms: chosen.and_then(|i| t.onsets_ms[i]),
+            alarms: chosen.map_or(0, |i| t.alarms(i, detector.thresholds[i], cool_down)),
+            // Without a threshold there is no false-alarm rate, neither 0 nor any other.
+            background_s: if chosen.is_some() {
+                t.background_s
+            } else {
+                0.0
+            },
+        };
+        let outcomes: Vec<Outcome> = trials.par_iter().map(outcome).collect();
+        let plan = Plan {
+            window_ms: settings.latency.window_ms,
+            earliest_ms: -reach_ms(detector),
+            resamples: settings.bootstrap_resamples,
+            seed: settings.seed,
+        };
+        Self {
+            estimates: plan.estimate(&outcomes),
+            rows,
+            chosen,
+        }
+    }
+}
+
+/// Half the kernel, ms: so much before its event a smoothed count can rise.
+fn reach_ms(detector: &Detector) -> f64 {
+    detector.kernel.reach() as f64 * detector.bin_ms
+}
+
+/// From the reported onset, the middle of the first bin of a run, to the end of the last bin that decided on it.
+fn decision_delay_ms(detector: &Detector) -> f64 {
+    let rest = f64::from(detector.consecutive.max(1)) - 0.5;
+    rest * detector.bin_ms + reach_ms(detector)
+}
+
+/// Latencies from the measured contact. The trigger marks tie host time, on which the contact was measured, to each
+/// camera's clock.
+fn from_contact(
+    analysis: &Analysis,
+    clocks: &[ClockFit; 2],
+    detector: &Detector,
+    trials: &[Trial],
+    found: &Found,
+) -> Option<ContactLatency> {
+    let timing = &analysis.contact_timing;
+    if timing.scheduled || clocks.iter().any(|c| c.method != ClockMethod::TriggerMarks) {
+        return None;
+    }
+    let onset = |t: &Trial| found.chosen.and_then(|i| t.onsets_ms[i]);
+    let onsets = || trials.iter().map(onset);
+    // Standard deviation of something that lies anywhere in an interval of this width.
+    let uniform = |width: f64| width / 12f64.sqrt();
+    let from_bins_ms = uniform(detector.bin_ms);
+    let residual_us = clocks[0].residual_rms_us.max(clocks[1].residual_rms_us);
+    let from_clocks_ms = 1e-3 * libm::hypot(residual_us, uniform(2.0 * timing.mark_half_width_us));
+    let from_contact_ms = 1e-3 * uniform(timing.pose_interval_us);
+    let [p5_ms, median_ms, p95_ms] = found.estimates.from_contact_ms;
+    Some(ContactLatency {
+        p5_ms,
+        median_ms,
+        p95_ms,
+        before_contact: onsets()
+            .flatten()
+            .filter(|t| *t < -reach_ms(detector))
+            .count() as u32,
+        missed: onsets().filter(Option::is_none).count() as u32,
+        uncertainty_ms: libm::hypot(libm::hypot(from_bins_ms, from_clocks_ms), from_contact_ms),
+        from_bins_ms,
+        from_clocks_ms,
+        from_contact_ms,
+    })
+}

@@ -1,0 +1,22 @@
+//! The choice of events that thinning leaves.
+
+use std::collections::BTreeSet;
+
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+use crate::seeded;
+
+/// Which of `n` events are kept at factor `factor` (at least 1): n / factor of them, rounded, ties to even (public
+/// code), without replacement, ascending. Floyd's method (Bentley and Floyd 1987): one random number per event kept.
+#[must_use]
+pub fn chosen(n: usize, factor: u32, rng: &mut Xoshiro256PlusPlus) -> Vec<usize> {
+    let keep = ((n as f64 / f64::from(factor.max(1))).round_ties_even() as usize).min(n);
+    let mut kept = BTreeSet::new();
+    for last in n - keep..n {
+        let pick = seeded::index(rng, last + 1);
+        if !kept.insert(pick) {
+            kept.insert(last);
+        }
+    }
+    kept.into_iter().collect()
+}
