@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use skinrig::exit::Exit;
+use skinrig_bench::memory::{peak_mb, reset_peak};
 
 const PROTOCOL: &str = concat!(
     env!("CARGO_MANIFEST_DIR"),
@@ -22,18 +23,6 @@ struct Stage {
     seconds: f64,
     /// Largest resident memory during the part; `None` where the system does not say.
     peak_mb: Option<f64>,
-}
-
-/// Forgets the largest resident memory so far, where the system can.
-fn reset_peak() {
-    let _ = std::fs::write("/proc/self/clear_refs", "5");
-}
-
-fn peak_mb() -> Option<f64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"))?;
-    let kib: f64 = line.trim().strip_suffix(" kB")?.parse().ok()?;
-    Some(kib * 1024.0 / 1e6)
 }
 
 fn stage(what: &'static str, work: impl FnOnce()) -> Stage {

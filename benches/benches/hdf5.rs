@@ -3,13 +3,13 @@
 
 use std::fs::File;
 use std::hint::black_box;
-use std::io::{BufRead as _, BufReader, Read as _, Write as _};
+use std::io::Read as _;
 use std::path::Path;
-use std::process::{Child, ChildStdout, Command, Stdio};
 
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use skinrig_bench::Table;
+use skinrig_bench::python::{Python, interpreter};
 use skinrig_formats::Geometry;
 use skinrig_formats::hdf5::{Container, EventWriter};
 use skinrig_model::{CdEvent, Polarity};
@@ -27,7 +27,8 @@ for line in sys.stdin:
     with h5py.File(line.rstrip("\n")) as f:
         d = f["data"]
         arrays = [d['"%s"' % k][:] for k in ("ts", "x", "y", "pol")]
-    print(time.perf_counter() - start, len(arrays[0]), flush=True)
+    seconds = time.perf_counter() - start
+    print('{"seconds": %r, "rows": %d}' % (seconds, len(arrays[0])), flush=True)
 "#;
 
 /// The layout of the published files: contiguous columns, as h5py writes them.
@@ -39,56 +40,11 @@ with h5py.File(sys.argv[1]) as a, h5py.File(sys.argv[2], "w") as b:
         b['data/"%s"' % k] = v.astype("i8") if k in "xy" else v
 "#;
 
-fn interpreter() -> Command {
-    Command::new(std::env::var("SKINRIG_BENCH_PYTHON").unwrap_or_else(|_| "python3".into()))
-}
-
-/// A Python process that reads files when it is told to, and waits in between.
-struct H5py {
-    child: Child,
-    answers: BufReader<ChildStdout>,
-    version: String,
-}
-
-impl H5py {
-    fn start() -> Option<Self> {
-        let mut child = interpreter()
-            .args(["-c", H5PY])
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::null())
-            .spawn()
-            .ok()?;
-        let mut answers = BufReader::new(child.stdout.take()?);
-        let mut version = String::new();
-        answers.read_line(&mut version).ok()?;
-        let version = version.trim().to_owned();
-        (!version.is_empty()).then_some(Self {
-            child,
-            answers,
-            version,
-        })
-    }
-
-    /// Reads the file and returns the seconds that it took, as Python measured them.
-    fn read(&mut self, path: &Path) -> f64 {
-        let questions = self.child.stdin.as_mut().expect("an open pipe");
-        writeln!(questions, "{}", path.display()).expect("a listening process");
-        let mut answer = String::new();
-        self.answers.read_line(&mut answer).expect("an answer");
-        let mut words = answer.split_whitespace();
-        let seconds = words.next().and_then(|w| w.parse().ok());
-        assert_eq!(words.next(), Some(EVENTS.to_string().as_str()));
-        seconds.expect("a number of seconds")
-    }
-}
-
-impl Drop for H5py {
-    fn drop(&mut self) {
-        // Its input ends, and so does it.
-        drop(self.child.stdin.take());
-        let _ = self.child.wait();
-    }
+/// Reads the file and returns the seconds that it took, as Python measured them.
+fn read(h5py: &mut Python, path: &Path) -> f64 {
+    let answer = h5py.ask(&path.display().to_string()).expect("an answer");
+    assert_eq!(answer["rows"].as_u64(), Some(EVENTS as u64));
+    answer["seconds"].as_f64().expect("a number of seconds")
 }
 
 fn write(path: &Path) {
@@ -119,10 +75,10 @@ fn measure(title: &str, path: &Path) {
     let method = "one core each, file in the page cache, rounds in turn; ours checks every value and delivers \
                   slices of CdEvent; h5py runs in a process of its own, which waits while others are measured";
     let mut table = Table::new(&title, "Mev", method);
-    match H5py::start() {
+    match Python::start(["-c", H5PY]) {
         Some(mut h5py) => {
-            let what = format!("h5py {}, four arrays, unchecked", h5py.version);
-            table.baseline_told(&what, mev, move || h5py.read(path));
+            let what = format!("h5py {}, four arrays, unchecked", h5py.versions());
+            table.baseline_told(&what, mev, move || read(&mut h5py, path));
         }
         None => println!(
             "h5py: not measured (no python3 with h5py; SKINRIG_BENCH_PYTHON names another)"

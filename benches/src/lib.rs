@@ -4,6 +4,13 @@
 //! the baseline that the code is compared with, and each row says how it was measured. The rounds of all rows
 //! are interleaved, so that a slow moment of the machine hits all of them, and every second round runs backwards,
 //! so that none always follows the same neighbour; the best round counts.
+//!
+//! [`recording`] makes the data, [`files`] stores it, [`python`] runs the other side, [`memory`] reads the peak.
+
+pub mod files;
+pub mod memory;
+pub mod python;
+pub mod recording;
 
 use std::fmt::Write as _;
 use std::time::Instant;
@@ -42,13 +49,17 @@ impl<'a> Table<'a> {
         self.push(what, units, false, timed(work))
     }
 
+    /// Adds a row whose `work` says itself how many seconds it took: another process, or something that is known.
+    pub fn told(&mut self, what: &str, units: f64, work: impl FnMut() -> f64 + 'a) -> &mut Self {
+        self.push(what, units, false, work)
+    }
+
     /// Adds the row that the ratios refer to.
     pub fn baseline(&mut self, what: &str, units: f64, work: impl FnMut() + 'a) -> &mut Self {
         self.push(what, units, true, timed(work))
     }
 
-    /// Adds the row that the ratios refer to, whose `work` says itself how many seconds it took: another process,
-    /// or something that is known.
+    /// Adds the row that the ratios refer to, whose `work` says itself how many seconds it took.
     pub fn baseline_told(
         &mut self,
         what: &str,

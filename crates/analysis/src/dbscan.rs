@@ -114,6 +114,7 @@ impl Dbscan {
     pub fn run(&mut self, grid: &PixelGrid) -> &[Cluster] {
         self.clusters.clear();
         self.labels.clear();
+        self.core.reset(grid.height());
         grid.sorted_pixels(&mut self.pixels);
         if self.pixels.is_empty() || self.half.is_empty() {
             self.labels.resize(self.pixels.len(), NOISE);
@@ -150,6 +151,11 @@ impl Dbscan {
     /// (index of the pixel as in [`PixelGrid::sorted_pixels`], its cluster or [`NOISE`]) of the last run.
     pub fn labels(&self) -> impl Iterator<Item = (u32, u32)> {
         self.pixels.iter().copied().zip(self.labels.iter().copied())
+    }
+
+    /// Indices of the core pixels of the last run, ascending; every event of such a pixel is core.
+    pub fn core_pixels(&self) -> impl Iterator<Item = u32> {
+        self.core.iter().map(|index| index as u32)
     }
 
     /// The largest cluster of the last run, the first of equal ones, with its number.
@@ -192,7 +198,6 @@ impl Dbscan {
 
     fn find_core(&mut self, grid: &PixelGrid) {
         let height = grid.height();
-        self.core.reset(height);
         for &pixel in &self.pixels {
             let (x, y) = (pixel as usize % WIDTH, pixel as usize / WIDTH);
             let in_row = |row: usize, half: usize| {

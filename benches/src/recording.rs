@@ -1,0 +1,260 @@
+//! A seeded recording of one repetition of the published experiment, at its event rates: 289 presses 3 + 1/289 s
+//! apart, 7 M events per camera of which four fifths lie in the rows of the skin, a sixth of them outside presses.
+//!
+//! Counts and densities follow a real-rate recording: 20 thousand events per period in the rows of the skin, half as many
+//! different pixels, 800 events within 10 px of an event of a press, 3 % noise.
+
+use rand_xoshiro::Xoshiro256PlusPlus;
+use rand_xoshiro::rand_core::{Rng, SeedableRng};
+use skinrig_analysis::SessionInput;
+use skinrig_model::{
+    AnalysisSettings, AttemptId, CdEvent, HostTime, PlannedPress, Point2, Polarity, PressId,
+    PressOutcome, PressRole, PressTiming, PressVerdict, RigGeometry, SkinOutline, StereoGeometry,
+};
+
+/// Presses of one repetition.
+pub const PRESSES: u32 = 289;
+/// Time from press to press, s.
+pub const PERIOD_S: f64 = 868.0 / 289.0;
+/// Events of one camera in one period.
+pub const PERIOD_EVENTS: usize = 24_000;
+/// Contact of the first press on the host's clock, s.
+const FIRST_S: f64 = 15.0;
+/// From contact to release, s.
+pub const TOUCH_S: f64 = 0.55;
+/// The cameras' clocks began this long before the host's, s.
+const CLOCK_LEADS_S: [f64; 2] = [7.0, 5.3];
+/// The rows in which the skin is seen.
+const SKIN_ROWS: (u16, u16) = (185, 360);
+
+/// Random numbers and the pixels' sensitivities.
+pub struct Random {
+    rng: Xoshiro256PlusPlus,
+    /// Per pixel, 0..1: the unevenness of skin and sensor, which makes some pixels fire again and again.
+    gain: Vec<f32>,
+}
+
+impl Random {
+    /// Always the same.
+    #[must_use]
+    pub fn seeded(seed: u64) -> Self {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+        let gain = (0..640 * 480).map(|_| unit(&mut rng).powi(4) as f32);
+        Self {
+            gain: gain.collect(),
+            rng,
+        }
+    }
+
+    /// From 0 to 1.
+    pub fn unit(&mut self) -> f64 {
+        unit(&mut self.rng)
+    }
+
+    /// About normal, at most 3.5 standard deviations.
+    fn normal(&mut self) -> f64 {
+        let sum: f64 = (0..4).map(|_| self.unit()).sum();
+        (sum - 2.0) * 3f64.sqrt()
+    }
+
+    /// A pixel of a press that is seen at `column`: most at the two sides of the dent, some around it.
+    pub fn touched(&mut self, column: f64) -> (u16, u16) {
+        loop {
+            let (x, y) = match self.unit() {
+                p if p < 0.9 => {
+                    let side = if p < 0.5 { -13.0 } else { 13.0 };
+                    (
+                        column + side + 8.0 * self.normal(),
+                        272.0 + 19.0 * self.normal(),
+                    )
+                }
+                _ => (column + 90.0 * self.normal(), 272.0 + 24.0 * self.normal()),
+            };
+            if let Some(pixel) = self.seen(x, y) {
+                return pixel;
+            }
+        }
+    }
+
+    /// A pixel of the skin at rest.
+    pub fn idle(&mut self) -> (u16, u16) {
+        loop {
+            let (low, high) = SKIN_ROWS;
+            let y = f64::from(low) + f64::from(high + 1 - low) * self.unit();
+            let x = 640.0 * self.unit();
+            if let Some(pixel) = self.seen(x, y) {
+                return pixel;
+            }
+        }
+    }
+
+    /// A pixel above or below the skin.
+    fn elsewhere(&mut self) -> (u16, u16) {
+        let x = (640.0 * self.unit()) as u16;
+        let y = (303.0 * self.unit()) as u16;
+        (
+            x,
+            if y < SKIN_ROWS.0 {
+                y
+            } else {
+                y + SKIN_ROWS.1 + 1 - SKIN_ROWS.0
+            },
+        )
+    }
+
+    /// The pixel at a place, when it lies in the rows of the skin and happens to fire.
+    fn seen(&mut self, x: f64, y: f64) -> Option<(u16, u16)> {
+        let (low, high) = (f64::from(SKIN_ROWS.0), f64::from(SKIN_ROWS.1 + 1));
+        if !(0.0..640.0).contains(&x) || !(low..high).contains(&y) {
+            return None;
+        }
+        let (x, y) = (x as u16, y as u16);
+        let gain = self.gain[usize::from(y) * 640 + usize::from(x)];
+        (self.unit() < f64::from(gain)).then_some((x, y))
+    }
+
+    fn event(&mut self, t_s: f64, (x, y): (u16, u16)) -> CdEvent {
+        CdEvent {
+            t_us: (t_s * 1e6) as u64,
+            x,
+            y,
+            polarity: Polarity::from_bit(self.unit() < 0.5),
+        }
+    }
+}
+
+fn unit(rng: &mut Xoshiro256PlusPlus) -> f64 {
+    (rng.next_u64() >> 11) as f64 / (1u64 << 53) as f64
+}
+
+/// Where a press is, and when it touches on the host's clock: the grid of the published experiment, 4 mm apart.
+fn press(i: u32) -> (Point2, f64) {
+    let (line, place) = (i / 17, i % 17);
+    let place = if line % 2 == 0 { place } else { 16 - place };
+    let at = Point2::new(
+        -22.0 + 4.0 * f64::from(line),
+        -30.0 + 4.0 * f64::from(place),
+    );
+    (at, FIRST_S + PERIOD_S * f64::from(i))
+}
+
+/// What is known of the session besides its events: three sync presses and the grid, every other press calibrates. No
+/// trigger marks, as in the published recordings, so that the clocks are aligned by event rates.
+#[must_use]
+pub fn input() -> SessionInput {
+    let h = HostTime::from_secs_f64;
+    let sync = (0..3).map(|i| {
+        (
+            PressRole::Sync,
+            0,
+            Point2::new(10.0, 2.0),
+            10.0 + f64::from(i),
+        )
+    });
+    let grid = (0..PRESSES).map(|i| {
+        let (at, contact) = press(i);
+        let role = if i % 2 == 0 {
+            PressRole::Calibrate
+        } else {
+            PressRole::Score
+        };
+        (role, i, at, contact)
+    });
+    let (planned, outcomes) = sync
+        .chain(grid)
+        .zip(0u32..)
+        .map(|((role, location, at, contact), i)| {
+            let id = PressId(i);
+            let planned = PlannedPress {
+                id,
+                role,
+                repetition: 0,
+                location,
+                at,
+                depth_mm: 2.0,
+            };
+            let outcome = PressOutcome {
+                attempt: AttemptId {
+                    press: id,
+                    number: 1,
+                },
+                verdict: PressVerdict::Valid,
+                timing: Some(PressTiming {
+                    approach: h(contact - 0.1),
+                    contact: h(contact),
+                    at_depth: h(contact + 0.2),
+                    retract: h(contact + 0.3),
+                    release: h(contact + TOUCH_S),
+                    clear: h(contact + 0.7),
+                }),
+                measured_at: Some(at),
+                measured_depth_mm: Some(2.0),
+                peak_force_n: None,
+                scheduled: false,
+            };
+            (planned, Some(outcome))
+        })
+        .unzip();
+    SessionInput {
+        planned,
+        outcomes,
+        edges: [Vec::new(), Vec::new()],
+        marks: Vec::new(),
+        gaps: [Vec::new(), Vec::new()],
+        pose_interval_us: None,
+        rig: RigGeometry {
+            outline: SkinOutline::PAPER,
+            nominal: StereoGeometry::PAPER,
+            trigger_channel: None,
+        },
+        settings: AnalysisSettings::default(),
+    }
+}
+
+/// The events of both cameras, by time.
+#[must_use]
+pub fn events(input: &SessionInput) -> [Vec<CdEvent>; 2] {
+    [0, 1].map(|k| {
+        let mut random = Random::seeded(1 + k as u64);
+        let camera = &StereoGeometry::PAPER.cameras[k];
+        let mut events = Vec::new();
+        for outcome in input.outcomes.iter().flatten() {
+            let (Some(timing), Some(at)) = (outcome.timing, outcome.measured_at) else {
+                continue;
+            };
+            let contact_s = timing.contact.0 as f64 * 1e-9 + CLOCK_LEADS_S[k];
+            // The dent is seen a little beside its place: there is an error to measure.
+            let column = camera.column_of_point(at).unwrap_or(320.0) + 6.0 * random.normal();
+            let place = outcome.attempt.press.0;
+            let events_here = if place < 3 {
+                PERIOD_EVENTS / 3
+            } else {
+                PERIOD_EVENTS
+            };
+            for _ in 0..events_here {
+                let (after_s, pixel) = match random.unit() {
+                    p if p < 0.18 => (PERIOD_S * random.unit(), random.elsewhere()),
+                    p if p < 0.25 => (PERIOD_S * random.unit(), random.idle()),
+                    // The skin comes to rest slowly.
+                    p if p < 0.40 => {
+                        let after_s = TOUCH_S - 0.5 * random.unit().max(0.02).ln();
+                        (after_s, random.touched(column))
+                    }
+                    _ => (TOUCH_S * random.unit(), random.touched(column)),
+                };
+                events.push(random.event(contact_s + after_s, pixel));
+            }
+        }
+        events.sort_by_key(|e| e.t_us);
+        events
+    })
+}
+
+/// Pixels of the events of one press, as they lie in one period: `count` of them.
+pub fn press_pixels(count: usize) -> impl Iterator<Item = (u16, u16)> {
+    let mut random = Random::seeded(7);
+    (0..count).map(move |_| match random.unit() {
+        p if p < 0.09 => random.idle(),
+        _ => random.touched(310.0),
+    })
+}
