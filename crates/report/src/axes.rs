@@ -88,35 +88,37 @@ pub struct Axes {
 }
 
 impl Axes {
-    /// Draws grid, ticks and labels.
+    /// Draws grid, ticks and labels, ticks at round numbers.
     pub fn draw(&self, svg: &mut Svg) {
+        let marks = |scale: Scale, wanted| {
+            let at = ticks(scale.data.0, scale.data.1, wanted);
+            let step = if at.len() > 1 { at[1] - at[0] } else { 1.0 };
+            let labelled = at.into_iter().map(|t| (t, tick_label(t, step)));
+            labelled.collect::<Vec<_>>()
+        };
+        let (xs, ys) = (
+            marks(self.x, self.tick_count.0),
+            marks(self.y, self.tick_count.1),
+        );
+        self.draw_with(svg, &xs, &ys);
+    }
+
+    /// Draws grid, the given ticks (value and text) and labels.
+    pub fn draw_with(&self, svg: &mut Svg, xs: &[(f64, String)], ys: &[(f64, String)]) {
         let (left, right) = (self.x.px.0.min(self.x.px.1), self.x.px.0.max(self.x.px.1));
         let (top, bottom) = (self.y.px.0.min(self.y.px.1), self.y.px.0.max(self.y.px.1));
         svg.open("g", &[("class", &"axes")]);
-        let xs = ticks(self.x.data.0, self.x.data.1, self.tick_count.0);
-        let ys = ticks(self.y.data.0, self.y.data.1, self.tick_count.1);
-        let step = |v: &[f64]| if v.len() > 1 { v[1] - v[0] } else { 1.0 };
         svg.open("g", &[("class", &"x-ticks")]);
-        for &t in &xs {
-            let x = self.x.at(t);
+        for (t, label) in xs {
+            let x = self.x.at(*t);
             svg.line("grid", (x, top), (x, bottom));
-            svg.text(
-                (x, bottom + 16.0),
-                "tick",
-                "middle",
-                &tick_label(t, step(&xs)),
-            );
+            svg.text((x, bottom + 16.0), "tick", "middle", label);
         }
         svg.close();
-        for &t in &ys {
-            let y = self.y.at(t);
+        for (t, label) in ys {
+            let y = self.y.at(*t);
             svg.line("grid", (left, y), (right, y));
-            svg.text(
-                (left - 7.0, y + 4.0),
-                "tick",
-                "end",
-                &tick_label(t, step(&ys)),
-            );
+            svg.text((left - 7.0, y + 4.0), "tick", "end", label);
         }
         svg.line("axis", (left, bottom), (right, bottom));
         svg.line("axis", (left, top), (left, bottom));

@@ -2,7 +2,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use skinrig_analysis::result::{Analysis, PressResult};
+use skinrig_analysis::result::{Analysis, Latency, PressResult};
+use skinrig_analysis::triangulate::locate;
 use skinrig_model::{Point2, PressRole};
 
 /// True for the presses behind the headline: scored, valid, with a truth and an estimate.
@@ -158,4 +159,82 @@ pub fn disagreement(analysis: &Analysis) -> Option<String> {
     (drawn != headline).then(|| {
         format!("figures show {drawn} scored presses, the headline stands on {headline}: do not trust this report")
     })
+}
+
+/// The onsets that count: within the settings' window of the median onset, ascending, ms (the paper's true
+/// positives).
+#[must_use]
+pub fn onsets_ms(latency: &Latency) -> Vec<f64> {
+    let mut onsets: Vec<f64> = latency
+        .onsets
+        .iter()
+        .filter_map(|(_, onset)| *onset)
+        .filter(|onset| onset.is_finite())
+        .collect();
+    onsets.sort_by(f64::total_cmp);
+    let Some(median) = quantile(&onsets, 0.5) else {
+        return vec![];
+    };
+    onsets.retain(|onset| (onset - median).abs() <= latency.settings.window_ms);
+    onsets
+}
+
+/// 5th, 50th and 95th percentile of [`onsets_ms`], ms; `None` without any.
+#[must_use]
+pub fn onset_percentiles(latency: &Latency) -> Option<(f64, f64, f64)> {
+    let onsets = onsets_ms(latency);
+    Some((
+        quantile(&onsets, 0.05)?,
+        quantile(&onsets, 0.5)?,
+        quantile(&onsets, 0.95)?,
+    ))
+}
+
+/// Quantile of ascending values, linear between neighbours.
+fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
+    let at = share * sorted.len().checked_sub(1)? as f64;
+    let (low, high) = (sorted[at.floor() as usize], sorted[at.ceil() as usize]);
+    Some(low + (high - low) * at.fract())
+}
+
+/// Where a calibrating press was, and where it was located before and after the calibration.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Residual {
+    /// Which press.
+    pub press: u32,
+    /// Its measured position.
+    pub truth: Point2,
+    /// Located with the geometry that the calibration started from.
+    pub before: Option<Point2>,
+    /// Located with the calibrated geometry.
+    pub after: Option<Point2>,
+}
+
+/// One row per calibrating press with a truth and both centroids, in plan order; empty without a calibration.
+/// "Before" intersects the rays of the same centroids with the geometry that the calibration started from.
+#[must_use]
+pub fn residuals(analysis: &Analysis) -> Vec<Residual> {
+    let Some(calibration) = &analysis.calibration else {
+        return vec![];
+    };
+    let finite = |p: Point2| p.x_mm.is_finite() && p.y_mm.is_finite();
+    let row = |press: &PressResult| {
+        let columns = press.views.map(|v| v.and_then(|v| v.centroid_u));
+        let truth = press.truth.filter(|t| finite(*t))?;
+        if columns.iter().any(Option::is_none) {
+            return None;
+        }
+        let start = locate(&calibration.start, &analysis.rig.outline, columns);
+        Some(Residual {
+            press: press.press.0,
+            truth,
+            before: start.estimate().filter(|p| finite(*p)),
+            after: press.estimate().filter(|p| finite(*p)),
+        })
+    };
+    let calibrating = analysis
+        .presses
+        .iter()
+        .filter(|p| p.role == PressRole::Calibrate && p.verdict == "valid");
+    calibrating.filter_map(row).collect()
 }

@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json as object};
 
-use crate::ReportInput;
+use crate::{ReportInput, comparison};
 
 /// Value of the document's `format` field.
 pub const JSON_FORMAT: &str = "skinrig-report";
@@ -10,7 +10,7 @@ pub const JSON_FORMAT: &str = "skinrig-report";
 pub const JSON_VERSION: u32 = 1;
 
 /// Fields of the analysis that are bulk data for figures.
-const BULK: [&str; 3] = ["rates", "pictures", "zooms"];
+const BULK: [&str; 4] = ["rates", "pictures", "zooms", "activity"];
 
 /// See [`crate::json`].
 pub(crate) fn json(input: &ReportInput<'_>) -> Value {
@@ -26,5 +26,6 @@ pub(crate) fn json(input: &ReportInput<'_>) -> Value {
         "format_version": JSON_VERSION,
         "provenance": input.provenance,
         "analysis": analysis,
+        "comparison": comparison::rows(input.analysis),
     })
 }

@@ -55,6 +55,14 @@ pub(crate) fn grouped(n: u64) -> String {
     out
 }
 
+/// The name that serde writes for a variant without fields, with spaces for underscores.
+pub(crate) fn words<T: serde::Serialize>(variant: &T) -> String {
+    match serde_json::to_value(variant) {
+        Ok(serde_json::Value::String(name)) => name.replace('_', " "),
+        _ => NONE.to_owned(),
+    }
+}
+
 /// The text, or "not recorded" when it is empty.
 pub(crate) fn or_missing(text: &str) -> &str {
     if text.trim().is_empty() {

@@ -11,10 +11,12 @@
 
 pub mod axes;
 pub mod colour;
+pub mod comparison;
 pub mod derive;
 pub mod figures;
 pub mod page;
 pub mod provenance;
+pub mod published;
 pub mod svg;
 
 mod document;
@@ -56,7 +58,8 @@ pub fn html(input: &ReportInput<'_>) -> Result<String, ReportError> {
 }
 
 /// The results as JSON for programs: `format` ([`JSON_FORMAT`]), `format_version` ([`JSON_VERSION`]),
-/// `provenance` ([`Provenance`]) and `analysis` (the fields of [`Analysis`] without the bulk series `rates`, `pictures` and `zooms`).
+/// `provenance` ([`Provenance`]), `analysis` (the fields of [`Analysis`] without the bulk series `rates`, `pictures`,
+/// `zooms` and `activity`) and `comparison` ([`comparison::Row`]s: the session beside the published numbers).
 ///
 /// A field that has no value is `null`. Fields are added without a new version; a field that changes its
 /// meaning or disappears raises the version.

@@ -192,6 +192,27 @@ fn everything_a_browser_test_needs_has_a_name() {
         "figure-press-pictures",
         "clocks",
         "calibration",
+        "coverage",
+        "cmre",
+        "bit-rates",
+        "fit-table",
+        "model-table",
+        "reduction-table",
+        "latency-table",
+        "latency-from-contact",
+        "comparison-msows",
+        "comparison-skins",
+        "comparison-sensors",
+        "audit-silent",
+        "figure-activity",
+        "figure-models",
+        "figure-correlation",
+        "figure-residuals",
+        "figure-threshold",
+        "figure-reduction",
+        "figure-latency-course",
+        "figure-latency-roc",
+        "figure-latency-onsets",
         "press-table",
         "inspector",
         "filter-verdict",
@@ -207,6 +228,27 @@ fn everything_a_browser_test_needs_has_a_name() {
         page.matches("<title id=").count(),
         page.matches("role=\"img\"").count()
     );
+}
+
+/// A broken law stands before every number, with fault, evidence and advice; the public code's numbers only where
+/// they were computed.
+#[test]
+fn findings_come_first_and_reference_numbers_only_when_asked_for() {
+    let mut analysis = support::analysis(4, 3);
+    assert!(
+        !html(&input(&analysis))
+            .unwrap()
+            .contains("data-testid=\"reference")
+    );
+    analysis.findings = support::studies::findings();
+    analysis.reference = Some(support::studies::reference());
+    let page = html(&input(&analysis)).unwrap();
+    let at = |text: &str| page.find(text).unwrap_or_else(|| panic!("no {text}"));
+    assert!(at("data-testid=\"findings\"") < at("data-testid=\"metric-rmse\""));
+    assert!(at("Likely: cameras swapped.") < at("exchanged they follow with 0.97"));
+    assert!(at("Likely: clock wrong, camera 2.") < at("check the alignment of camera 2"));
+    assert!(!page.contains("data-testid=\"audit-silent\""));
+    assert!(at("data-testid=\"reference-table\"") < at("data-testid=\"reference-reduction\""));
 }
 
 /// Every id once, and every reference to one has its target.

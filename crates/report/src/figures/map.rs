@@ -89,8 +89,8 @@ pub fn skin_map(input: &ReportInput<'_>) -> Figure {
         "Localisation error over the skin. Discs: scored locations, coloured by the mean Euclidean error of \
          their presses. Lines run from each measured position (truth) to its estimate, which ends in a dot \
          ({} presses at {} locations). Open squares: scored presses that do not count ({}; those never done are drawn \
-         only at places without a disc). Thin grey line: press path of the first repetition. Tinted: fields of view of camera 1 and camera 2; both tints \
-         together mark the overlap, where a press can be located.",
+         only at places without a disc). Thin grey line: press path of the first repetition. Tinted: fields of view of camera 1 and camera 2; dotted: their \
+         overlap, where a press can be located. Squares: the cells that the probed locations stand for.",
         counted.len(),
         locations.len(),
         others.len()
@@ -113,11 +113,20 @@ pub fn skin_map(input: &ReportInput<'_>) -> Figure {
             ("clip-path", &"url(#skin-map-clip)"),
         ],
     );
+    let coverage = input.analysis.coverage.as_ref();
     for (i, camera) in input.analysis.geometry.cameras.iter().enumerate() {
         let class = format!("fov f{0} c{0}", i + 1);
-        svg.path(&class, &layout.field_of_view(camera));
+        let seen = coverage.map(|c| &c.views[i]).filter(|v| !v.is_empty());
+        let data = seen.map_or_else(|| layout.field_of_view(camera), |v| layout.polygons(v));
+        svg.path(&class, &data);
+    }
+    if let Some(c) = coverage {
+        svg.path("overlap-edge", &layout.polygons(&c.overlap));
     }
     svg.close();
+    if let Some(cell) = coverage.and_then(|c| c.cell_mm) {
+        cells(svg, &layout, input, cell);
+    }
     svg.path("skin-edge", &layout.skin());
     let first = input
         .analysis
@@ -189,6 +198,30 @@ pub fn skin_map(input: &ReportInput<'_>) -> Figure {
     )
 }
 
+/// The squares that the probed locations stand for, within the outline.
+fn cells(svg: &mut Svg, layout: &Layout, input: &ReportInput<'_>, cell_mm: f64) {
+    let side = cell_mm * layout.axes.x.per_unit();
+    let mut seen = std::collections::BTreeSet::new();
+    let mut data = String::new();
+    let planned = input.analysis.presses.iter();
+    for p in planned.filter(|p| p.role != PressRole::Sync && p.timing.is_some()) {
+        if seen.insert(p.location) {
+            let (x, y) = layout.px(p.planned);
+            let (x, y) = (Px(x - side / 2.0), Px(y - side / 2.0));
+            data += &format!("M{x} {y}h{0}v{0}h-{0}Z", Px(side));
+        }
+    }
+    svg.open(
+        "g",
+        &[
+            ("class", &"layer-cells"),
+            ("clip-path", &"url(#skin-map-clip)"),
+        ],
+    );
+    svg.path("cell", &data);
+    svg.close();
+}
+
 fn legend(svg: &mut Svg) {
     let (x, mut y) = (756.0, 400.0);
     let mut row = |svg: &mut Svg, label: &str, draw: &dyn Fn(&mut Svg, f64)| {
@@ -212,6 +245,21 @@ fn legend(svg: &mut Svg) {
     };
     row(svg, "seen by camera 1", &swatch("fov strong f1 c1"));
     row(svg, "seen by camera 2", &swatch("fov strong f2 c2"));
+    row(svg, "seen by both", &|svg, y| {
+        svg.line("overlap-edge", (x, y), (x + 18.0, y));
+    });
+    row(svg, "probed cell", &|svg, y| {
+        svg.leaf(
+            "rect",
+            &[
+                ("class", &"cell"),
+                ("x", &Px(x + 2.0)),
+                ("y", &Px(y - 7.0)),
+                ("width", &"14"),
+                ("height", &"14"),
+            ],
+        );
+    });
     row(svg, "press path", &|svg, y| {
         svg.line("path", (x, y), (x + 18.0, y));
     });

@@ -1,21 +1,41 @@
 //! Owns the figures: one function each, from an analysis to a labelled SVG with title and description.
 
+mod activity;
 mod centroids;
+mod correlation;
 mod errors;
+mod latency_course;
+mod latency_onsets;
+mod latency_roc;
+mod legend;
 mod map;
+mod models;
 mod pictures;
 mod rates;
+mod reduction;
+mod residuals;
 mod skin;
+mod threshold;
 
+pub use activity::activity;
 pub use centroids::centroid_tracks;
+pub use correlation::correlation;
 pub use errors::{error_distribution, error_scatter};
+pub use latency_course::latency_course;
+pub use latency_onsets::latency_onsets;
+pub use latency_roc::latency_roc;
 pub use map::{repeat_map, skin_map};
+pub(crate) use models::model_name;
+pub use models::models;
 pub use pictures::press_pictures;
 pub use rates::{event_rates, press_rates};
+pub use reduction::reduction;
+pub use residuals::residuals;
+pub use threshold::threshold;
 
 use crate::ReportInput;
 use crate::format::or_missing;
-use crate::svg::{Attributes, Px, Svg, plain_css};
+use crate::svg::{Attributes, Px, Svg, plain_css, polyline};
 
 /// A figure.
 #[derive(Debug, Clone)]
@@ -58,8 +78,20 @@ pub fn all(input: &ReportInput<'_>) -> Vec<Figure> {
         centroid_tracks(input),
         repeat_map(input),
     ];
-    figures.extend(press_rates(input));
-    figures.extend(press_pictures(input));
+    let optional = [
+        press_rates,
+        press_pictures,
+        activity,
+        models,
+        correlation,
+        residuals,
+        threshold,
+        reduction,
+        latency_course,
+        latency_roc,
+        latency_onsets,
+    ];
+    figures.extend(optional.into_iter().filter_map(|draw| draw(input)));
     figures
 }
 
@@ -145,4 +177,12 @@ fn nice_above(value: f64) -> f64 {
         .map(|m| m * power)
         .find(|c| *c >= value * (1.0 - 1e-12))
         .unwrap_or(10.0 * power)
+}
+
+/// Path data of the area between two lines: x with the y of both.
+fn band(points: impl IntoIterator<Item = (f64, (f64, f64))>) -> String {
+    let points: Vec<_> = points.into_iter().collect();
+    let forth = points.iter().map(|(x, (low, _))| (*x, *low));
+    let back = points.iter().rev().map(|(x, (_, high))| (*x, *high));
+    polyline(forth.chain(back), true)
 }

@@ -16,6 +16,15 @@ pub(super) struct Layout {
 
 impl Layout {
     pub(super) fn new(input: &ReportInput<'_>) -> Self {
+        Self::within(input, (66.0, 18.0), (660.0, 610.0))
+    }
+
+    /// The skin and the cameras as large as they fit into the box at `(left, top)`.
+    pub(super) fn within(
+        input: &ReportInput<'_>,
+        (left, top): (f64, f64),
+        (width, height): (f64, f64),
+    ) -> Self {
         let outline = input.analysis.rig.outline.polygon(24);
         let cameras = input.analysis.geometry.cameras.map(|c| c.position);
         let all = || {
@@ -30,7 +39,6 @@ impl Layout {
             (low - 5.0, high + 5.0)
         };
         let (xs, ys) = (range(|p| p.x_mm), range(|p| p.y_mm));
-        let (left, top, width, height) = (66.0, 18.0, 660.0, 610.0);
         // One scale for both axes.
         let k = (width / (xs.1 - xs.0)).min(height / (ys.1 - ys.0));
         let right = left + k * (xs.1 - xs.0);
@@ -51,6 +59,12 @@ impl Layout {
 
     pub(super) fn skin(&self) -> String {
         polyline(self.outline.iter().map(|p| self.px(*p)), true)
+    }
+
+    /// Closed polygons.
+    pub(super) fn polygons(&self, polygons: &[Vec<Point2>]) -> String {
+        let one = |points: &Vec<Point2>| polyline(points.iter().map(|p| self.px(*p)), true);
+        polygons.iter().map(one).collect()
     }
 
     /// Radius of a location's disc: a share of the distance to its nearest neighbour, 3 to 8 px.

@@ -1,5 +1,7 @@
 //! A made-up, seeded analysis for the tests of the report. None of its numbers was measured.
 
+pub mod studies;
+
 use skinrig_analysis::result::*;
 use skinrig_model::*;
 use skinrig_report::{DeviceRow, InterruptionRow, NoteRow, Provenance};
@@ -114,6 +116,10 @@ pub fn analysis(side: u32, repetitions: u32) -> Analysis {
         .flat_map(|id| [CameraId::One, CameraId::Two].map(|c| (*id, c)))
         .map(|(id, camera)| zoom(&mut noise, id, camera))
         .collect();
+    let latency = studies::latency(&mut noise, &presses);
+    let activity = CameraId::ALL
+        .map(|c| studies::activity(&mut noise, c))
+        .to_vec();
     Analysis {
         version: ANALYSIS_VERSION,
         contact_timing: Default::default(),
@@ -125,13 +131,13 @@ pub fn analysis(side: u32, repetitions: u32) -> Analysis {
         calibration: Some(CalibrationResult {
             model: CalibrationModel::Full,
             lens: LensKind::Exponential,
-            correlation: vec![],
+            correlation: studies::correlation(8),
             condition: Some(184.0),
             rank: 8,
-            outliers: 0,
+            outliers: 4,
             starts: 10,
             starts_agreeing: 9,
-            compared: vec![],
+            compared: studies::models(),
             start: geometry,
             names: ["camera 1 x (mm)", "camera 1 y (mm)", "camera 2 x (mm)", "camera 2 y (mm)", "camera 1 skew (deg)",
                 "camera 2 skew (deg)", "camera 1 distortion W (1)", "camera 2 distortion W (1)"].map(str::to_owned).to_vec(),
@@ -151,15 +157,15 @@ pub fn analysis(side: u32, repetitions: u32) -> Analysis {
             failures: 4,
             rmse_mm: scored_without_exclusions.rmse_mm,
         },
-        threshold: None,
-        coverage: None,
-        cmre: None,
-        bit_rates: None,
-        reduction: None,
-        latency: None,
+        threshold: Some(studies::threshold()),
+        coverage: Some(studies::coverage(pitch, side * side)),
+        cmre: Some(studies::cmre()),
+        bit_rates: Some(studies::bit_rates()),
+        reduction: Some(studies::reduction()),
+        latency: Some(latency),
         reference: None,
         findings: vec![],
-        activity: vec![],
+        activity,
         depths: vec![],
         rates,
         presses,
@@ -462,6 +468,13 @@ pub fn empty() -> Analysis {
         warnings: vec![],
         pictures: vec![],
         zooms: vec![],
+        threshold: None,
+        coverage: None,
+        cmre: None,
+        bit_rates: None,
+        reduction: None,
+        latency: None,
+        activity: vec![],
         ..full
     }
 }

@@ -1,6 +1,8 @@
 //! Owns the data tables of the page (press table, tooltips, CSV downloads) and the small tables of settings
 //! and calibration.
 
+mod studies;
+
 use serde_json::{Map, Value, json};
 use skinrig_analysis::result::{Analysis, CalibrationResult};
 
@@ -88,6 +90,9 @@ pub(crate) fn script_data(input: &ReportInput<'_>) -> Value {
                 rows.iter().map(|r| rounded(r.standard_error, 6)),
             );
         put("calibration", table);
+    }
+    for (name, table) in studies::all(a) {
+        tables.insert(name.to_owned(), table.finish());
     }
     json!({ "session": input.provenance.session_id, "tables": tables })
 }

@@ -1,11 +1,20 @@
 //! Owns the HTML page: what the template and the script receive.
 //!
-//! The template is `assets/page.html` (minijinja, auto-escaped), the style `assets/page.css` and
+//! The template is `assets/page.html` with `assets/sections/*.html` (minijinja, auto-escaped), the style `assets/page.css` and
 //! `assets/figure.css`, the script `assets/report.js`. The script gets one JSON value with named tables
 //! (columns and column-wise data): the press table, tooltips and CSV downloads all read it.
 
+mod areas;
+mod calibration;
+mod comparison;
+pub(crate) mod findings;
+mod grid;
+mod latency;
+mod reduction;
+
 use std::collections::BTreeMap;
 
+use minijinja::value::Serde;
 use minijinja::{AutoEscape, Environment, Value, context};
 use serde::Serialize;
 use skinrig_analysis::result::Analysis;
@@ -19,9 +28,61 @@ use crate::tables;
 use crate::terminal::{clock_method, metric_rows};
 use crate::{ReportError, ReportInput};
 
-const TEMPLATE: &str = include_str!("../assets/page.html");
-const PAGE_CSS: &str = include_str!("../assets/page.css");
-const SCRIPT: &str = include_str!("../assets/report.js");
+/// The templates: the page, its macros, and one file per section.
+const TEMPLATES: [(&str, &str); 14] = [
+    ("page.html", include_str!("../../assets/page.html")),
+    ("macros.html", include_str!("../../assets/macros.html")),
+    (
+        "sections/results.html",
+        include_str!("../../assets/sections/results.html"),
+    ),
+    (
+        "sections/skin.html",
+        include_str!("../../assets/sections/skin.html"),
+    ),
+    (
+        "sections/errors.html",
+        include_str!("../../assets/sections/errors.html"),
+    ),
+    (
+        "sections/events.html",
+        include_str!("../../assets/sections/events.html"),
+    ),
+    (
+        "sections/single.html",
+        include_str!("../../assets/sections/single.html"),
+    ),
+    (
+        "sections/calibration.html",
+        include_str!("../../assets/sections/calibration.html"),
+    ),
+    (
+        "sections/reduction.html",
+        include_str!("../../assets/sections/reduction.html"),
+    ),
+    (
+        "sections/detection.html",
+        include_str!("../../assets/sections/detection.html"),
+    ),
+    (
+        "sections/rates.html",
+        include_str!("../../assets/sections/rates.html"),
+    ),
+    (
+        "sections/comparison.html",
+        include_str!("../../assets/sections/comparison.html"),
+    ),
+    (
+        "sections/session.html",
+        include_str!("../../assets/sections/session.html"),
+    ),
+    (
+        "sections/presses.html",
+        include_str!("../../assets/sections/presses.html"),
+    ),
+];
+const PAGE_CSS: &str = include_str!("../../assets/page.css");
+const SCRIPT: &str = include_str!("../../assets/report.js");
 
 /// JSON that may stand inside `<script>`: `<`, `>`, `&` and the line separators of JavaScript are written as
 /// escapes, so no text can end the element or open a comment.
@@ -48,7 +109,9 @@ pub fn script_json<T: Serialize>(value: &T) -> Result<String, serde_json::Error>
 pub(crate) fn render(input: &ReportInput<'_>) -> Result<String, ReportError> {
     let mut env = Environment::new();
     env.set_auto_escape_callback(|_| AutoEscape::Html);
-    env.add_template("page.html", TEMPLATE)?;
+    for (name, source) in TEMPLATES {
+        env.add_template(name, source)?;
+    }
     let (a, p) = (input.analysis, &input.provenance);
     let fig: BTreeMap<&str, Value> = figures::all(input)
         .into_iter()
@@ -80,6 +143,12 @@ pub(crate) fn render(input: &ReportInput<'_>) -> Result<String, ReportError> {
             interval => interval(&a.scored_without_exclusions.rmse_mm, 1.0, 2),
             n => a.scored_without_exclusions.rmse_mm.n,
         },
+        penalised => penalised(a),
+        threshold_note => threshold_note(a),
+        findings => findings::values(&a.findings),
+        contents => contents(input),
+        grids => grids(input),
+        has_cells => a.coverage.as_ref().is_some_and(|c| c.cell_mm.is_some()),
         diagonal => a.scored.rmse_diagonal_percent.map(|v| number(Some(v), 2)),
         counts => [
             count("valid", "valid", c.valid),
@@ -124,6 +193,74 @@ pub(crate) fn render(input: &ReportInput<'_>) -> Result<String, ReportError> {
         press_total => a.presses.len(),
     })?;
     Ok(page)
+}
+
+/// The tables of the sections, by name; those without data are missing.
+fn grids(input: &ReportInput<'_>) -> BTreeMap<&'static str, Value> {
+    let a = input.analysis;
+    [
+        ("coverage", areas::coverage(a)),
+        ("cmre", areas::cmre(a)),
+        ("bit_rates", areas::bit_rates(a)),
+        ("fit", calibration::fit(a)),
+        ("models", calibration::models(a)),
+        ("reduction", reduction::reduction(a)),
+        ("latency", latency::latency(a)),
+        ("from_contact", latency::from_contact(a)),
+        ("msows", Some(comparison::msows(input))),
+        ("skins", Some(comparison::skins(input))),
+        ("sensors", Some(comparison::sensors(input))),
+        ("reference", comparison::reference(a)),
+        ("reference_reduction", comparison::reference_reduction(a)),
+    ]
+    .into_iter()
+    .filter_map(|(name, grid)| Some((name, Value::from(Serde(grid?)))))
+    .collect()
+}
+
+/// The sections in their order: anchor and name.
+fn contents(input: &ReportInput<'_>) -> Vec<(&'static str, &'static str)> {
+    let a = input.analysis;
+    let single = !a.pictures.is_empty() || !a.zooms.is_empty();
+    let rates = a.bit_rates.is_some() || a.cmre.is_some();
+    [
+        ("results", "Results", true),
+        ("provenance", "Provenance", true),
+        ("skin", "Skin map", true),
+        ("errors", "Errors", true),
+        ("events", "Events", true),
+        ("single", "Single presses", single),
+        ("calibration", "Calibration", true),
+        ("data-reduction", "Data reduction", true),
+        ("detection", "Detection latency", true),
+        ("rates", "Data rates, contact map", rates),
+        ("comparison", "Comparison", true),
+        ("session", "Session", true),
+        ("presses", "Presses", true),
+    ]
+    .into_iter()
+    .filter_map(|(anchor, name, there)| there.then_some((anchor, name)))
+    .collect()
+}
+
+/// The RMSE with failures counted, when there are any.
+fn penalised(a: &Analysis) -> Option<Value> {
+    let p = &a.penalised;
+    (p.failures > 0 && p.rmse_mm.value.is_some()).then(|| {
+        context! {
+            value => number(p.rmse_mm.value, 2), interval => interval(&p.rmse_mm, 1.0, 2), n => p.rmse_mm.n,
+            failures => p.failures, penalty => number(Some(p.penalty_mm), 1),
+        }
+    })
+}
+
+/// Where the least number of cluster events comes from.
+fn threshold_note(a: &Analysis) -> Option<String> {
+    let t = a.threshold.as_ref()?;
+    Some(format!(
+        "A press needs {} cluster events in each camera: chosen on the {} calibrating presses alone, of which it leaves out {}.",
+        t.events, t.n, t.left_out
+    ))
 }
 
 fn safe(text: &str) -> Value {

@@ -1,0 +1,226 @@
+//! Owns the data-reduction figure: error and rates against the thinning factor.
+
+use skinrig_analysis::result::{Estimate, Reduction, ReductionCurve, ReductionRow, Thinning};
+
+use super::legend::{self, Sample, diamond};
+use super::{Canvas, Figure, band, nice_above};
+use crate::ReportInput;
+use crate::axes::{Axes, Scale, tick_label, ticks};
+use crate::format::number;
+use crate::published;
+use crate::svg::{Svg, dots, polyline};
+
+/// What one panel shows.
+struct Panel {
+    name: &'static str,
+    label: String,
+    value: fn(&ReductionRow) -> Estimate,
+    /// From the unit of the value to the one drawn.
+    scale: f64,
+    /// Published values at 1 and 1024, in the unit drawn.
+    published: Option<(f64, f64)>,
+}
+
+/// RMSE, pass rate, within-X rate and located rate against the factor on a log2 axis, both kinds of thinning, with
+/// 95 % bands (the paper's figure "pass rate reduction" is panel B). `None` without the study.
+#[must_use]
+pub fn reduction(input: &ReportInput<'_>) -> Option<Figure> {
+    let study = input.analysis.reduction.as_ref()?;
+    if study.curves.iter().all(|c| c.rows.is_empty()) {
+        return None;
+    }
+    let mut canvas = Canvas::new(
+        input,
+        "reduction",
+        "Data reduction",
+        caption(study),
+        (1240.0, 700.0),
+        &[],
+    );
+    let percent = |name| format!("{name} (%)");
+    let panels = [
+        Panel {
+            name: "A   RMSE of the located presses",
+            label: "RMSE (mm)".into(),
+            value: |r| r.rmse_mm,
+            scale: 1.0,
+            published: Some((published::RMSE_MM, published::RMSE_1024_MM)),
+        },
+        Panel {
+            name: "B   pass rate, threshold fixed at factor 1",
+            label: percent("pass rate"),
+            value: |r| r.pass_rate,
+            scale: 100.0,
+            published: Some((
+                100.0 * published::PASS_RATE.0,
+                100.0 * published::PASS_RATE.1,
+            )),
+        },
+        Panel {
+            name: "C   within the absolute limit",
+            label: percent(&format!("within {} mm", number(Some(study.within_mm), 1))),
+            value: |r| r.within_rate,
+            scale: 100.0,
+            published: None,
+        },
+        Panel {
+            name: "D   located",
+            label: percent("located rate"),
+            value: |r| r.located_rate,
+            scale: 100.0,
+            published: None,
+        },
+    ];
+    for (i, panel) in panels.iter().enumerate() {
+        let left = 66.0 + 620.0 * (i % 2) as f64;
+        let top = if i < 2 { 92.0 } else { 404.0 };
+        draw(&mut canvas.svg, study, panel, (left, top), i < 2);
+    }
+    legend::line(
+        &mut canvas.svg,
+        (66.0, 18.0),
+        &[
+            (Sample::Line("line c1"), "exact count (public code)"),
+            (Sample::Line("line dashed c2"), "Bernoulli (paper's text)"),
+            (Sample::Area("band f1"), "95 % interval over locations"),
+            (Sample::Published, "published, another recording"),
+        ],
+    );
+    let n = format!("n = {} presses, {} seeds", study.presses, study.seeds);
+    Some(canvas.finish(&n, "reduction", ""))
+}
+
+fn caption(study: &Reduction) -> String {
+    format!(
+        "Data reduction: what is left of the localisation when only one event in k is kept. One clustering setting at \
+         all factors (radius {} px, core threshold {} events). Values are means over {} seeds, bands 95 % bootstrap \
+         intervals over locations, {} presses. A press without an estimate fails in B, C and D. The pass threshold is \
+         the 95th percentile of the errors at factor 1 ({} mm), so B begins at 95 % by construction; C asks for an error \
+         of at most {} mm. Small figures above the plots: kB/s of both cameras during a press.",
+        number(Some(study.eps_px), 1),
+        study.min_samples,
+        study.seeds,
+        study.presses,
+        number(study.pass_threshold_mm, 2),
+        number(Some(study.within_mm), 1),
+    )
+}
+
+fn power(row: &ReductionRow) -> f64 {
+    f64::from(row.factor.max(1)).log2()
+}
+
+fn axes(study: &Reduction, panel: &Panel, (left, top): (f64, f64)) -> Axes {
+    let rows = || study.curves.iter().flat_map(|c| &c.rows);
+    let values = rows().flat_map(|r| {
+        let e = (panel.value)(r);
+        [e.value, e.low, e.high]
+    });
+    let drawn: Vec<f64> = values
+        .flatten()
+        .filter(|v| v.is_finite())
+        .map(|v| v * panel.scale)
+        .chain(panel.published.into_iter().flat_map(|(a, b)| [a, b]))
+        .collect();
+    let high = drawn.iter().copied().fold(0.0, f64::max);
+    let low = drawn.iter().copied().fold(f64::INFINITY, f64::min);
+    let y = if panel.scale > 1.0 {
+        // A share: from a round number below the lowest up to 100 %.
+        (((low - 4.0) / 10.0).floor().clamp(0.0, 9.0) * 10.0, 101.0)
+    } else {
+        (0.0, nice_above(high * 1.02))
+    };
+    let last = rows().map(power).fold(0.0, f64::max);
+    Axes {
+        x: Scale::new((-0.35, last + 0.35), (left, left + 540.0)),
+        y: Scale::new(y, (top + 208.0, top)),
+        x_label: "one event kept of k".into(),
+        y_label: panel.label.clone(),
+        tick_count: (0, 5),
+    }
+}
+
+fn draw(svg: &mut Svg, study: &Reduction, panel: &Panel, at: (f64, f64), with_bytes: bool) {
+    let axes = axes(study, panel, at);
+    let (low, high) = (axes.y.data.0, axes.y.data.1.min(100.0));
+    let marks = ticks(
+        low,
+        if panel.scale > 1.0 {
+            high
+        } else {
+            axes.y.data.1
+        },
+        5,
+    );
+    let step = if marks.len() > 1 {
+        marks[1] - marks[0]
+    } else {
+        1.0
+    };
+    let ys: Vec<_> = marks.iter().map(|t| (*t, tick_label(*t, step))).collect();
+    let most = axes.x.data.1.floor() as u32;
+    let every = if most > 14 { 2 } else { 1 };
+    let xs: Vec<_> = (0..=most)
+        .step_by(every)
+        .map(|p| (f64::from(p), (1u64 << p).to_string()))
+        .collect();
+    axes.draw_with(svg, &xs, &ys);
+    let name_y = if with_bytes { at.1 - 36.0 } else { at.1 - 12.0 };
+    svg.text((at.0, name_y), "panel", "start", panel.name);
+    if with_bytes {
+        bytes(svg, study, &axes, at.1);
+    }
+    for curve in &study.curves {
+        let (area, line, dot) = match curve.thinning {
+            Thinning::Exact => ("band f1", "line c1", "dots c1"),
+            Thinning::Bernoulli => ("band f2", "line dashed c2", "dots c2"),
+        };
+        let points = points(curve, panel, &axes);
+        svg.path(area, &band(points.iter().filter_map(|p| Some((p.0, p.2?)))));
+        let middle: Vec<_> = points.iter().filter_map(|p| Some((p.0, p.1?))).collect();
+        svg.path(line, &polyline(middle.iter().copied(), false));
+        svg.path(dot, &dots(middle));
+    }
+    if let Some((one, many)) = panel.published {
+        for (power, value) in [(0.0, one), (10.0, many)] {
+            if power <= axes.x.data.1 {
+                svg.path("published", &diamond((axes.x.at(power), axes.y.at(value))));
+            }
+        }
+    }
+}
+
+/// x, y of the value, y of both ends of the interval.
+type Drawn = (f64, Option<f64>, Option<(f64, f64)>);
+
+fn points(curve: &ReductionCurve, panel: &Panel, axes: &Axes) -> Vec<Drawn> {
+    let y = |v: Option<f64>| {
+        v.filter(|v| v.is_finite())
+            .map(|v| axes.y.at(v * panel.scale))
+    };
+    let drawn = |r: &ReductionRow| {
+        let e = (panel.value)(r);
+        (axes.x.at(power(r)), y(e.value), y(e.low).zip(y(e.high)))
+    };
+    curve.rows.iter().map(drawn).collect()
+}
+
+/// Bytes per second during a press above the plot, as a second scale.
+fn bytes(svg: &mut Svg, study: &Reduction, axes: &Axes, top: f64) {
+    let Some(curve) = study.curves.first() else {
+        return;
+    };
+    for row in curve
+        .rows
+        .iter()
+        .filter(|r| (power(r) as u32).is_multiple_of(2))
+    {
+        let x = axes.x.at(power(row));
+        svg.line("axis", (x, top - 4.0), (x, top));
+        let kilo = row.press_bytes_per_s / 1e3;
+        let digits = if kilo >= 10.0 { 0 } else { 2 };
+        let unit = if row.factor == 1 { " kB/s" } else { "" };
+        let text = format!("{}{unit}", number(Some(kilo), digits));
+        svg.text((x, top - 8.0), "tick", "middle", &text);
+    }
+}

@@ -1,0 +1,96 @@
+//! Owns the figure of the threshold's choice.
+
+use super::{Canvas, Figure, nice_above};
+use crate::ReportInput;
+use crate::axes::{Axes, Scale};
+use crate::format::number;
+use crate::svg::{Px, dots, polyline};
+
+/// Root mean square cost of each candidate for the least number of cluster events, the chosen one marked. `None`
+/// where it was not chosen.
+#[must_use]
+pub fn threshold(input: &ReportInput<'_>) -> Option<Figure> {
+    let choice = input.analysis.threshold.as_ref()?;
+    let rows: Vec<(f64, f64)> = choice
+        .candidates
+        .iter()
+        .filter(|(_, cost)| cost.is_finite())
+        .map(|(events, cost)| (f64::from((*events).max(1)).log10(), *cost))
+        .collect();
+    if rows.is_empty() {
+        return None;
+    }
+    let caption = format!(
+        "Choice of the least number of cluster events, on the {} calibrating presses alone. Cost of a threshold: root \
+         mean square over presses of the error, where a press left out counts {} mm, the error of an answer that knows \
+         nothing. Ring: the threshold chosen, {} events in the weaker camera; it leaves out {} of them.",
+        choice.n,
+        number(Some(choice.penalty_mm), 1),
+        choice.events,
+        choice.left_out,
+    );
+    let mut canvas = Canvas::new(
+        input,
+        "threshold",
+        "Choice of the threshold",
+        caption,
+        (620.0, 480.0),
+        &[],
+    );
+    let span = |pick: fn(f64, f64) -> f64, from: f64| rows.iter().map(|r| r.0).fold(from, pick);
+    let (low, high) = (
+        span(f64::min, f64::INFINITY),
+        span(f64::max, f64::NEG_INFINITY),
+    );
+    let margin = 0.04 * (high - low).max(0.5);
+    let most = rows.iter().map(|r| r.1).fold(0.0, f64::max);
+    let axes = Axes {
+        x: Scale::new((low - margin, high + margin), (66.0, 604.0)),
+        y: Scale::new((0.0, nice_above(most * 1.05)), (412.0, 30.0)),
+        x_label: "least number of cluster events".into(),
+        y_label: "cost on calibrating presses (mm)".into(),
+        tick_count: (0, 6),
+    };
+    let marks: Vec<_> = (0..=9)
+        .flat_map(|p| [1u64, 2, 5].map(|m| m * 10u64.pow(p)))
+        .map(|m| ((m as f64).log10(), m.to_string()))
+        .filter(|(at, _)| (axes.x.data.0..=axes.x.data.1).contains(at))
+        .collect();
+    let step = crate::axes::ticks(axes.y.data.0, axes.y.data.1, 6);
+    let distance = if step.len() > 1 {
+        step[1] - step[0]
+    } else {
+        1.0
+    };
+    let ys: Vec<_> = step
+        .iter()
+        .map(|t| (*t, crate::axes::tick_label(*t, distance)))
+        .collect();
+    let svg = &mut canvas.svg;
+    axes.draw_with(svg, &marks, &ys);
+    let points: Vec<_> = rows
+        .iter()
+        .map(|(x, y)| (axes.x.at(*x), axes.y.at(*y)))
+        .collect();
+    svg.path("line c1", &polyline(points.iter().copied(), false));
+    svg.path("dots c1", &dots(points));
+    let chosen = f64::from(choice.events.max(1)).log10();
+    let nearest = rows
+        .iter()
+        .min_by(|a, b| (a.0 - chosen).abs().total_cmp(&(b.0 - chosen).abs()));
+    if let Some((_, cost)) = nearest {
+        let (x, y) = (axes.x.at(chosen), axes.y.at(*cost));
+        svg.leaf(
+            "circle",
+            &[
+                ("class", &"ring"),
+                ("cx", &Px(x)),
+                ("cy", &Px(y)),
+                ("r", &"8"),
+            ],
+        );
+        let text = format!("{} events", choice.events);
+        svg.text((x, y - 14.0), "note", "middle", &text);
+    }
+    Some(canvas.finish(&format!("n = {} presses", choice.n), "threshold", ""))
+}

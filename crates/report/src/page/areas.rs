@@ -1,0 +1,164 @@
+//! Owns the tables of areas, taxels, contact maps and data rates.
+
+use skinrig_analysis::result::{Analysis, Estimate};
+
+use super::grid::Grid;
+use crate::format::{NONE, interval, number};
+use crate::published;
+
+/// Areas and taxels beside the published ones.
+pub(super) fn coverage(a: &Analysis) -> Option<Grid> {
+    let c = a.coverage.as_ref()?;
+    let mut grid = Grid::new(
+        "coverage",
+        "Areas and taxels",
+        &["Quantity", "#Session", "#95 % interval", "#Published"],
+    );
+    let [skin, seen, probed] = published::AREAS_MM2;
+    let share = |part: f64, whole: f64| {
+        if whole > 0.0 {
+            format!(" ({} %)", number(Some(100.0 * part / whole), 1))
+        } else {
+            String::new()
+        }
+    };
+    let area = |name: &str, value: Option<f64>, of: Option<f64>, theirs: f64, their_share: &str| {
+        let parts = value.zip(of);
+        let share = parts.map_or_else(String::new, |(value, whole)| share(value, whole));
+        [
+            name.to_owned(),
+            format!("{}{share}", number(value, 0)),
+            NONE.to_owned(),
+            format!("{theirs}{their_share}"),
+        ]
+    };
+    grid.row(area("skin (mm²)", Some(c.skin_mm2), None, skin, ""));
+    grid.row(area(
+        "seen by both cameras (mm², share of the skin)",
+        Some(c.seen_by_both_mm2),
+        Some(c.skin_mm2),
+        seen,
+        " (93.9 %)",
+    ));
+    grid.row(area(
+        "probed (mm², share of the seen area)",
+        c.probed_mm2,
+        Some(c.seen_by_both_mm2),
+        probed,
+        " (52.7 %)",
+    ));
+    let taxels = |name: &str, e: &Estimate, theirs: f64| {
+        [
+            name.to_owned(),
+            number(e.value, 1),
+            interval(e, 1.0, 1),
+            theirs.to_string(),
+        ]
+    };
+    grid.row(taxels(
+        "effective taxels, probed area",
+        &c.taxels_probed,
+        published::TAXELS.1,
+    ));
+    grid.row(taxels(
+        "effective taxels, whole skin",
+        &c.taxels_skin,
+        published::TAXELS.0,
+    ));
+    let cell = c.cell_mm.map_or_else(String::new, |mm| {
+        format!(
+            ", one cell of {} mm for each of {} locations",
+            number(Some(mm), 2),
+            c.locations
+        )
+    });
+    grid.note(format!(
+        "Taxels: circles of radius RMSE that fill the area. The RMSE was measured in the probed area only{cell}: the number \
+         for the whole skin supposes that it holds everywhere, which nothing here shows."
+    ));
+    grid.note("The published taxels need a radius of 5.31 mm, not the published RMSE of 4.66 mm.");
+    grid.download("coverage");
+    Some(grid)
+}
+
+/// The contact map reconstruction error with its parameters.
+pub(super) fn cmre(a: &Analysis) -> Option<Grid> {
+    let c = a.cmre.as_ref()?;
+    let mut grid = Grid::new(
+        "cmre",
+        "Contact map error",
+        &["Quantity", "#Session", "#95 % interval", "#n"],
+    );
+    grid.row([
+        "contact map reconstruction error (%)".to_owned(),
+        number(c.percent.value, 2),
+        interval(&c.percent, 1.0, 2),
+        c.percent.n.to_string(),
+    ]);
+    grid.row([
+        "RMSE, share of the skin's diagonal (%)".to_owned(),
+        number(a.scored.rmse_diagonal_percent, 2),
+        NONE.to_owned(),
+        a.scored.rmse_mm.n.to_string(),
+    ]);
+    grid.note(format!(
+        "Parameters: {} x {} cells of {} mm, Gaussian of {} mm, region of {} mm. None of them is published, so this number \
+         cannot be compared with the published 3.75 %; that one equals the share of the diagonal that an RMSE of 5.30 mm is.",
+        c.cells.0,
+        c.cells.1,
+        number(Some(c.settings.cell_mm), 1),
+        number(Some(c.settings.sigma_mm), 1),
+        number(Some(c.settings.region_mm), 0),
+    ));
+    if c.without_score > 0 {
+        grid.note(format!(
+            "{} presses lie outside the map and have no score.",
+            c.without_score
+        ));
+    }
+    grid.download("cmre");
+    Some(grid)
+}
+
+/// Data rates during presses and while idle.
+pub(super) fn bit_rates(a: &Analysis) -> Option<Grid> {
+    let r = a.bit_rates.as_ref()?;
+    let mut grid = Grid::new(
+        "bit-rates",
+        "Data rates",
+        &[
+            "Both cameras together",
+            "#Session",
+            "#95 % interval",
+            "#n",
+            "#Published",
+        ],
+    );
+    let row = |name: &str, e: &Estimate, scale: f64, digits: usize, theirs: &str| {
+        [
+            name.to_owned(),
+            number(e.value.map(|v| v * scale), digits),
+            interval(e, scale, digits),
+            e.n.to_string(),
+            theirs.to_owned(),
+        ]
+    };
+    grid.row(row("press (kev/s)", &r.press_events_per_s, 1e-3, 2, "28.6"));
+    grid.row(row("idle (kev/s)", &r.idle_events_per_s, 1e-3, 2, "9.1"));
+    grid.row(row("press (kB/s)", &r.press_bytes_per_s, 1e-3, 2, "~75"));
+    grid.row(row("idle (kB/s)", &r.idle_bytes_per_s, 1e-3, 2, "~24"));
+    grid.row([
+        "press, contact to release (s)".to_owned(),
+        number(r.press_s, 2),
+        NONE.to_owned(),
+        NONE.to_owned(),
+        "0.55".to_owned(),
+    ]);
+    grid.note(format!(
+        "Events in the rows of the crop; bytes at {} bits per event. The published event rates follow from the published \
+         bytes at 21 bits.",
+        number(Some(r.bits_per_event), 0)
+    ));
+    grid.download("bit_rates");
+    Some(grid)
+}

@@ -1,0 +1,37 @@
+//! Owns the audit's findings on the page.
+
+use minijinja::{Value, context};
+use skinrig_analysis::result::Finding;
+
+use crate::format::words;
+
+/// The law that is broken, in a sentence's words.
+pub(crate) fn law(finding: &Finding) -> &'static str {
+    use skinrig_analysis::result::Law;
+    match finding.law {
+        Law::BurstWithMotion => "events burst while the tip moves in the skin",
+        Law::CentroidFollowsPosition => "the centroid follows the position of the press",
+        Law::RepetitionsAgree => "repetitions at one place agree",
+        Law::AsCommanded => "depth, speed and position are as commanded",
+        Law::ClockDrift => "a camera's clock drifts no more than a crystal",
+        Law::Complete => "the data of such a session are there",
+    }
+}
+
+/// The likely fault and the camera concerned.
+pub(crate) fn fault(finding: &Finding) -> String {
+    let fault = words(&finding.fault);
+    match finding.camera {
+        Some(camera) => format!("{fault}, camera {}", camera.number()),
+        None => fault,
+    }
+}
+
+pub(super) fn values(findings: &[Finding]) -> Vec<Value> {
+    findings
+        .iter()
+        .map(|f| {
+            context! { law => law(f), fault => fault(f), evidence => f.evidence.clone(), advice => f.advice.clone() }
+        })
+        .collect()
+}

@@ -1,0 +1,77 @@
+//! Owns the small tables of the page's sections: what the template's `grid` macro writes.
+
+use serde::Serialize;
+
+/// A table.
+#[derive(Debug, Clone, Serialize)]
+pub(super) struct Grid {
+    /// Test id, and stem of the downloaded file.
+    id: &'static str,
+    title: &'static str,
+    columns: Vec<Column>,
+    rows: Vec<Row>,
+    notes: Vec<String>,
+    /// Name of the table in the script data that is downloaded.
+    table: Option<&'static str>,
+}
+
+#[derive(Debug, Clone, Serialize)]
+struct Column {
+    name: String,
+    number: bool,
+}
+
+#[derive(Debug, Clone, Serialize)]
+struct Row {
+    cells: Vec<String>,
+    /// True for the row that stands out: chosen, or the session's own.
+    marked: bool,
+}
+
+impl Grid {
+    /// An empty table. A name that begins with `#` is a column of numbers.
+    pub(super) fn new(id: &'static str, title: &'static str, columns: &[&str]) -> Self {
+        let column = |name: &&str| Column {
+            name: name.trim_start_matches('#').to_owned(),
+            number: name.starts_with('#'),
+        };
+        Self {
+            id,
+            title,
+            columns: columns.iter().map(column).collect(),
+            rows: vec![],
+            notes: vec![],
+            table: None,
+        }
+    }
+
+    /// Adds a row; its first cell heads it.
+    pub(super) fn row(&mut self, cells: impl IntoIterator<Item = String>) -> &mut Self {
+        self.marked_row(cells, false)
+    }
+
+    /// Adds a row that stands out when `marked`.
+    pub(super) fn marked_row(
+        &mut self,
+        cells: impl IntoIterator<Item = String>,
+        marked: bool,
+    ) -> &mut Self {
+        self.rows.push(Row {
+            cells: cells.into_iter().collect(),
+            marked,
+        });
+        self
+    }
+
+    /// Adds a remark below.
+    pub(super) fn note(&mut self, text: impl Into<String>) -> &mut Self {
+        self.notes.push(text.into());
+        self
+    }
+
+    /// Offers this table of the script data for download.
+    pub(super) const fn download(&mut self, table: &'static str) -> &mut Self {
+        self.table = Some(table);
+        self
+    }
+}

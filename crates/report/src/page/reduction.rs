@@ -1,0 +1,83 @@
+//! Owns the table of the data-reduction study.
+
+use skinrig_analysis::result::{Analysis, Estimate, Thinning};
+
+use super::grid::Grid;
+use crate::format::{grouped, interval, number};
+
+/// A kind of thinning for people.
+pub(crate) const fn thinning(kind: Thinning) -> &'static str {
+    match kind {
+        Thinning::Exact => "exact count",
+        Thinning::Bernoulli => "Bernoulli",
+    }
+}
+
+/// One row per kind and factor.
+pub(super) fn reduction(a: &Analysis) -> Option<Grid> {
+    let study = a.reduction.as_ref()?;
+    let within = format!("#within {} mm (%)", number(Some(study.within_mm), 1));
+    let mut grid = Grid::new(
+        "reduction-table",
+        "Data reduction, row by row",
+        &[
+            "Thinning",
+            "#k",
+            "#events per press and camera",
+            "#RMSE (mm)",
+            "#of single seeds (mm)",
+            "#pass (%)",
+            &within,
+            "#located (%)",
+            "#press (kB/s)",
+            "#idle (kB/s)",
+        ],
+    );
+    let with = |e: &Estimate, scale: f64, digits| {
+        format!(
+            "{} {}",
+            number(e.value.map(|v| v * scale), digits),
+            interval(e, scale, digits)
+        )
+    };
+    for curve in &study.curves {
+        for row in &curve.rows {
+            let kilo = |bytes: Option<f64>| {
+                let digits = if bytes.is_some_and(|b| b >= 1e4) {
+                    1
+                } else {
+                    3
+                };
+                number(bytes.map(|b| b / 1e3), digits)
+            };
+            let seeds = row.rmse_of_seeds_mm.map_or_else(
+                || "–".to_owned(),
+                |(low, high)| format!("{} to {}", number(Some(low), 2), number(Some(high), 2)),
+            );
+            grid.marked_row(
+                [
+                    thinning(curve.thinning).to_owned(),
+                    grouped(u64::from(row.factor)),
+                    number(
+                        Some(row.events_per_view),
+                        if row.events_per_view < 100.0 { 1 } else { 0 },
+                    ),
+                    with(&row.rmse_mm, 1.0, 2),
+                    seeds,
+                    with(&row.pass_rate, 100.0, 1),
+                    with(&row.within_rate, 100.0, 1),
+                    with(&row.located_rate, 100.0, 1),
+                    kilo(Some(row.press_bytes_per_s)),
+                    kilo(row.idle_bytes_per_s),
+                ],
+                row.factor == crate::comparison::FACTOR,
+            );
+        }
+    }
+    grid.note(format!(
+        "n = {} presses, means over {} seeds, intervals over locations. Marked: the published factor.",
+        study.presses, study.seeds
+    ));
+    grid.download("reduction");
+    Some(grid)
+}

@@ -1,0 +1,402 @@
+//! Owns the published numbers that a session is compared with, each with its source.
+//!
+//! "The paper" is Koolani et al., "An Event-Based Opto-Tactile Skin" (Frontiers); table and figure names are
+//! its own. Numbers only: what a cell says in words is said here in our own. Where published numbers
+//! contradict each other, both stand here and a [`Footnote`] says so.
+
+use serde::Serialize;
+
+/// Localisation RMSE without reduction, mm (section 3.1).
+pub const RMSE_MM: f64 = 4.66;
+/// The same along x, mm (section 3.1).
+pub const RMSE_X_MM: f64 = 4.17;
+/// The same along y, mm (section 3.1).
+pub const RMSE_Y_MM: f64 = 3.28;
+/// Mean standard deviation between repetitions, mm (section 3.1).
+pub const REPEAT_STD_MM: f64 = 2.85;
+/// RMSE at 1024-fold reduction, mm (abstract).
+pub const RMSE_1024_MM: f64 = 9.33;
+/// Pass rate without reduction (section 3.1), and at 1024-fold reduction (abstract).
+pub const PASS_RATE: (f64, f64) = (0.95, 0.85);
+/// Area of the skin, area seen by both cameras, probed area, mm² (section 3.1).
+pub const AREAS_MM2: [f64; 3] = [9328.0, 8763.0, 4620.0];
+/// Effective taxels over the sensor and over the probed area, without reduction (table "MSOWS").
+pub const TAXELS: (f64, f64) = (105.0, 46.0);
+/// Width of the 5-95 % interval of the onsets, ms: without reduction, and at 1024-fold reduction (section 3.2).
+pub const LATENCY_WIDTH_MS: (f64, f64) = (31.0, 113.0);
+/// False alarms per second at that (section 3.2).
+pub const FALSE_ALARMS_PER_S: (f64, f64) = (0.13, 1.86);
+/// Share of trials detected at that: the target without reduction, what was reached at 1024 (section 3.2).
+pub const DETECTED_RATE: (f64, f64) = (0.95, 0.88);
+
+/// A remark below a comparison.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Footnote {
+    /// Its mark.
+    pub mark: &'static str,
+    /// The remark.
+    pub text: &'static str,
+}
+
+/// What the published numbers do not agree on, and what is known of the reason.
+pub const FOOTNOTES: [Footnote; 7] = [
+    Footnote {
+        mark: "a",
+        text: "The published RMSE along x and y (4.17, 3.28 mm) add up to 5.31 mm in quadrature, not to 4.66 mm.",
+    },
+    Footnote {
+        mark: "b",
+        text: "3.75 % of the skin's diagonal (141.4 mm) is 5.30 mm; 4.66 mm is 3.30 %. The published contact map \
+               error has the same value, 3.75 %; its parameters are not published.",
+    },
+    Footnote {
+        mark: "c",
+        text: "105 and 46 taxels need a radius of 5.31 mm; 4.66 mm gives 136.7 over the skin and 67.7 over 4620 mm².",
+    },
+    Footnote {
+        mark: "d",
+        text: "75 kB/s divided by 1024 is 0.073 kB/s, not about 1 kB/s.",
+    },
+    Footnote {
+        mark: "e",
+        text: "The address of a 640 x 480 pixel and its polarity take 20 bits; the 21st is not explained.",
+    },
+    Footnote {
+        mark: "f",
+        text: "The pass threshold is the 95th percentile of the errors at factor 1, so the rate at factor 1 is 95 % \
+               by construction.",
+    },
+    Footnote {
+        mark: "g",
+        text: "Width of the 5-95 % interval of the onsets, not a delay after contact: the published recording has no \
+               measured contact.",
+    },
+];
+
+/// One row of the published comparison with the multitouch soft optical waveguide skin (table "MSOWS").
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct MsowsRow {
+    /// Which quantity.
+    pub metric: Metric,
+    /// Lo Preti et al. 2022, as given in the paper.
+    pub msows: &'static str,
+    /// The paper without reduction.
+    pub paper: &'static str,
+    /// The paper at 1024-fold reduction.
+    pub paper_1024: &'static str,
+    /// Marks of the footnotes.
+    pub notes: &'static str,
+}
+
+/// A quantity of the comparison.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Metric {
+    /// Kind of sensor.
+    Sensor,
+    /// Number of view points.
+    ViewPoints,
+    /// Where the data are processed.
+    Processing,
+    /// Samples or events per press.
+    Samples,
+    /// Bits per sample or event.
+    Bits,
+    /// Length of a press.
+    PressDuration,
+    /// Data rate during a press.
+    PressRate,
+    /// Data rate while idle.
+    IdleRate,
+    /// Width of the 5-95 % interval of the detections.
+    LatencyWidth,
+    /// Median delay after the measured contact.
+    LatencyFromContact,
+    /// Global error.
+    GlobalError,
+    /// RMSE as a share of the diagonal.
+    DiagonalError,
+    /// Localisation RMSE.
+    Rmse,
+    /// Presses that pass.
+    PassRate,
+    /// Effective taxels over the sensor.
+    TaxelsSkin,
+    /// Effective taxels over the probed area.
+    TaxelsProbed,
+}
+
+impl Metric {
+    /// Its name with unit.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Sensor => "sensor",
+            Self::ViewPoints => "view points",
+            Self::Processing => "processing",
+            Self::Samples => "samples per press",
+            Self::Bits => "bits per sample",
+            Self::PressDuration => "press duration (s)",
+            Self::PressRate => "data rate, press (kB/s)",
+            Self::IdleRate => "data rate, idle (kB/s)",
+            Self::LatencyWidth => "detection, width of 5-95 % (ms)",
+            Self::LatencyFromContact => "detection, median after contact (ms)",
+            Self::GlobalError => "contact map error (%)",
+            Self::DiagonalError => "RMSE, share of the diagonal (%)",
+            Self::Rmse => "localisation RMSE (mm)",
+            Self::PassRate => "pass rate (%)",
+            Self::TaxelsSkin => "effective taxels, sensor",
+            Self::TaxelsProbed => "effective taxels, probed area",
+        }
+    }
+}
+
+const fn row(
+    metric: Metric,
+    msows: &'static str,
+    paper: &'static str,
+    paper_1024: &'static str,
+    notes: &'static str,
+) -> MsowsRow {
+    MsowsRow {
+        metric,
+        msows,
+        paper,
+        paper_1024,
+        notes,
+    }
+}
+
+/// Table "MSOWS" of the paper; `–` where it has no value. The pass rates are those of its abstract and section 3.
+pub const MSOWS: [MsowsRow; 16] = [
+    row(
+        Metric::Sensor,
+        "24 emitters, 24 receivers",
+        "2 event cameras",
+        "2 event cameras",
+        "",
+    ),
+    row(Metric::ViewPoints, "24", "2", "2", ""),
+    row(
+        Metric::Processing,
+        "FPGA board",
+        "on events",
+        "on events",
+        "",
+    ),
+    row(
+        Metric::Samples,
+        "168 per receiver",
+        "event stream",
+        "event stream",
+        "",
+    ),
+    row(Metric::Bits, "12", "21", "21", "e"),
+    row(Metric::PressDuration, "0.144", "0.55", "0.55", ""),
+    row(Metric::PressRate, "~145", "~75", "~1", "d"),
+    row(Metric::IdleRate, "~145", "~24", "~0.02", ""),
+    row(Metric::LatencyWidth, "–", "31", "113", "g"),
+    row(Metric::LatencyFromContact, "–", "–", "–", ""),
+    row(Metric::GlobalError, "1.8", "3.75", "~6.4", "b"),
+    row(Metric::DiagonalError, "–", "3.75", "–", "b"),
+    row(Metric::Rmse, "–", "4.66", "9.33", "a"),
+    row(Metric::PassRate, "–", "95", "85", "f"),
+    row(Metric::TaxelsSkin, "–", "105", "34", "c"),
+    row(Metric::TaxelsProbed, "–", "46", "15", "c"),
+];
+
+/// A skin that localises touch, as the paper's table of tactile localisation technologies gives it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Skin {
+    /// What it is.
+    pub name: &'static str,
+    /// Author and year of its source.
+    pub source: &'static str,
+    /// Which touches it locates.
+    pub touches: &'static str,
+    /// Material.
+    pub material: &'static str,
+    /// Accuracy or resolution.
+    pub accuracy: &'static str,
+    /// Method.
+    pub method: &'static str,
+}
+
+/// The paper's table of tactile localisation technologies.
+pub const SKINS: [Skin; 7] = [
+    Skin {
+        name: "impedance tomography sheet",
+        source: "Chen et al. 2025",
+        touches: "several, while bent",
+        material: "conductive hydrogel, elastomer",
+        accuracy: "5.4 mm error",
+        method: "tomography, learned",
+    },
+    Skin {
+        name: "hydrogel tomography skin",
+        source: "Hardman et al. 2023",
+        touches: "several",
+        material: "self-healing hydrogel",
+        accuracy: "12.1 mm",
+        method: "tomography, learned",
+    },
+    Skin {
+        name: "stretchable capacitive array",
+        source: "Sarwar et al. 2017",
+        touches: "several, while stretched or bent",
+        material: "elastomer, stretchable electrodes",
+        accuracy: "10 mm resolution",
+        method: "capacitive grid",
+    },
+    Skin {
+        name: "magnetic skin",
+        source: "Hu et al. 2024",
+        touches: "several",
+        material: "magnetised elastomer, Hall sensors",
+        accuracy: "1.2 mm error over 48 400 mm²",
+        method: "convolutional network",
+    },
+    Skin {
+        name: "graphene Hall array",
+        source: "Li et al. 2025",
+        touches: "single, 6 x 6 virtual",
+        material: "graphene Hall elements, magnetised layer",
+        accuracy: "1.3 mm mean error",
+        method: "periodic magnetisation",
+    },
+    Skin {
+        name: "flexible tomography skin",
+        source: "Chen et al. 2025b",
+        touches: "several, while bent",
+        material: "magnetic hydrogel, silicone",
+        accuracy: "4.8 ± 2.8 mm error",
+        method: "convolutional network",
+    },
+    Skin {
+        name: "SonicBoom",
+        source: "Lee et al. 2025",
+        touches: "single",
+        material: "microphones",
+        accuracy: "4.3 to 22.2 mm error",
+        method: "acoustic triangulation, learned",
+    },
+];
+
+/// A tactile sensor of the paper's overview table.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Sensor {
+    /// What it is.
+    pub name: &'static str,
+    /// Author and year of its source.
+    pub source: &'static str,
+    /// What senses.
+    pub hardware: &'static str,
+    /// What is measured.
+    pub measures: &'static str,
+    /// Method.
+    pub method: &'static str,
+    /// How well.
+    pub result: &'static str,
+}
+
+const fn sensor(
+    name: &'static str,
+    source: &'static str,
+    hardware: &'static str,
+    measures: &'static str,
+    method: &'static str,
+    result: &'static str,
+) -> Sensor {
+    Sensor {
+        name,
+        source,
+        hardware,
+        measures,
+        method,
+        result,
+    }
+}
+
+/// The paper's overview table of optical tactile sensors.
+pub const SENSORS: [Sensor; 10] = [
+    sensor(
+        "Force-EvT",
+        "Guo et al. 2024",
+        "event camera",
+        "force",
+        "transformer",
+        "RMSE 0.13 N, R² 0.3, error 1.5 %",
+    ),
+    sensor(
+        "vision-based",
+        "Naeini et al. 2020",
+        "event camera",
+        "contact force",
+        "time-delay network",
+        "RMSE 0.16 to 0.17 N",
+    ),
+    sensor(
+        "bio-inspired",
+        "Faris et al. 2024",
+        "event camera",
+        "slip, pressure",
+        "spike processing",
+        "5 %, response 2 ms",
+    ),
+    sensor(
+        "Evetac",
+        "Funk et al. 2024",
+        "event camera",
+        "vibration, shear",
+        "learned",
+        "up to 48 Hz",
+    ),
+    sensor(
+        "E-BTS",
+        "Mukashev et al. 2025",
+        "event camera",
+        "force",
+        "learned",
+        "RMSE ~1 N, latency < 5 ms",
+    ),
+    sensor(
+        "NeuroTac",
+        "Ward-Cherrier et al. 2020",
+        "event camera",
+        "texture, slip",
+        "spiking network",
+        "~95 % on Braille",
+    ),
+    sensor(
+        "multi-camera",
+        "Trueeb et al. 2020",
+        "4 RGB cameras",
+        "force distribution",
+        "convolutional network",
+        "RMSE 0.057 N (z), 40 Hz",
+    ),
+    sensor(
+        "DIGIT",
+        "Lambeta et al. 2020",
+        "RGB camera",
+        "shape, force",
+        "autoencoder",
+        "640 x 480 px at 60 Hz",
+    ),
+    sensor(
+        "retrographic",
+        "Johnson and Adelson 2009",
+        "RGB camera",
+        "texture, shape",
+        "photometric stereo",
+        "2.5D capture",
+    ),
+    sensor(
+        "MSOWS",
+        "Lo Preti et al. 2022",
+        "LEDs, photoreceivers",
+        "location",
+        "sequential scan",
+        "5 mm resolution, error 2.6 %",
+    ),
+];

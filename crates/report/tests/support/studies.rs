@@ -1,0 +1,333 @@
+//! Made-up studies for the tests of the report, shaped like the real ones. None of their numbers was measured.
+
+use skinrig_analysis::result::*;
+use skinrig_model::*;
+
+use super::Noise;
+
+/// A value with an interval `spread` to either side.
+pub fn estimate(value: f64, spread: f64, n: u32) -> Estimate {
+    Estimate {
+        value: Some(value),
+        low: Some(value - spread),
+        high: Some(value + spread),
+        n,
+    }
+}
+
+/// Two curves over 2^0 ..= 2^12.
+pub fn reduction() -> Reduction {
+    let curve = |thinning, loss: f64| ReductionCurve {
+        thinning,
+        rows: (0..=12)
+            .map(|power| {
+                let x = f64::from(power);
+                let rmse = 2.5 + 0.004 * x.powf(3.1);
+                let share = |v: f64, spread: f64| {
+                    let e = estimate(v, spread, 300);
+                    Estimate {
+                        high: e.high.map(|h| h.min(1.0)),
+                        ..e
+                    }
+                };
+                let kept = 0.5f64.powi(power);
+                ReductionRow {
+                    factor: 1 << power,
+                    events_per_view: 11_600.0 * kept,
+                    rmse_mm: estimate(rmse, 0.1 + 0.02 * x, 300),
+                    rmse_of_seeds_mm: Some((rmse - 0.05 * x, rmse + 0.06 * x)),
+                    pass_rate: share(0.95 - loss * (x / 12.0).powi(5), 0.02),
+                    within_rate: share(0.93 - 1.3 * loss * (x / 12.0).powi(4), 0.025),
+                    located_rate: share(0.99 - 0.4 * loss * (x / 12.0).powi(7), 0.008),
+                    press_bytes_per_s: 75_000.0 * kept,
+                    idle_bytes_per_s: Some(24_000.0 * kept),
+                }
+            })
+            .collect(),
+    };
+    Reduction {
+        eps_px: 10.0,
+        min_samples: 10,
+        seeds: 10,
+        presses: 300,
+        pass_threshold_mm: Some(4.76),
+        within_mm: 5.0,
+        curves: vec![
+            curve(Thinning::Exact, 0.35),
+            curve(Thinning::Bernoulli, 0.5),
+        ],
+    }
+}
+
+/// A detector whose onsets follow the contact by 9 to 40 ms.
+pub fn latency(noise: &mut Noise, presses: &[PressResult]) -> Latency {
+    let onsets: Vec<(PressId, Option<f64>)> = presses
+        .iter()
+        .filter(|p| p.role == PressRole::Score && p.timing.is_some())
+        .take(300)
+        .map(|p| {
+            let onset = 18.0 + 5.0 * noise.normal() + 12.0 * noise.uniform().powi(3);
+            let onset = match p.press.0 % 97 {
+                5 => None,
+                6 => Some(-41.0),
+                _ => Some(onset),
+            };
+            (p.press, onset)
+        })
+        .collect();
+    let sweep: Vec<ThresholdRow> = (0..20)
+        .map(|i| {
+            let h = 1.0 + f64::from(i);
+            ThresholdRow {
+                threshold: h,
+                onsets: 299,
+                detected_rate: 1.0 - 0.0001 * h.powf(2.2),
+                median_ms: Some(12.0 + 0.4 * h),
+                width_ms: Some(26.0 + 0.25 * h),
+                false_alarms_per_s: if i < 15 {
+                    38.0 * (-0.62 * h).exp()
+                } else {
+                    0.0
+                },
+            }
+        })
+        .collect();
+    let bump = |t: f64, at: f64, width: f64| (-((t - at) / width).powi(2)).exp();
+    let course = |gain: f64, noise: &mut Noise| {
+        (0..850)
+            .map(|i| {
+                let t = -700.0 + 2.0 * f64::from(i);
+                let rate = 21_000.0 + 4e5 * bump(t, 130.0, 70.0) + 2.6e5 * bump(t, 640.0, 90.0);
+                (gain * rate * (0.93 + 0.14 * noise.uniform())) as f32
+            })
+            .collect()
+    };
+    Latency {
+        settings: LatencySettings::default(),
+        trials: 300,
+        unusable: 2,
+        shortened: 1,
+        covered_ms: (700.0, 850.0),
+        zero_padded: false,
+        decision_delay_ms: 1.4,
+        background_s: 241.7,
+        background_rate_per_s: 20_900.0,
+        chosen: Some(15),
+        detected_rate: estimate(0.983, 0.012, 300),
+        width_ms: estimate(28.6, 2.1, 295),
+        median_ms: estimate(19.4, 0.8, 295),
+        false_alarms_per_s: estimate(0.08, 0.05, 300),
+        from_contact: Some(ContactLatency {
+            p5_ms: estimate(10.2, 0.9, 295),
+            median_ms: estimate(19.5, 0.7, 295),
+            p95_ms: estimate(33.1, 1.9, 295),
+            before_contact: 3,
+            missed: 4,
+            uncertainty_ms: 0.31,
+            from_bins_ms: 0.058,
+            from_clocks_ms: 0.012,
+            from_contact_ms: 0.289,
+        }),
+        reduced: Some(ReducedLatency {
+            factor: 1024,
+            thresholds: (3.0, 8.0, 6),
+            target_rate: 0.85,
+            threshold: Some(3.0),
+            detected_rate: estimate(0.89, 0.03, 300),
+            width_ms: estimate(102.0, 9.0, 267),
+            false_alarms_per_s: estimate(1.7, 0.3, 300),
+        }),
+        course: LatencyCourse {
+            start_ms: -700.0,
+            bin_ms: 2.0,
+            press_per_s: [course(0.55, noise), course(1.0, noise), course(1.6, noise)],
+            background_per_s: [14_000.0, 20_900.0, 31_000.0],
+        },
+        sweep,
+        onsets,
+    }
+}
+
+/// The four nested models and the ten-parameter one, the second smallest chosen.
+pub fn models() -> Vec<ModelComparison> {
+    let rows = [
+        (CalibrationModel::None, 0, 5.87, 5.87),
+        (CalibrationModel::Positions, 4, 3.61, 3.48),
+        (CalibrationModel::PositionsSkews, 6, 3.47, 3.33),
+        (CalibrationModel::Full, 8, 3.45, 3.31),
+        (CalibrationModel::FullScale, 10, 3.52, 3.3),
+    ];
+    rows.map(|(model, parameters, validated, fitted)| ModelComparison {
+        model,
+        parameters,
+        rmse_mm: estimate(validated, 0.2, 256),
+        standard_error_mm: Some(0.1),
+        fitted_rmse_mm: Some(fitted),
+        chosen: model == CalibrationModel::Full,
+    })
+    .to_vec()
+}
+
+/// Correlations that fall with the distance of two parameters; the last one is not determined.
+pub fn correlation(parameters: usize) -> Vec<Vec<Option<f64>>> {
+    let last = parameters - 1;
+    let at = |i: usize, k: usize| {
+        (i != last && k != last).then(|| {
+            let sign = if (i + k).is_multiple_of(3) && i != k {
+                -1.0
+            } else {
+                1.0
+            };
+            sign * 0.8f64.powi(i.abs_diff(k) as i32)
+        })
+    };
+    (0..parameters)
+        .map(|i| (0..parameters).map(|k| at(i, k)).collect())
+        .collect()
+}
+
+/// A cost that is flat, dips, and rises.
+pub fn threshold() -> ThresholdChoice {
+    let cost = |events: u32| {
+        let x = f64::from(events).ln();
+        2.9 + 0.35 * (x - 4.2).powi(2)
+    };
+    ThresholdChoice {
+        events: 67,
+        penalty_mm: 28.3,
+        n: 256,
+        left_out: 3,
+        candidates: [20, 31, 45, 67, 90, 140, 260, 410, 900, 1900, 3200]
+            .map(|e| (e, cost(e)))
+            .to_vec(),
+    }
+}
+
+/// The published skin and the areas of its fields of view as drawn by hand.
+pub fn coverage(cell_mm: f64, locations: u32) -> Coverage {
+    let polygon =
+        |points: &[(f64, f64)]| vec![points.iter().map(|p| Point2::new(p.0, p.1)).collect()];
+    Coverage {
+        skin_mm2: 9331.75,
+        seen_by_both_mm2: 8760.1,
+        probed_mm2: Some(f64::from(locations) * cell_mm * cell_mm),
+        cell_mm: Some(cell_mm),
+        locations,
+        views: [
+            polygon(&[
+                (44.0, -32.0),
+                (60.0, 10.0),
+                (60.0, 32.0),
+                (40.0, 52.0),
+                (-15.0, 52.0),
+                (-40.0, 27.0),
+                (-40.0, -28.0),
+            ]),
+            polygon(&[
+                (49.7, 39.8),
+                (-40.0, 30.0),
+                (-40.0, -23.0),
+                (-15.0, -48.0),
+                (40.0, -48.0),
+                (58.0, -30.0),
+            ]),
+        ],
+        overlap: polygon(&[
+            (44.0, -32.0),
+            (57.5, 4.0),
+            (49.7, 39.8),
+            (-40.0, 27.0),
+            (-40.0, -28.0),
+        ]),
+        taxels_skin: estimate(483.0, 60.0, 2271),
+        taxels_probed: estimate(332.0, 40.0, 2271),
+    }
+}
+
+/// The parameters are those of the settings.
+pub fn cmre() -> Cmre {
+    Cmre {
+        settings: CmreSettings::default(),
+        cells: (20, 20),
+        percent: estimate(31.4, 2.2, 2271),
+        without_score: 2,
+    }
+}
+
+/// About the published rates.
+pub fn bit_rates() -> BitRates {
+    BitRates {
+        bits_per_event: 21.0,
+        press_events_per_s: estimate(28_570.0, 600.0, 2294),
+        idle_events_per_s: estimate(9_140.0, 90.0, 2294),
+        press_bytes_per_s: estimate(74_996.0, 1_575.0, 2294),
+        idle_bytes_per_s: estimate(23_992.0, 236.0, 2294),
+        press_s: Some(1.2),
+    }
+}
+
+/// A bright band about row 270 under a faint rim, with a few hot pixels.
+pub fn activity(noise: &mut Noise, camera: CameraId) -> Activity {
+    let (width, height) = (320u16, 240u16);
+    let mut counts = vec![0; usize::from(width) * usize::from(height)];
+    for (i, count) in counts.iter_mut().enumerate() {
+        let (u, v) = ((i % 320) as f64, (i / 320) as f64);
+        let band = 4e4 * (-((v - 135.0) / 22.0).powi(2)).exp() * (0.4 + (u / 40.0).sin().abs());
+        let rim = (u - 160.0).hypot(1.2 * (v - 120.0));
+        let seen = if rim < 165.0 { band + 30.0 } else { 0.4 };
+        *count = (seen * (0.5 + noise.uniform())) as u64;
+        if noise.uniform() < 0.0002 {
+            *count = 900_000;
+        }
+    }
+    Activity {
+        camera,
+        cell_px: 2,
+        width,
+        height,
+        counts,
+    }
+}
+
+/// The published way of judging.
+pub fn reference() -> ReferenceCode {
+    ReferenceCode {
+        presses: 256,
+        with_centroids: 251,
+        inside: 244,
+        rmse_mm: Some(3.02),
+        rmse_x_mm: Some(2.31),
+        rmse_y_mm: Some(1.94),
+        std_of_errors_mm: Some(1.71),
+        reduction: (0..=10)
+            .map(|power| ReferenceReduction {
+                factor: 1 << power,
+                rmse_mm: Some(3.1 + 0.05 * f64::from(power).powi(2)),
+                pass_rate: 0.948 - 0.006 * f64::from(power),
+                honest_pass_rate: 0.940 - 0.009 * f64::from(power),
+            })
+            .collect(),
+    }
+}
+
+/// Two broken laws.
+pub fn findings() -> Vec<Finding> {
+    vec![
+        Finding {
+            law: Law::CentroidFollowsPosition,
+            fault: Fault::CamerasSwapped,
+            camera: None,
+            evidence: "expected the centroid's column to follow the viewing angle in rank (at least 0.8), found -0.91 \
+                and -0.88 (n = 2512 and 2497); exchanged they follow with 0.97 and 0.96"
+                .into(),
+            advice: "check which camera wrote which file, and import again with the files exchanged".into(),
+        },
+        Finding {
+            law: Law::ClockDrift,
+            fault: Fault::ClockWrong,
+            camera: Some(CameraId::Two),
+            evidence: "expected a drift within 100 ppm, found 312.4 ± 0.2 ppm (n = 2500)".into(),
+            advice: "check the alignment of camera 2 before any time of it is used".into(),
+        },
+    ]
+}
