@@ -47,7 +47,7 @@ pub fn bit_rates(analysis: &Analysis) -> Option<BitRates> {
 }
 
 /// Events per second of both cameras in the idle time before a press; `None` when one of them has none.
-pub(crate) fn idle_rate_per_s(views: &[PressView; 2]) -> Option<f64> {
+fn idle_rate_per_s(views: &[PressView; 2]) -> Option<f64> {
     let known = views.iter().all(|v| v.idle_s > 0.0);
     known.then(|| views.iter().map(|v| v.idle_rate_per_s).sum())
 }

@@ -216,6 +216,26 @@ pub fn location_rule(outcome: &LocationOutcome, settings: &AnalysisSettings) -> 
     }
 }
 
+/// True for the rules of [`from_data`] and [`location_rule`] that exclude a press for what the cameras saw of it;
+/// false for what the journal or a hand left out.
+#[must_use]
+pub fn is_rule_on_data(rule: &str) -> bool {
+    const RULES: [&str; 8] = [
+        "no cluster (",
+        "too few cluster events (",
+        "no response (",
+        "no view",
+        "parallel rays",
+        "nearly parallel rays",
+        "behind camera",
+        "outside the skin outline",
+    ];
+    RULES.iter().any(|known| match known.strip_suffix('(') {
+        Some(_) => rule.starts_with(known),
+        None => rule == *known,
+    })
+}
+
 /// Writes a verdict into a row.
 pub fn put(row: &mut PressResult, judgement: Judgement) {
     row.verdict = judgement.verdict.name().to_owned();

@@ -1,0 +1,241 @@
+//! Random thinning of one camera's view of a press, and the centroid of what is left.
+//!
+//! The clustering sees how many events fell on each pixel and nothing of their times, and thinning treats all events
+//! of a view alike; so a random choice among events is a random choice among the entries of the pixel list, whatever
+//! their order. One random order of that list serves all factors: its first m entries are a uniform choice of m
+//! events. For the exact count m = max(1, n / k). For independent events m is binomial: Bernoulli thinning with
+//! probability 1 / k is a Binomial(n, 1 / k) count of uniformly chosen events. Binomial counts of successive powers of two
+//! are drawn by halving, Binomial(m, 1 / 2) of the m left, which is the number of ones in m random bits.
+//!
+//! The events left at a factor are thus among those left at all smaller ones, and both kinds share their order: rows of a
+//! curve and the two curves differ by what was taken away and not by chance as well. Each row alone is
+//! distributed exactly as if drawn alone.
+
+use rand_xoshiro::Xoshiro256PlusPlus;
+use rand_xoshiro::rand_core::Rng;
+use skinrig_model::CentroidRule;
+
+use crate::dbscan::Dbscan;
+use crate::estimators::Sighting;
+use crate::grid::PixelGrid;
+use crate::kept::KeptEvent;
+use crate::result::Thinning;
+use crate::seeded;
+
+/// What is left of a view at one factor.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct Left {
+    /// Events.
+    pub events: u32,
+    /// Column of their centroid, px; `None` without a cluster.
+    pub column: Option<f64>,
+}
+
+/// Thins one view after another in one camera.
+pub(super) struct Thinner {
+    grid: PixelGrid,
+    dbscan: Dbscan,
+    min_samples: u32,
+    centroid: CentroidRule,
+    /// (column, row) of each event of the view, in an order that each seed shuffles again.
+    pixels: Vec<(u16, u16)>,
+    /// (events, index in the result) of the present seed.
+    steps: Vec<(u32, usize)>,
+}
+
+impl Thinner {
+    pub fn new(crop: (u16, u16), eps_px: f64, min_samples: u32, centroid: CentroidRule) -> Self {
+        Self {
+            grid: PixelGrid::new(crop),
+            dbscan: Dbscan::new(eps_px, min_samples),
+            min_samples,
+            centroid,
+            pixels: Vec::new(),
+            steps: Vec::new(),
+        }
+    }
+
+    /// Takes the events of a view, of which there are less than 2^32, and says what they are without thinning.
+    pub fn load(&mut self, events: &[KeptEvent]) -> Left {
+        self.pixels.clear();
+        self.pixels.extend(events.iter().map(|e| (e.x(), e.y())));
+        let n = self.count();
+        self.grow(n);
+        let full = self.left();
+        self.grid.clear();
+        full
+    }
+
+    /// Thins the view by 2, 4 .. 2^`max_power` in each of `kinds`; all factors of the first kind come first. Takes its
+    /// random numbers from `rng` alone and depends on earlier calls only since the last [`Self::load`].
+    pub fn thin(
+        &mut self,
+        rng: &mut Xoshiro256PlusPlus,
+        kinds: &[Thinning],
+        max_power: u32,
+        out: &mut Vec<Left>,
+    ) {
+        let n = self.count();
+        self.steps.clear();
+        for kind in kinds {
+            let mut left = n;
+            for power in 1..=max_power {
+                left = match kind {
+                    Thinning::Exact => (n >> power).max(n.min(1)),
+                    Thinning::Bernoulli => heads(rng, left),
+                };
+                self.steps.push((left, self.steps.len()));
+            }
+        }
+        self.steps.sort_unstable();
+        self.shuffle(rng, self.steps.last().map_or(0, |s| s.0));
+        out.clear();
+        out.resize(self.steps.len(), Left::default());
+        let mut last = Left::default();
+        for i in 0..self.steps.len() {
+            let (events, at) = self.steps[i];
+            if events != last.events {
+                self.grow(events);
+                last = self.left();
+            }
+            out[at] = last;
+        }
+        self.grid.clear();
+    }
+
+    /// Events of the view.
+    fn count(&self) -> u32 {
+        u32::try_from(self.pixels.len()).unwrap_or(u32::MAX)
+    }
+
+    /// Puts a uniform choice of `count` events in uniform order at the front (Fisher and Yates, as far as needed).
+    fn shuffle(&mut self, rng: &mut Xoshiro256PlusPlus, count: u32) {
+        for i in 0..count as usize {
+            let other = i + seeded::index(rng, self.pixels.len() - i);
+            self.pixels.swap(i, other);
+        }
+    }
+
+    /// Fills the grid up to the first `count` events.
+    fn grow(&mut self, count: u32) {
+        for &(u, v) in &self.pixels[self.grid.events() as usize..count as usize] {
+            self.grid.add(u, v);
+        }
+    }
+
+    /// The centroid of what is on the grid.
+    fn left(&mut self) -> Left {
+        let events = self.grid.events();
+        let column = if events < self.min_samples {
+            None // nobody can have that many neighbours
+        } else {
+            self.dbscan.run(&self.grid);
+            Sighting::of_clusters(&self.dbscan, self.centroid, 1).column
+        };
+        Left { events, column }
+    }
+}
+
+/// Heads among `tosses` of a fair coin.
+fn heads(rng: &mut Xoshiro256PlusPlus, tosses: u32) -> u32 {
+    let whole: u32 = (0..tosses / 64).map(|_| rng.next_u64().count_ones()).sum();
+    match tosses % 64 {
+        0 => whole,
+        rest => whole + (rng.next_u64() >> (64 - rest)).count_ones(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use skinrig_model::{CdEvent, Polarity};
+
+    const CROP: (u16, u16) = (185, 360);
+
+    fn events(pixels: &[(u16, u16)]) -> Vec<KeptEvent> {
+        let event = |(t_us, &(x, y)): (u64, &(u16, u16))| CdEvent {
+            t_us,
+            x,
+            y,
+            polarity: Polarity::On,
+        };
+        let packed = (0..).zip(pixels).map(event);
+        packed.map(|e| KeptEvent::pack(&e, 0).unwrap()).collect()
+    }
+
+    proptest! {
+        /// Against clustering each choice of events afresh.
+        #[test]
+        fn every_step_is_the_clustering_of_what_is_left(
+            pixels in prop::collection::vec((300u16..340, 250u16..270), 0..300), min_samples in 1u32..12, seed in 0u64..1000,
+        ) {
+            const POWERS: u32 = 9;
+            let rule = CentroidRule::LargestCluster;
+            let mut thinner = Thinner::new(CROP, 3.0, min_samples, rule);
+            let fresh = |chosen: &[(u16, u16)]| {
+                let mut grid = PixelGrid::new(CROP);
+                chosen.iter().for_each(|(u, v)| assert!(grid.add(*u, *v)));
+                let mut dbscan = Dbscan::new(3.0, min_samples);
+                dbscan.run(&grid);
+                let column = dbscan.largest().and_then(|(_, c)| c.centroid()).map(|c| c.0);
+                Left { events: chosen.len() as u32, column }
+            };
+            prop_assert_eq!(thinner.load(&events(&pixels)), fresh(&pixels));
+            let mut rng = seeded::generator(seed, 0);
+            let mut out = Vec::new();
+            for _ in 0..2 {
+                thinner.thin(&mut rng, &[Thinning::Exact, Thinning::Bernoulli], POWERS, &mut out);
+                let mut shuffled = thinner.pixels.clone();
+                for (left, power) in out.iter().zip((1..=POWERS).cycle()) {
+                    prop_assert_eq!(*left, fresh(&shuffled[..left.events as usize]), "power {}", power);
+                }
+                for (left, power) in out[..POWERS as usize].iter().zip(1..) {
+                    let n = pixels.len() as u32;
+                    prop_assert_eq!(left.events, if n == 0 { 0 } else { (n / 2u32.pow(power)).max(1) });
+                }
+                prop_assert!(out[POWERS as usize..].is_sorted_by(|a, b| a.events >= b.events));
+                // Nothing is lost or made.
+                let mut before = pixels.clone();
+                before.sort_unstable();
+                shuffled.sort_unstable();
+                prop_assert_eq!(before, shuffled);
+            }
+        }
+    }
+
+    #[test]
+    fn every_event_is_as_likely_and_counts_are_binomial() {
+        // 40 events on as many pixels, far from each other: the grid tells which are left.
+        let pixels: Vec<(u16, u16)> = (0..40).map(|i| (15 * i, 200)).collect();
+        let mut thinner = Thinner::new(CROP, 1.0, 1, CentroidRule::AllClusters);
+        thinner.load(&events(&pixels));
+        let (mut rng, mut out) = (seeded::generator(5, 0), Vec::new());
+        const RUNS: u32 = 20_000;
+        const KINDS: [Thinning; 2] = [Thinning::Exact, Thinning::Bernoulli];
+        let mut chosen = [[0u32; 40]; 2];
+        let (mut sum, mut squares) = (0.0, 0.0);
+        for _ in 0..RUNS {
+            thinner.thin(&mut rng, &KINDS, 2, &mut out);
+            for (counts, left) in chosen.iter_mut().zip([out[1], out[3]]) {
+                for (u, _) in &thinner.pixels[..left.events as usize] {
+                    counts[usize::from(u / 15)] += 1;
+                }
+            }
+            let left = f64::from(out[3].events);
+            sum += left;
+            squares += left * left;
+        }
+        // A quarter of the events: each 5000 times, standard deviation 61.
+        for counts in chosen {
+            assert!(
+                counts.iter().all(|c| c.abs_diff(RUNS / 4) < 5 * 62),
+                "{counts:?}"
+            );
+        }
+        let mean = sum / f64::from(RUNS);
+        let variance = squares / f64::from(RUNS) - mean * mean;
+        assert!((mean - 10.0).abs() < 0.1, "{mean}");
+        assert!((variance - 40.0 * 0.25 * 0.75).abs() < 0.4, "{variance}");
+    }
+}

@@ -1,0 +1,160 @@
+//! The thinned presses: each press, seed and factor located anew.
+
+use rayon::prelude::*;
+use skinrig_model::{AnalysisSettings, CentroidRule, Point2, PressId, SkinOutline, StereoGeometry};
+
+use super::thinning::{Left, Thinner};
+use crate::kept::{KeptPress, KeptView};
+use crate::result::{LocationOutcome, PressResult, Thinning};
+use crate::seeded;
+use crate::triangulate::locate;
+
+/// Streams of random numbers that no other part of an analysis uses.
+const STREAMS: u64 = 1 << 63;
+
+/// A press to be thinned.
+pub(crate) struct Attempt<'a> {
+    press: PressId,
+    location: u32,
+    truth: Point2,
+    views: &'a [KeptView; 2],
+}
+
+impl<'a> Attempt<'a> {
+    /// A kept press with its row of the table; `None` without a measured position.
+    pub fn new(row: &PressResult, kept: &'a KeptPress) -> Option<Self> {
+        Some(Self {
+            press: row.press,
+            location: row.location,
+            truth: row.truth?,
+            views: &kept.views,
+        })
+    }
+
+    /// Events per second of both cameras in the idle time before the press; `None` when one of them has none.
+    pub(super) fn idle_events_per_s(&self) -> Option<f64> {
+        let rate = |view: &KeptView| {
+            let (from, to) = (view.idle_from_us, view.window_us.0);
+            let idle_s = f64::from(to.saturating_sub(from)) * 1e-6;
+            (idle_s > 0.0).then(|| view.between(from, to).len() as f64 / idle_s)
+        };
+        let [one, two] = self.views;
+        Some(rate(one)? + rate(two)?)
+    }
+}
+
+/// One located or lost press.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct Trial {
+    /// Length of the error vector, mm; `None` when the press is not located.
+    pub error_mm: Option<f64>,
+    /// Events left in both cameras.
+    pub events: u32,
+    /// The same per second of the press window.
+    pub events_per_s: f64,
+}
+
+/// What became of one press.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Outcome {
+    pub location: u32,
+    /// With all of its events.
+    pub full: Trial,
+    /// By seed, kind and power of two from 1 on, in this order.
+    thinned: Vec<Trial>,
+    kinds: usize,
+    max_power: usize,
+}
+
+impl Outcome {
+    /// The press thinned by 2^`power` with this seed.
+    pub fn trial(&self, seed: usize, kind: usize, power: usize) -> &Trial {
+        match power {
+            0 => &self.full,
+            _ => &self.thinned[(seed * self.kinds + kind) * self.max_power + power - 1],
+        }
+    }
+}
+
+/// How presses are thinned, clustered and located.
+pub(crate) struct Trials<'a> {
+    pub geometry: &'a StereoGeometry,
+    pub outline: &'a SkinOutline,
+    /// Crop, radius, seeds and factors.
+    pub settings: &'a AnalysisSettings,
+    /// DBSCAN core threshold at all factors.
+    pub min_samples: u32,
+    pub centroid: CentroidRule,
+    pub kinds: &'a [Thinning],
+}
+
+impl Trials<'_> {
+    /// Thins and locates every press; `accept` says where it counts as located. In the order of `attempts` and to the
+    /// last bit the same for any number of threads: each press, seed and camera has random numbers of its own.
+    pub fn run(
+        &self,
+        attempts: &[Attempt<'_>],
+        accept: impl Fn(&LocationOutcome) -> Option<Point2> + Sync,
+    ) -> Vec<Outcome> {
+        let thinners = || {
+            self.settings.crop_v.map(|crop| {
+                Thinner::new(crop, self.settings.eps_px, self.min_samples, self.centroid)
+            })
+        };
+        attempts
+            .par_iter()
+            .map_init(thinners, |thinners, attempt| {
+                self.press(thinners, attempt, &accept)
+            })
+            .collect()
+    }
+
+    fn press(
+        &self,
+        thinners: &mut [Thinner; 2],
+        attempt: &Attempt<'_>,
+        accept: &impl Fn(&LocationOutcome) -> Option<Point2>,
+    ) -> Outcome {
+        let reduction = &self.settings.reduction;
+        let windows_s = [0, 1].map(|k| {
+            let (start, end) = attempt.views[k].window_us;
+            f64::from(end.saturating_sub(start)) * 1e-6
+        });
+        let trial = |left: [Left; 2]| {
+            let columns = left.map(|l| l.column);
+            let estimate = accept(&locate(self.geometry, self.outline, columns));
+            let truth = attempt.truth;
+            let per_s = |k: usize| match windows_s[k] {
+                s if s > 0.0 => f64::from(left[k].events) / s,
+                _ => 0.0,
+            };
+            Trial {
+                error_mm: estimate
+                    .map(|at| libm::hypot(at.x_mm - truth.x_mm, at.y_mm - truth.y_mm)),
+                events: left[0].events.saturating_add(left[1].events),
+                events_per_s: per_s(0) + per_s(1),
+            }
+        };
+        let full = [0, 1].map(|k| thinners[k].load(attempt.views[k].press_events()));
+        let full = trial(full);
+        let mut thinned = Vec::new();
+        let mut left = [Vec::new(), Vec::new()];
+        for seed in 0..reduction.seeds {
+            for (k, left) in left.iter_mut().enumerate() {
+                let stream =
+                    STREAMS | u64::from(seed) << 33 | u64::from(attempt.press.0) << 1 | k as u64;
+                let mut rng = seeded::generator(self.settings.seed, stream);
+                thinners[k].thin(&mut rng, self.kinds, reduction.max_power, left);
+            }
+            let [one, two] = &left;
+            thinned.extend(one.iter().zip(two).map(|(one, two)| trial([*one, *two])));
+        }
+        Outcome {
+            location: attempt.location,
+            full,
+            thinned,
+            kinds: self.kinds.len(),
+            max_power: reduction.max_power as usize,
+        }
+    }
+}
