@@ -1,5 +1,7 @@
 //! The data reduction and the data rates of a planted session.
 
+#![expect(clippy::unwrap_used, reason = "tests")]
+
 #[path = "session/support.rs"]
 mod support;
 
