@@ -32,6 +32,7 @@ pub mod metrics;
 mod pixels;
 pub mod rates;
 pub mod reduction;
+pub mod reference_code;
 pub mod result;
 mod seeded;
 pub mod segment;

@@ -5,6 +5,7 @@
 #[path = "session/support.rs"]
 mod support;
 
+use skinrig_analysis::reference_code::reference_code;
 use skinrig_analysis::result::{Analysis, Estimate, ReductionRow, Thinning};
 use skinrig_analysis::{Keep, SessionInput, analyze, analyze_and_keep, reduction};
 use skinrig_model::PressRole;
@@ -196,4 +197,39 @@ fn data_rates_are_means_over_the_presses_that_count() {
     ));
     assert_eq!((press.n, idle.n), (25, 25));
     assert!((rates.press_s.unwrap() - 0.45).abs() < 1e-9);
+}
+
+#[test]
+fn the_published_way_judges_the_first_repetition_and_counts_nothing_as_missing() {
+    let (mut input, source) = small();
+    input.settings.centroid = skinrig_model::CentroidRule::AllClusters;
+    let (a, kept) = analyze_and_keep(&input, &source, Keep::All).unwrap();
+    let r = reference_code(&a, &kept);
+    assert_eq!((r.presses, r.with_centroids, r.inside), (25, 25, 25));
+    let first = a.presses.iter().filter(|p| p.role == PressRole::Calibrate);
+    let errors: Vec<(f64, f64)> = first.map(|p| p.error_mm().unwrap()).collect();
+    let mean = |of: &dyn Fn(&(f64, f64)) -> f64| errors.iter().map(of).sum::<f64>() / 25.0;
+    let (xx, yy) = (mean(&|e| e.0 * e.0), mean(&|e| e.1 * e.1));
+    assert!(near(r.rmse_x_mm.unwrap(), xx.sqrt()) && near(r.rmse_y_mm.unwrap(), yy.sqrt()));
+    assert!(near(r.rmse_mm.unwrap(), (xx + yy).sqrt()));
+    // E[d²] = mean² + population variance.
+    let length = mean(&|e| libm::hypot(e.0, e.1));
+    let spread = r.std_of_errors_mm.unwrap();
+    assert!((spread * spread + length * length - xx - yy).abs() < 1e-9);
+    assert!(
+        r.reduction
+            .iter()
+            .zip(0..=8)
+            .all(|(row, power)| row.factor == 1 << power)
+    );
+    for row in &r.reduction {
+        // One event makes a centroid: two of them always point somewhere, if only outside the square.
+        assert!(row.rmse_mm.is_some_and(f64::is_finite));
+        assert!(row.honest_pass_rate <= row.pass_rate);
+    }
+    // 23 of 25 lie below their own 95th percentile.
+    assert!(near(r.reduction[0].pass_rate, 23.0 / 25.0));
+    // Kept for the scored repetition alone there is nothing to thin.
+    let (_, scored) = analyze_and_keep(&input, &source, Keep::Scored).unwrap();
+    assert_eq!(reference_code(&a, &scored).reduction, []);
 }

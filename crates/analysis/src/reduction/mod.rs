@@ -21,7 +21,7 @@ use crate::metrics::quantile;
 use crate::result::{Analysis, Reduction, ReductionCurve, Thinning};
 use crate::verdict;
 
-pub(crate) use trials::{Attempt, Trials};
+pub(crate) use trials::{Attempt, Outcome, Trials};
 
 /// Thins the kept scored presses and locates them again; `None` when there are none.
 #[must_use]

@@ -1,0 +1,193 @@
+//! The public code's way of judging, computed without its wrong roots.
+//!
+//! It judges the presses that it was calibrated on (the first repetition, whatever their role here), drops estimates outside
+//! the enclosing square without counting them, and gives the spread of the error lengths as population standard
+//! deviation (numpy's default). Its data reduction keeps max(1, n / k) events of each press, clusters with a core threshold of
+//! one event, so that the centroid is the mean of all events left, drops no estimate, and lets a press without an
+//! estimate count with the largest error found at that factor, which can be a pass. The last is given beside the honest
+//! rate. Estimates are exact intersections: rays that meet behind a camera have none here.
+
+use skinrig_model::{CentroidRule, PressRole};
+
+use crate::kept::Kept;
+use crate::metrics::{mean, quantile, root_mean_square};
+use crate::reduction::{Attempt, Outcome, Trials};
+use crate::result::{
+    Analysis, LocationOutcome, PressResult, ReferenceCode, ReferenceReduction, Thinning,
+};
+
+/// Core threshold of the published data reduction, events.
+const MIN_SAMPLES: u32 = 1;
+/// What a press without an estimate errs by where no press has one, mm.
+const ERROR_OF_NOTHING_MM: f64 = 1.0;
+
+/// The published numbers of an analysed session. `kept` holds the presses of the first repetition, calibrating ones too;
+/// without them there is no data reduction.
+#[must_use]
+pub fn reference_code(analysis: &Analysis, kept: &Kept) -> ReferenceCode {
+    let presses: Vec<&PressResult> = analysis.presses.iter().filter(|p| is_used(p)).collect();
+    let with_centroids = presses.iter().filter(|p| {
+        let seen = |k: usize| p.views[k].is_some_and(|v| v.centroid_u.is_some());
+        seen(0) && seen(1)
+    });
+    let inside = presses.iter().filter_map(|p| {
+        let in_square = analysis.rig.outline.box_contains(p.estimate()?);
+        p.error_mm().filter(|_| in_square)
+    });
+    let (mut x, mut y): (Vec<f64>, Vec<f64>) = inside.unzip();
+    let mut lengths: Vec<f64> = x.iter().zip(&y).map(|(x, y)| libm::hypot(*x, *y)).collect();
+    ReferenceCode {
+        presses: presses.len() as u32,
+        with_centroids: with_centroids.count() as u32,
+        inside: lengths.len() as u32,
+        std_of_errors_mm: population_std(&lengths),
+        rmse_mm: root_mean_square(&mut lengths),
+        rmse_x_mm: root_mean_square(&mut x),
+        rmse_y_mm: root_mean_square(&mut y),
+        reduction: reduction(analysis, kept),
+    }
+}
+
+/// Share of the presses that pass as the public code counts: an error strictly below the threshold, a press without an
+/// error having the largest error there is (1 mm where there is none). 0 without presses.
+#[must_use]
+pub fn published_pass_rate(errors_mm: &[Option<f64>], threshold_mm: f64) -> f64 {
+    let filled = filled(errors_mm);
+    share(
+        filled.iter().filter(|e| **e < threshold_mm).count(),
+        filled.len(),
+    )
+}
+
+/// The same with presses without an error failing.
+#[must_use]
+pub fn honest_pass_rate(errors_mm: &[Option<f64>], threshold_mm: f64) -> f64 {
+    let passed = errors_mm.iter().flatten().filter(|e| **e < threshold_mm);
+    share(passed.count(), errors_mm.len())
+}
+
+/// Presses of the first repetition with a measured position.
+fn is_used(press: &PressResult) -> bool {
+    press.repetition == 0 && press.role != PressRole::Sync && press.truth.is_some()
+}
+
+fn reduction(analysis: &Analysis, kept: &Kept) -> Vec<ReferenceReduction> {
+    let attempts: Vec<Attempt<'_>> = kept
+        .presses
+        .iter()
+        .filter_map(|k| {
+            let row = analysis.presses.get(k.row).filter(|p| is_used(p))?;
+            Attempt::new(row, k)
+        })
+        .collect();
+    if attempts.is_empty() {
+        return Vec::new();
+    }
+    let settings = &analysis.settings;
+    let trials = Trials {
+        geometry: &analysis.geometry,
+        outline: &analysis.rig.outline,
+        settings,
+        min_samples: MIN_SAMPLES,
+        centroid: CentroidRule::AllClusters,
+        kinds: &[Thinning::Exact],
+    };
+    let outcomes = trials.run(&attempts, LocationOutcome::estimate);
+    let mut at_factor_1 = filled(&errors(&outcomes, 0, 0));
+    let threshold_mm = quantile(&mut at_factor_1, 0.95).unwrap_or(0.0);
+    let row = |power: u32| {
+        let seeds = 0..settings.reduction.seeds as usize;
+        let of_seeds: Vec<Vec<Option<f64>>> = seeds
+            .map(|seed| errors(&outcomes, seed, power as usize))
+            .collect();
+        let rmse = |errors: &Vec<Option<f64>>| {
+            let mut found: Vec<f64> = errors.iter().flatten().copied().collect();
+            root_mean_square(&mut found)
+        };
+        let rate = |of: fn(&[Option<f64>], f64) -> f64| {
+            let sum: f64 = of_seeds.iter().map(|e| of(e, threshold_mm)).sum();
+            sum / of_seeds.len() as f64
+        };
+        let mut rmses: Vec<f64> = of_seeds.iter().filter_map(rmse).collect();
+        ReferenceReduction {
+            factor: 1 << power,
+            rmse_mm: mean(&mut rmses),
+            pass_rate: rate(published_pass_rate),
+            honest_pass_rate: rate(honest_pass_rate),
+        }
+    };
+    (0..=settings.reduction.max_power).map(row).collect()
+}
+
+fn errors(outcomes: &[Outcome], seed: usize, power: usize) -> Vec<Option<f64>> {
+    let trials = outcomes.iter().map(|o| o.trial(seed, 0, power));
+    trials.map(|t| t.error_mm).collect()
+}
+
+/// The errors with the largest of them in the place of those that are missing.
+fn filled(errors_mm: &[Option<f64>]) -> Vec<f64> {
+    let largest = errors_mm.iter().flatten().copied().fold(0.0, f64::max);
+    let largest = if largest > 0.0 {
+        largest
+    } else {
+        ERROR_OF_NOTHING_MM
+    };
+    errors_mm.iter().map(|e| e.unwrap_or(largest)).collect()
+}
+
+fn population_std(values: &[f64]) -> Option<f64> {
+    let n = values.len() as f64;
+    let centre = mean(&mut values.to_vec())?;
+    let squares: f64 = values.iter().map(|v| (v - centre).powi(2)).sum();
+    Some((squares / n).sqrt())
+}
+
+fn share(part: usize, whole: usize) -> f64 {
+    if whole == 0 {
+        0.0
+    } else {
+        part as f64 / whole as f64
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 250 different errors from 0.02 mm up, in another order than their size.
+    fn errors() -> Vec<Option<f64>> {
+        (0..250)
+            .map(|i| Some(0.02 * f64::from(1 + i * 77 % 250)))
+            .collect()
+    }
+
+    #[test]
+    fn a_press_that_is_not_found_passes_as_published_and_fails_here() {
+        let threshold = quantile(&mut filled(&errors()), 0.95).unwrap();
+        let rates = |e: &[Option<f64>]| {
+            (
+                published_pass_rate(e, threshold),
+                honest_pass_rate(e, threshold),
+            )
+        };
+        // 237 of 250 whatever the errors: the threshold is made of them.
+        assert_eq!(rates(&errors()), (0.948, 0.948));
+        assert_eq!(rates(&[None; 250]), (1.0, 0.0));
+        let mut one = vec![None; 250];
+        one[7] = Some(0.5);
+        assert_eq!(rates(&one), (1.0, 0.004));
+        // The worst one found fails, and so do those that take its error.
+        let half = errors().into_iter().enumerate();
+        let half: Vec<_> = half.map(|(i, e)| e.filter(|_| i < 125)).collect();
+        assert!(half.iter().flatten().any(|e| *e >= threshold));
+        let (published, honest) = rates(&half);
+        assert!(published == honest && honest < 0.5);
+        assert_eq!(rates(&[]), (0.0, 0.0));
+    }
+
+    #[test]
+    fn the_spread_is_that_of_a_population() {
+        assert_eq!(population_std(&[1.0, 3.0]), Some(1.0));
+        assert_eq!(population_std(&[]), None);
+    }
+}
