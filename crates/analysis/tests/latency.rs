@@ -419,7 +419,7 @@ fn the_threshold_has_the_fewest_false_alarms_among_those_that_detect_enough() {
             threshold: i as f64,
             onsets: 0,
             detected_rate,
-            median_ms: None,
+            median_ms: Some(20.0),
             width_ms: None,
             false_alarms_per_s,
         };
@@ -433,13 +433,30 @@ fn the_threshold_has_the_fewest_false_alarms_among_those_that_detect_enough() {
         (0.95, 1.0),
         (0.9, 0.5),
     ]);
-    assert_eq!(choose(&all, 0.95), Some(2));
-    assert_eq!(choose(&all, 0.99), Some(2));
-    assert_eq!(choose(&all, 0.9), Some(4));
-    assert_eq!(choose(&rows(&[(0.5, 3.0), (0.5, 2.0)]), 0.95), Some(1));
-    assert_eq!(choose(&rows(&[(0.0, 3.0), (0.0, 2.0)]), 0.95), None);
-    assert_eq!(choose(&rows(&[(0.0, 3.0)]), 0.0), None);
-    assert_eq!(choose(&[], 0.95), None);
+    assert_eq!(choose(&all, 0.95, -100.0), Some(2));
+    assert_eq!(choose(&all, 0.99, -100.0), Some(2));
+    assert_eq!(choose(&all, 0.9, -100.0), Some(4));
+    assert_eq!(
+        choose(&rows(&[(0.5, 3.0), (0.5, 2.0)]), 0.95, -100.0),
+        Some(1)
+    );
+    assert_eq!(choose(&rows(&[(0.0, 3.0), (0.0, 2.0)]), 0.95, -100.0), None);
+    assert_eq!(choose(&rows(&[(0.0, 3.0)]), 0.0, -100.0), None);
+    assert_eq!(choose(&[], 0.95, -100.0), None);
+    // Onsets that agree well, on the background 0.8 s before the contact.
+    let mut early = all.clone();
+    early.extend(rows(&[(0.0, 0.0); 5]));
+    early.extend(rows(&[(0.0, 0.0); 5]).into_iter().map(|r| ThresholdRow {
+        median_ms: None,
+        ..r
+    }));
+    early.push(ThresholdRow {
+        median_ms: Some(-800.0),
+        detected_rate: 1.0,
+        ..all[1]
+    });
+    assert_eq!(choose(&early, 0.95, -100.0), Some(2));
+    assert_eq!(choose(&early, 0.95, -1000.0), Some(15));
     // Trials in which nothing is found: a share of 0, no width, no choice.
     let detector = detector();
     let silent = vec![look(&detector, 0, &[0; 100], &[1; 100]); 3];
@@ -449,7 +466,7 @@ fn the_threshold_has_the_fewest_false_alarms_among_those_that_detect_enough() {
             .iter()
             .all(|r| r.detected_rate == 0.0 && r.width_ms.is_none())
     );
-    assert_eq!((found.len(), choose(&found, 0.95)), (20, None));
+    assert_eq!((found.len(), choose(&found, 0.95, -100.0)), (20, None));
     assert_eq!(sweep(&[], &detector, 100.0), []);
     assert_eq!(thresholds((17.0, 19.0), 3), [17.0, 18.0, 19.0]);
     assert_eq!(thresholds((5.0, 9.0), 1), [5.0]);

@@ -180,7 +180,9 @@ impl Found {
     fn new(analysis: &Analysis, detector: &Detector, target_rate: f64, trials: &[Trial]) -> Self {
         let settings = &analysis.settings;
         let rows = sweep::sweep(trials, detector, settings.latency.window_ms);
-        let chosen = sweep::choose(&rows, target_rate);
+        // As far from the contact as an onset may be from the median, so that a schedule may be a little off.
+        let earliest_ms = -settings.latency.window_ms;
+        let chosen = sweep::choose(&rows, target_rate, earliest_ms);
         let cool_down = chosen.map_or(0, |i| sweep::cool_down(rows[i].width_ms, detector.bin_ms));
         let outcome = |t: &Trial| Outcome {
             location: t.label.location,

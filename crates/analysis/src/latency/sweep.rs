@@ -84,13 +84,19 @@ pub fn sweep(trials: &[Trial], detector: &Detector, window_ms: f64) -> Vec<Thres
 
 /// The row with the fewest false alarms among those that detect at least `target_rate`; when none does, among those
 /// that detect most. The lowest threshold of equals; `None` when nothing counts at any.
+///
+/// A row whose median onset is earlier than `earliest_ms` cannot be chosen: at a low threshold every trial trips over
+/// its background soon after its start, and those onsets agree well with their own median.
 #[must_use]
-pub fn choose(rows: &[ThresholdRow], target_rate: f64) -> Option<usize> {
-    let best = rows.iter().map(|r| r.detected_rate).fold(0.0, f64::max);
-    let wanted = target_rate.min(best);
-    let candidates = rows.iter().enumerate();
-    candidates
-        .filter(|(_, r)| r.detected_rate >= wanted && r.detected_rate > 0.0)
+pub fn choose(rows: &[ThresholdRow], target_rate: f64, earliest_ms: f64) -> Option<usize> {
+    let touches = |r: &ThresholdRow| {
+        r.detected_rate > 0.0 && r.median_ms.is_some_and(|median| median >= earliest_ms)
+    };
+    let candidates = || rows.iter().enumerate().filter(|(_, r)| touches(r));
+    let best = candidates().map(|(_, r)| r.detected_rate);
+    let wanted = target_rate.min(best.fold(0.0, f64::max));
+    candidates()
+        .filter(|(_, r)| r.detected_rate >= wanted)
         .min_by(|(_, a), (_, b)| a.false_alarms_per_s.total_cmp(&b.false_alarms_per_s))
         .map(|(i, _)| i)
 }

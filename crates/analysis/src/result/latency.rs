@@ -47,7 +47,8 @@ pub struct Latency {
     pub background_rate_per_s: f64,
     /// One row per threshold tried, ascending; empty without trials.
     pub sweep: Vec<ThresholdRow>,
-    /// Index of the threshold chosen in `sweep`; `None` when nothing was detected at any.
+    /// Index of the threshold chosen in `sweep`; `None` when nothing was detected at any. A threshold whose median onset
+    /// is more than the window before the contact detects the background and is never chosen.
     pub chosen: Option<u32>,
     /// Share of trials detected within the window of the median onset, at the chosen threshold.
     pub detected_rate: Estimate,
