@@ -3,7 +3,8 @@
 //! The angle grows with the column in any lens, and skew only adds to it: the rank correlation of the two needs no
 //! calibration, only roughly known camera positions, and no calibration can absorb what it shows. If another reading
 //! of the session (cameras exchanged, an axis mirrored, presses shifted) orders the columns clearly better, that is
-//! the likely fault.
+//! the likely fault. Where ranks cannot tell readings apart (few places, or all on a line), the viewing angles
+//! themselves decide, as far as the nominal geometry is good to some degrees.
 
 use std::collections::BTreeSet;
 use std::fmt;
@@ -23,6 +24,13 @@ const MOST_SHIFT: i32 = 5;
 const CLEARLY: f64 = 4.0;
 /// And order the columns of each camera at least this well: a poor nominal geometry fits nothing.
 const LEAST_FIT: f64 = 0.85;
+/// Viewing angles off by more than this in the median, in both cameras, are no error of a drawn geometry, degrees:
+/// the paper's guess of the positions is up to 6 mm off, its skews 2 degrees.
+const FAR_DEG: f64 = 10.0;
+/// A reading explains them when it leaves less than this in the median, in both cameras, degrees,
+const NEAR_DEG: f64 = 5.0;
+/// and less than this share of what the session as it is leaves.
+const NEAR_SHARE: f64 = 1.0 / 3.0;
 /// Below this correlation a camera does not follow, when nothing explains it.
 const NOT_FOLLOWING: f64 = 0.5;
 /// Columns of a fixed pixel scatter less than this in the median, px.
@@ -92,6 +100,8 @@ struct Judged {
     score: f64,
     /// Mean Fisher z over the cameras, to choose among readings.
     strength: f64,
+    /// Median difference of the viewing angles per camera, degrees.
+    off_deg: [Option<f64>; 2],
 }
 
 pub fn findings(analysis: &Analysis, touches: &[Touch<'_>]) -> Vec<Finding> {
@@ -112,18 +122,84 @@ pub fn findings(analysis: &Analysis, touches: &[Touch<'_>]) -> Vec<Finding> {
     if let Some(finding) = on_a_fixed_pixel(fixed) {
         return vec![finding];
     }
-    let judged = Reading::alternatives(&analysis.rig.outline)
-        .into_iter()
-        .filter_map(|reading| judge(nominal, &path, places.len(), reading))
-        .filter(|j| j.score > CLEARLY && j.fit.iter().flatten().all(|r| *r > LEAST_FIT));
-    if let Some(best) = judged.max_by(|a, b| a.strength.total_cmp(&b.strength)) {
-        return vec![named(&best, places.len())];
+    let readings = Reading::alternatives(&analysis.rig.outline);
+    let judged: Vec<Judged> = readings
+        .iter()
+        .filter_map(|reading| judge(nominal, &path, places.len(), *reading))
+        .collect();
+    let clear: Vec<&Judged> = judged
+        .iter()
+        .filter(|j| j.score > CLEARLY && j.fit.iter().flatten().all(|r| *r > LEAST_FIT))
+        .collect();
+    if let Some(best) = likeliest(&clear, places.len()) {
+        return vec![by_rank(best, places.len())];
+    }
+    if let Some(finding) = by_angle(&judged, nominal, &path) {
+        return vec![finding];
     }
     let lost = |camera| not_following(analysis, &path, places.len(), camera);
     CameraId::ALL.into_iter().filter_map(lost).collect()
 }
 
-fn named(best: &Judged, places: usize) -> Finding {
+/// The strongest reading; among those that are as strong within a standard error, the one that leaves the smallest
+/// angles.
+fn likeliest<'a>(clear: &[&'a Judged], places: usize) -> Option<&'a Judged> {
+    let strongest = clear.iter().map(|j| j.strength).fold(f64::MIN, f64::max);
+    let error = 1.0 / (places as f64 - 3.0).sqrt();
+    let tied = clear.iter().filter(|j| j.strength >= strongest - error);
+    let off = |j: &Judged| j.off_deg.iter().flatten().copied().fold(0.0, f64::max);
+    tied.min_by(|a, b| off(a).total_cmp(&off(b))).copied()
+}
+
+/// A reading that puts the angles right in both cameras, where the session as it is has them far off.
+fn by_angle(judged: &[Judged], nominal: &StereoGeometry, path: &[&Touch<'_>]) -> Option<Finding> {
+    let as_is = CameraId::ALL.map(|c| off_deg(nominal, path, c, Reading::AsIs));
+    let [Some(one), Some(two)] = as_is else {
+        return None;
+    };
+    if one.min(two) < FAR_DEG {
+        return None;
+    }
+    let left = |j: &Judged| match j.off_deg {
+        [Some(a), Some(b)] => (a < NEAR_SHARE * one && b < NEAR_SHARE * two).then(|| a.max(b)),
+        _ => None,
+    };
+    // A shift moves the angles too little to tell it from an error of the geometry.
+    let best = judged
+        .iter()
+        .filter(|j| !matches!(j.reading, Reading::Shifted(_)))
+        .filter_map(|j| Some((j, left(j)?)))
+        .filter(|(_, left)| *left < NEAR_DEG)
+        .min_by(|a, b| a.1.total_cmp(&b.1))?;
+    let evidence = format!(
+        "expected viewing angles within some degrees of the nominal geometry's, found them {one:.0} and {two:.0} degrees off \
+         in the median (cameras 1 and 2) as the session is, and within {:.1} with {}",
+        best.1, best.0.reading
+    );
+    let fault = best.0.reading.fault();
+    Some(finding(Law::CentroidFollowsPosition, fault, None, evidence))
+}
+
+/// Median difference between the viewing angles of the columns and those of the presses, degrees.
+fn off_deg(
+    geometry: &StereoGeometry,
+    path: &[&Touch<'_>],
+    camera: CameraId,
+    reading: Reading,
+) -> Option<f64> {
+    let k = match reading {
+        Reading::Swapped => 1 - camera.index(),
+        _ => camera.index(),
+    };
+    let model = &geometry.cameras[k];
+    let compared = compared(geometry, path, camera, reading);
+    let off = |&(column, _, angle): &(f64, f64, f64)| {
+        (model.angle_of_column_deg(column) - model.skew_deg - angle).abs()
+    };
+    median(compared.iter().map(off).collect())
+}
+
+fn by_rank(best: &Judged, places: usize) -> Finding {
     let list = |fit: [Option<f64>; 2]| {
         let values = fit.map(|r| r.map_or_else(|| "-".to_owned(), |r| format!("{r:.3}")));
         values.join(" and ")
@@ -159,6 +235,7 @@ fn judge(
         fit_as_is: [None; 2],
         score: 0.0,
         strength: 0.0,
+        off_deg: CameraId::ALL.map(|c| off_deg(geometry, path, c, reading)),
     };
     let mut cameras = 0.0;
     for camera in CameraId::ALL {

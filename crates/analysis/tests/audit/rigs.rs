@@ -60,6 +60,10 @@ impl Random {
 /// What is planted into a session on top of its seed.
 #[derive(Clone, Copy, Default)]
 pub struct Wishes {
+    /// Which rig (`None`: the seed decides).
+    pub rig: Option<usize>,
+    /// This many places along y instead of a path (0: a path).
+    pub line_of: usize,
     /// With a trigger line (`None`: the seed decides).
     pub line: Option<bool>,
     /// Clock drift of camera 1, ppm (`None`: within ±50).
@@ -133,7 +137,8 @@ pub fn sound(seed: u64) -> Session {
 /// The session of this seed with `wishes`.
 pub fn session(seed: u64, wishes: Wishes) -> Session {
     let mut random = Random::new(seed);
-    let at = RIGS[random.below(4)];
+    let drawn = random.below(4);
+    let at = RIGS[wishes.rig.unwrap_or(drawn)];
     let nominal = StereoGeometry {
         cameras: at.map(|p| camera(p, 0.0, 0.0)),
     };
@@ -143,7 +148,12 @@ pub fn session(seed: u64, wishes: Wishes) -> Session {
             camera(place, random.within(1.5), random.within(0.08))
         }),
     };
-    let path = path(&mut random, wishes.places);
+    let path = match wishes.line_of {
+        0 => path(&mut random, wishes.places),
+        n => (0..n)
+            .map(|i| Point2::new(-12.0, -16.0 + 4.0 * i as f64))
+            .collect(),
+    };
     let drawn = 2 + random.below(2) as u32;
     let repetitions = if wishes.repetitions > 0 {
         wishes.repetitions
