@@ -26,6 +26,12 @@ impl Files {
         Ok(files)
     }
 
+    /// Files that are there.
+    #[must_use]
+    pub fn at(folder: &Path) -> Self {
+        Self(folder.into())
+    }
+
     /// The file of a camera.
     #[must_use]
     pub fn path(&self, camera: CameraId) -> PathBuf {
