@@ -10,8 +10,10 @@ use std::path::{Path, PathBuf};
 use serde_json::{Value, json};
 use skinrig_analysis::dbscan::{Dbscan, NOISE};
 use skinrig_analysis::grid::PixelGrid;
+use skinrig_analysis::kept::Keep;
+use skinrig_analysis::latency;
 use skinrig_analysis::segment::windows;
-use skinrig_analysis::{Analysis, SessionInput, analyze};
+use skinrig_analysis::{Analysis, SessionInput, analyze, analyze_and_keep};
 use skinrig_bench::files::Files;
 use skinrig_bench::python::Python;
 use skinrig_bench::{Table, recording};
@@ -31,6 +33,7 @@ fn main() {
     fs::create_dir_all(folder).expect("a folder");
     clustering(folder);
     repetition(folder);
+    studies(folder);
 }
 
 fn start(script: &str, folder: &Path) -> Option<RefCell<Python>> {
@@ -154,7 +157,7 @@ fn repetition(folder: &Path) {
         "one repetition: 289 presses, windows of a period, from two HDF5 files to the error in mm",
         "Mev",
         "wall time, rounds in turn, files in the page cache. This crate: two threads; clock alignment, calibration from \
-         10 starts, 2000 bootstrap samples. Python: two processes; press windows given, calibration from 10 starts. \
+         10 starts, 2000 bootstrap samples. Python: press windows given, calibration from 10 starts. \
          Public code's choices: one process, 12 of the 578 centroids, scaled; neither reading nor calibration. \
          Columns agree to 1e-9 px in every round",
     );
@@ -162,12 +165,49 @@ fn repetition(folder: &Path) {
         table.baseline_told("the public code's choices: clustering alone", mev, || {
             seconds(published, "clustering")
         });
-        table.told("h5py, numpy, scipy", mev, || seconds(assembled, "whole"));
+        table.told("h5py, numpy, scipy; one process", mev, || {
+            seconds(assembled, "one_process")
+        });
+        table.told("h5py, numpy, scipy; a process per camera", mev, || {
+            seconds(assembled, "two_processes")
+        });
     }
     table.row("this crate", mev, || {
         std::hint::black_box(analyze(&input, &files).map(|a| a.counts).ok());
     });
     println!("{}", table.run(5));
+}
+
+/// The detection latency of all presses of the repetition that [`repetition`] left in the folder.
+fn studies(folder: &Path) {
+    let mut input = recording::input();
+    input.settings.calibration = CalibrationModel::None;
+    for planned in &mut input.planned {
+        if planned.role == PressRole::Calibrate {
+            planned.role = PressRole::Score;
+        }
+    }
+    let (done, kept) =
+        analyze_and_keep(&input, &Files::at(folder), Keep::Scored).expect("a good recording");
+    let presses = f64::from(recording::PRESSES);
+    let thresholds = f64::from(input.settings.latency.thresholds);
+    let method = format!(
+        "wall time, rounds in turn, events in memory. This crate: {} presses, both cameras, 20 thresholds, trials and \
+         backgrounds, a second study on thinned events, intervals; two threads. Python: 24 presses, one camera, \
+         one threshold, scaled to all presses and 20 thresholds",
+        kept.presses.len()
+    );
+    let python = start("published.py", folder);
+    let mut table = Table::new("detection latency of 289 presses", "press", &method);
+    if let Some(python) = &python {
+        table.baseline_told("the public code's choices", presses, || {
+            thresholds * seconds(python, "latency")
+        });
+    }
+    table.row("this crate", presses, || {
+        std::hint::black_box(latency::study(&done, &kept));
+    });
+    println!("{}", table.run(3));
 }
 
 /// What the other side is given, and what it has to find.

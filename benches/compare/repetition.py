@@ -72,17 +72,21 @@ def rmse(errors):
     return float(np.sqrt((errors**2).sum(axis=0).mean()))
 
 
-def whole(folder):
+def whole(folder, submit=None):
+    """With a process per camera, or else both cameras in this one."""
     s = json.loads((folder / "repetition.json").read_text())
     truth, calibrates = np.array(s["truth"]).T, np.array(s["calibrates"])
 
     def work():
         jobs = [
-            pool.submit(columns, folder / f"camera{k + 1}.hdf5", s["windows"][k], s["rows"][k],
-                        s["eps_px"], s["min_samples"])
+            (columns, folder / f"camera{k + 1}.hdf5", s["windows"][k], s["rows"][k],
+             s["eps_px"], s["min_samples"])
             for k in (0, 1)
         ]
-        answers = [job.result() for job in jobs]
+        if submit:
+            answers = [job.result() for job in [submit(*job) for job in jobs]]
+        else:
+            answers = [job[0](*job[1:]) for job in jobs]
         cpu = time.process_time()
         u = np.array([columns for columns, _ in answers])
         seen = np.isfinite(u).all(axis=0)
@@ -108,4 +112,5 @@ if __name__ == "__main__":
     with ProcessPoolExecutor(2) as pool:
         # The processes are there before anything is timed.
         list(pool.map(abs, [1, 2]))
-        main({"whole": whole}, ["numpy", "scipy", "h5py"])
+        tasks = {"two_processes": lambda folder: whole(folder, pool.submit), "one_process": whole}
+        main(tasks, ["numpy", "scipy", "h5py"])

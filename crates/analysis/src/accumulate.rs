@@ -22,6 +22,9 @@ use crate::segment::Window;
 /// How far an event may lie before the newest one seen and still find its window open, µs.
 pub const SLACK_US: u64 = 10_000;
 
+/// Events that are handled together, so that they stay in the processor's nearest caches.
+const SLICE: usize = 1024;
+
 /// A close-up of the rate around one press.
 #[derive(Debug, Clone)]
 pub struct ZoomPlan {
@@ -44,7 +47,7 @@ pub struct Wanted<'a> {
     pub zooms: Vec<ZoomPlan>,
     /// Presses whose events are kept, sorted by start.
     pub kept: Vec<KeepPlan>,
-    /// The histogram to fill, when this pass is to fill it.
+    /// The histogram to fill, when this pass is to fill it; it then counts the activity, too.
     pub rates: Option<RateHistogram>,
 }
 
@@ -70,7 +73,9 @@ pub struct Accumulator<'a> {
     zooms: Vec<(ZoomPlan, Vec<u32>, Vec<u32>)>,
     zoom_next: usize,
     keeper: Keeper,
-    activity: ActivityGrid,
+    activity: Option<ActivityGrid>,
+    /// The events of a slice that lie in the crop.
+    inside: Vec<CdEvent>,
     bin_us: u64,
     views: Vec<(usize, PressView)>,
     pictures: Vec<PressPicture>,
@@ -151,6 +156,8 @@ impl<'a> Accumulator<'a> {
             camera,
             settings,
             crop: settings.crop_v[camera.index()],
+            activity: rates.is_some().then(ActivityGrid::new),
+            inside: Vec::new(),
             rates,
             windows,
             pictured,
@@ -167,7 +174,6 @@ impl<'a> Accumulator<'a> {
             zooms,
             zoom_next: 0,
             keeper: Keeper::new(kept),
-            activity: ActivityGrid::new(),
             bin_us: rate_bin_us(settings),
             views: Vec::new(),
             pictures: Vec::new(),
@@ -177,11 +183,12 @@ impl<'a> Accumulator<'a> {
 
     /// Takes the next events of the stream.
     pub fn take(&mut self, events: &[CdEvent]) {
-        if self.error.is_some() {
-            return;
-        }
-        for event in events {
-            if event.x >= SENSOR_WIDTH || event.y >= SENSOR_HEIGHT {
+        for slice in events.chunks(SLICE) {
+            if self.error.is_some() {
+                return;
+            }
+            let off_sensor = |e: &CdEvent| e.x >= SENSOR_WIDTH || e.y >= SENSOR_HEIGHT;
+            if let Some(event) = slice.iter().find(|e| off_sensor(e)) {
                 self.error = Some(AnalysisError::OffSensor {
                     camera: self.camera,
                     x: event.x,
@@ -190,64 +197,103 @@ impl<'a> Accumulator<'a> {
                 });
                 return;
             }
-            self.newest_us = self.newest_us.max(event.t_us);
-            if event.t_us.saturating_add(SLACK_US) < self.newest_us {
-                self.late += 1;
+            if slice.is_sorted_by_key(|e| e.t_us) {
+                self.take_in_order(slice);
+            } else {
+                slice.chunks(1).for_each(|event| self.take_in_order(event));
             }
-            self.activity.add(event);
-            if event.y < self.crop.0 || event.y > self.crop.1 {
-                continue;
-            }
-            if let Some(rates) = &mut self.rates {
-                rates.add(event.t_us);
-            }
+        }
+    }
+
+    /// Takes events by time, though the first may lie before those taken so far: what a window or a close-up wants of
+    /// them lies side by side.
+    fn take_in_order(&mut self, events: &[CdEvent]) {
+        let newest_us = self.newest_us;
+        self.late += events.partition_point(|e| e.t_us.saturating_add(SLACK_US) < newest_us) as u64;
+        if let Some(activity) = &mut self.activity {
+            events.iter().for_each(|e| activity.add(e));
+        }
+        let (low, high) = self.crop;
+        let mut inside = std::mem::take(&mut self.inside);
+        inside.clear();
+        inside.extend(events.iter().filter(|e| (low..=high).contains(&e.y)));
+        if let Some(rates) = &mut self.rates {
+            inside.iter().for_each(|e| rates.add(e.t_us));
+        }
+        let mut rest = &inside[..];
+        while let Some(first) = rest.first() {
+            self.newest_us = self.newest_us.max(first.t_us);
             if self.newest_us >= self.quiet_until_us {
                 self.move_on();
             }
-            self.count(event);
+            let (quiet, later) = rest.split_at(first_from(rest, self.quiet_until_us).max(1));
+            self.count(quiet);
+            rest = later;
+        }
+        self.inside = inside;
+        if let Some(last) = events.last() {
+            self.newest_us = self.newest_us.max(last.t_us);
         }
     }
 
-    fn count(&mut self, event: &CdEvent) {
-        let on = event.polarity == Polarity::On;
-        if self.thinning.keeps(event) {
-            self.count_in_windows(event, on);
+    /// Counts events of the crop, by time, wherever they are wanted.
+    fn count(&mut self, events: &[CdEvent]) {
+        self.keeper.take(events);
+        self.count_in_zooms(events);
+        if self.thinning.keeps_all() {
+            self.count_in_windows(events);
+        } else {
+            let kept = events.iter().filter(|e| self.thinning.keeps(e)).copied();
+            let kept: Vec<CdEvent> = kept.collect();
+            self.count_in_windows(&kept);
         }
-        self.keeper.take(event);
+    }
+
+    fn count_in_zooms(&mut self, events: &[CdEvent]) {
         for (plan, ons, offs) in &mut self.zooms[self.zoom_next..] {
-            if event.t_us < plan.start_us {
+            let events = &events[first_from(events, plan.start_us)..];
+            if events.is_empty() {
                 break;
             }
-            let bin = ((event.t_us - plan.start_us) / self.bin_us) as usize;
-            if let Some(count) = if on { ons } else { offs }.get_mut(bin) {
-                *count += 1;
+            for event in events {
+                let bin = ((event.t_us - plan.start_us) / self.bin_us) as usize;
+                let on = event.polarity == Polarity::On;
+                if let Some(count) = if on { &mut *ons } else { &mut *offs }.get_mut(bin) {
+                    *count += 1;
+                }
             }
         }
     }
 
-    fn count_in_windows(&mut self, event: &CdEvent, on: bool) {
-        let keep = self.estimator.is_some();
+    fn count_in_windows(&mut self, events: &[CdEvent]) {
         for open in &mut self.open {
             let w = &open.window;
-            if event.t_us >= w.start_us && event.t_us < w.end_us {
-                let packed = keep.then(|| KeptEvent::pack(event, w.start_us));
-                if !open.grid.add(event.x, event.y) || packed == Some(None) {
-                    self.error = Some(AnalysisError::TooManyEvents {
-                        camera: self.camera,
-                        row: w.row,
-                    });
-                    return;
+            let start = first_from(events, w.start_us);
+            let idle = first_from(events, w.idle_start_us)..start;
+            open.idle_events += idle.len() as u64;
+            let events = &events[start..first_from(events, w.end_us).max(start)];
+            let mut fits = open.grid.add_all(events);
+            if self.estimator.is_some() {
+                for event in events {
+                    let packed = KeptEvent::pack(event, w.start_us);
+                    fits &= packed.is_some();
+                    open.events.extend(packed);
                 }
-                open.events.extend(packed.flatten());
-                if on {
-                    open.on_events += 1;
-                    if let Some(grid) = &mut open.on {
-                        grid.add(event.x, event.y);
-                    }
-                }
-            } else if event.t_us >= w.idle_start_us && event.t_us < w.start_us {
-                open.idle_events += 1;
             }
+            if !fits {
+                self.error = Some(AnalysisError::TooManyEvents {
+                    camera: self.camera,
+                    row: w.row,
+                });
+                return;
+            }
+            let on = events.iter().filter(|e| e.polarity == Polarity::On);
+            if let Some(grid) = &mut open.on {
+                on.clone().for_each(|e| {
+                    grid.add(e.x, e.y);
+                });
+            }
+            open.on_events += on.count() as u32;
         }
     }
 
@@ -388,13 +434,18 @@ impl<'a> Accumulator<'a> {
         Ok(Accumulated {
             zooms: zooms.collect(),
             kept: self.keeper.finish(),
-            activity: Some(self.activity.result(self.camera)),
+            activity: self.activity.map(|a| a.result(self.camera)),
             rates: self.rates,
             views: self.views,
             pictures: self.pictures,
             late: self.late,
         })
     }
+}
+
+/// The place of the first event, by time, from `time_us` on.
+fn first_from(events: &[CdEvent], time_us: u64) -> usize {
+    events.partition_point(|e| e.t_us < time_us)
 }
 
 /// Width of a rate bin in whole µs, at least 1.
@@ -482,5 +533,48 @@ mod tests {
         let windows = [window(0, 1_000, 1_000, 5_000)];
         let late = [2_000, 16_000, 15_000, 5_999].map(|t| event(t, 250, Polarity::On));
         assert_eq!(run(&windows, &late).late, 1);
+    }
+
+    #[test]
+    fn slices_of_any_size_and_a_little_disorder_give_what_each_event_gives() {
+        let windows = [
+            window(0, 3_000, 20_000, 60_000),
+            window(1, 50_000, 50_000, 90_000),
+            window(2, 90_000, 120_000, 150_000),
+        ];
+        // Every seventh event comes 4 ms late, and some lie outside the crop.
+        let events: Vec<CdEvent> = (0..5_000u64)
+            .map(|i| {
+                let t_us = 40 * i + 4_000 - if i % 7 == 0 { 4_000 } else { 0 };
+                event(t_us, 180 + (i % 11) as u16, Polarity::from_bit(i % 3 == 0))
+            })
+            .collect();
+        let settings = AnalysisSettings::default();
+        let seen = |size: usize| {
+            let wanted = Wanted {
+                windows: &windows,
+                rates: Some(RateHistogram::new(10_000)),
+                ..Wanted::default()
+            };
+            let mut all = Accumulator::new(CameraId::One, &settings, wanted);
+            events.chunks(size).for_each(|slice| all.take(slice));
+            let done = all.finish().unwrap();
+            assert_eq!(done.late, 0);
+            (done.views, done.rates, done.activity)
+        };
+        let whole = seen(events.len());
+        let inside = |from: u64, to: u64| {
+            let near = events.iter().filter(|e| (185..=360).contains(&e.y));
+            near.filter(|e| (from..to).contains(&e.t_us)).count() as u32
+        };
+        for ((row, view), w) in whole.0.iter().zip(&windows) {
+            assert_eq!(*row, w.row);
+            assert_eq!(view.events, inside(w.start_us, w.end_us));
+            let idle = view.idle_rate_per_s * view.idle_s;
+            assert!((idle - f64::from(inside(w.idle_start_us, w.start_us))).abs() < 1e-6);
+        }
+        for size in [1, 7, 1_000, 1_024] {
+            assert_eq!(seen(size), whole, "slices of {size}");
+        }
     }
 }

@@ -234,6 +234,7 @@ fn camera_pass(
     let k = camera.index();
     let mut warnings: Vec<String> = Vec::new();
     let mut rates = Some(RateHistogram::new(rate_bin_us(settings)));
+    let mut activity = None;
     let marks = input
         .rig
         .trigger_channel
@@ -255,7 +256,7 @@ fn camera_pass(
         };
         let empty = Accumulator::new(camera, settings, wanted);
         let first = pass(source, camera, empty)?;
-        rates = first.rates;
+        (rates, activity) = (first.rates, first.activity);
         let found = rates
             .as_ref()
             .map_or_else(|| Err(String::new()), |r| fit_rates(r, &spans(input)));
@@ -285,7 +286,7 @@ fn camera_pass(
             pictures: Vec::new(),
             zooms: Vec::new(),
             kept: Vec::new(),
-            activity: None,
+            activity,
             late: 0,
         },
         (Some(clock), rates) => {
@@ -304,6 +305,7 @@ fn camera_pass(
             };
             let mut done = pass(source, camera, Accumulator::new(camera, settings, wanted))?;
             done.rates = done.rates.or(known);
+            done.activity = done.activity.or(activity);
             done
         }
     };

@@ -1,6 +1,6 @@
 //! How many events fell on each pixel of the crop: all that the clustering needs to know of a press.
 
-use skinrig_model::{SENSOR_HEIGHT, SENSOR_WIDTH};
+use skinrig_model::{CdEvent, SENSOR_HEIGHT, SENSOR_WIDTH};
 
 use crate::pixels::PixelSet;
 
@@ -76,6 +76,29 @@ impl PixelGrid {
         }
         self.events = events;
         true
+    }
+
+    /// Counts all of these events, or as many of the first as lie in the crop and fit: false when that is not all.
+    pub fn add_all(&mut self, events: &[CdEvent]) -> bool {
+        let first = usize::from(self.rows.0) * Self::WIDTH;
+        let free = u32::MAX - self.events;
+        let fitting = events.len().min(free as usize);
+        for (counted, event) in events[..fitting].iter().enumerate() {
+            let index = usize::from(event.y) * Self::WIDTH + usize::from(event.x);
+            let index = index.wrapping_sub(first);
+            match self.counts.get_mut(index) {
+                Some(count) if event.x < SENSOR_WIDTH => {
+                    *count += 1;
+                    self.occupied.insert(index);
+                }
+                _ => {
+                    self.events += counted as u32;
+                    return false;
+                }
+            }
+        }
+        self.events += fitting as u32;
+        fitting == events.len()
     }
 
     /// Empties the grid; costs as much as it held.

@@ -34,19 +34,24 @@ impl Keeper {
         }
     }
 
-    /// Takes the next event of the stream. When the memory is used up, this press and all later ones are given up.
-    pub fn take(&mut self, event: &CdEvent) {
+    /// Takes the next events of the stream, by time. When the memory is used up, this press and all later ones are
+    /// given up.
+    pub fn take(&mut self, events: &[CdEvent]) {
         for plan in &mut self.plans[self.next..] {
             let view = &mut plan.view;
-            if event.t_us < view.start_us {
+            let start = events.partition_point(|e| e.t_us < view.start_us);
+            let events = &events[start..];
+            if events.is_empty() {
                 break;
             }
-            if event.t_us - view.start_us < u64::from(view.length_us)
-                && let Some(packed) = KeptEvent::pack(event, view.start_us)
-            {
-                view.events.push(packed);
-                self.events += 1;
-            }
+            let within = |e: &CdEvent| e.t_us - view.start_us < u64::from(view.length_us);
+            let end = events.partition_point(within);
+            let packed = events[..end].iter();
+            let before = view.events.len();
+            let start_us = view.start_us;
+            view.events
+                .extend(packed.filter_map(|e| KeptEvent::pack(e, start_us)));
+            self.events += view.events.len() - before;
         }
         if self.events > MAX_EVENTS {
             self.plans.truncate(self.next);
@@ -91,12 +96,12 @@ mod tests {
     fn overlapping_views_get_all_of_their_events_in_order() {
         let mut keeper = Keeper::new(vec![plan(0, 100, 50), plan(1, 120, 50)]);
         for t_us in [99, 100, 149, 130, 150, 169, 170] {
-            keeper.take(&CdEvent {
+            keeper.take(&[CdEvent {
                 t_us,
                 x: 5,
                 y: 200,
                 polarity: Polarity::On,
-            });
+            }]);
             keeper.move_on(t_us.saturating_sub(30));
         }
         let done = keeper.finish();

@@ -21,6 +21,12 @@ impl Thinning {
         }
     }
 
+    /// True when every event stays.
+    #[must_use]
+    pub fn keeps_all(&self) -> bool {
+        self.limit == u64::MAX
+    }
+
     /// True for an event that stays; `event` in camera time.
     #[must_use]
     pub fn keeps(&self, event: &CdEvent) -> bool {
@@ -31,7 +37,7 @@ impl Thinning {
     #[must_use]
     pub fn keeps_at(&self, t_us: u64, x: u16, y: u16, on: bool) -> bool {
         let pixel = u64::from(on) << 32 | u64::from(y) << 16 | u64::from(x);
-        self.limit == u64::MAX || mixed(mixed(self.key ^ t_us) ^ pixel) <= self.limit
+        self.keeps_all() || mixed(mixed(self.key ^ t_us) ^ pixel) <= self.limit
     }
 }
 
