@@ -109,6 +109,28 @@ fn json_document_has_this_layout() {
     );
 }
 
+/// What is wrong comes before every number.
+#[test]
+fn terminal_table_begins_with_findings() {
+    let mut analysis = support::analysis(3, 2);
+    analysis.findings = support::studies::findings();
+    analysis.reference = Some(support::studies::reference());
+    let input = ReportInput {
+        analysis: &analysis,
+        provenance: support::provenance(),
+    };
+    let table = terminal_table(&input, false);
+    let fault = table.find("fault     cameras swapped. Broken:").unwrap();
+    assert!(fault < table.find("scored presses").unwrap(), "{table}");
+    assert!(table.contains("clock wrong, camera 2."), "{table}");
+    assert!(table.contains("do: check which camera"), "{table}");
+    assert!(
+        table.contains("3.02 mm (x 2.31, y 1.94) in-sample"),
+        "{table}"
+    );
+    assert!(table.lines().all(|l| l.chars().count() <= 80), "{table}");
+}
+
 /// Floats to six decimals: the layout is what is held, not the last bits of a platform's sine.
 fn blunt(value: serde_json::Value) -> serde_json::Value {
     use serde_json::Value;

@@ -100,7 +100,13 @@ pub fn latency_roc(input: &ReportInput<'_>) -> Option<Figure> {
         .zip([points[0], points[points.len() - 1]])
     {
         let text = format!("h = {}", number(Some(row.threshold), 1));
-        svg.text((x, y - 10.0), "tick", "middle", &text);
+        // Within the plot: to the right of a point at the left edge, else to its left.
+        let (dx, anchor) = if x < 130.0 {
+            (10.0, "start")
+        } else {
+            (-10.0, "end")
+        };
+        svg.text((x + dx, y + 14.0), "tick", anchor, &text);
     }
     if let Some(r) = chosen {
         let (x, y) = place(r.false_alarms_per_s, r.detected_rate);
@@ -114,7 +120,7 @@ pub fn latency_roc(input: &ReportInput<'_>) -> Option<Figure> {
             ],
         );
         let text = format!("chosen, h = {}", number(Some(r.threshold), 2));
-        svg.text((x, y + 24.0), "note", "middle", &text);
+        svg.text((x + 14.0, y + 18.0), "note", "start", &text);
     }
     svg.path(
         "published",

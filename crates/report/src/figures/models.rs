@@ -14,9 +14,9 @@ pub(crate) const fn model_name(model: CalibrationModel) -> &'static str {
     match model {
         CalibrationModel::None => "nominal geometry",
         CalibrationModel::Positions => "positions",
-        CalibrationModel::PositionsSkews => "+ skews",
-        CalibrationModel::Full => "+ distortions (paper)",
-        CalibrationModel::FullScale => "+ scales",
+        CalibrationModel::PositionsSkews => "with skews",
+        CalibrationModel::Full => "with distortions (paper)",
+        CalibrationModel::FullScale => "with scales",
         CalibrationModel::Auto => "automatic",
     }
 }
@@ -50,7 +50,7 @@ pub fn models(input: &ReportInput<'_>) -> Option<Figure> {
     let axes = Axes {
         x: Scale::new((-0.6, rows.len() as f64 - 0.4), (66.0, 604.0)),
         y: Scale::new((0.0, nice_above(most)), (390.0, 44.0)),
-        x_label: "model (parameters)".into(),
+        x_label: String::new(),
         y_label: "RMSE (mm)".into(),
         tick_count: (0, 6),
     };
@@ -66,9 +66,13 @@ pub fn models(input: &ReportInput<'_>) -> Option<Figure> {
     }
     for (i, row) in rows.iter().enumerate() {
         let x = axes.x.at(i as f64);
-        let name = format!("{} ({})", model_name(row.model), row.parameters);
+        let name = format!(
+            "{} ({})",
+            model_name(row.model).replace(" (paper)", ""),
+            row.parameters
+        );
         // Neighbouring names on two heights: five do not fit beside each other.
-        svg.text((x, 406.0 + 13.0 * (i % 2) as f64), "tick", "middle", &name);
+        svg.text((x, 407.0 + 14.0 * (i % 2) as f64), "tick", "middle", &name);
         if let (Some(low), Some(high)) = (finite(row.rmse_mm.low), finite(row.rmse_mm.high)) {
             svg.line("whisker c1", (x, axes.y.at(low)), (x, axes.y.at(high)));
         }

@@ -1,4 +1,6 @@
-//! Owns the results table for a terminal.
+//! Owns the results table for a terminal: findings, headline, presses, clocks; the studies are in [`studies`].
+
+mod studies;
 
 use std::fmt::Write as _;
 
@@ -12,7 +14,7 @@ const WIDTH: usize = 80;
 /// A metric ready to be written: name, value, unit, interval, n.
 pub(crate) struct MetricRow {
     pub(crate) key: &'static str,
-    pub(crate) name: &'static str,
+    pub(crate) name: String,
     pub(crate) value: String,
     pub(crate) unit: &'static str,
     pub(crate) interval: String,
@@ -23,14 +25,23 @@ pub(crate) struct MetricRow {
 /// The metrics in the order in which they are read.
 pub(crate) fn metric_rows(a: &Analysis) -> Vec<MetricRow> {
     let m = &a.scored;
-    let mm = |key, name, e: &Estimate, what_n| MetricRow {
+    let mm = |key, name: &str, e: &Estimate, what_n| MetricRow {
         key,
-        name,
+        name: name.to_owned(),
         value: number(e.value, 2),
         unit: "mm",
         interval: interval(e, 1.0, 2),
         n: e.n,
         what_n,
+    };
+    let share = |key, name, e: &Estimate| MetricRow {
+        key,
+        name,
+        value: number(e.value.map(|v| 100.0 * v), 1),
+        unit: "%",
+        interval: interval(e, 100.0, 1),
+        n: e.n,
+        what_n: "attempted",
     };
     vec![
         mm("rmse", "RMSE", &m.rmse_mm, "presses"),
@@ -50,15 +61,12 @@ pub(crate) fn metric_rows(a: &Analysis) -> Vec<MetricRow> {
                 "location-depths"
             },
         ),
-        MetricRow {
-            key: "located",
-            name: "located rate",
-            value: number(m.located_rate.value.map(|v| 100.0 * v), 1),
-            unit: "%",
-            interval: interval(&m.located_rate, 100.0, 1),
-            n: m.located_rate.n,
-            what_n: "attempted",
-        },
+        share("located", "located rate".to_owned(), &m.located_rate),
+        share(
+            "within",
+            format!("within {} mm", a.settings.within_mm),
+            &m.within_rate,
+        ),
     ]
 }
 
@@ -94,7 +102,7 @@ impl Paint {
         }
     }
     fn warn(&self, s: &str) -> String {
-        if self.0 {
+        if self.0 && !s.is_empty() {
             format!("\x1b[33m{s}\x1b[0m")
         } else {
             s.to_owned()
@@ -162,6 +170,17 @@ pub(crate) fn table(input: &ReportInput<'_>, color: bool) -> String {
     };
     out += &wrap("run       ", &plain(&end));
     out.push('\n');
+    let before = out.len();
+    out += &paint.warn(&findings(a));
+    if let Some(text) = crate::derive::disagreement(a) {
+        out += &paint.warn(&wrap("warning   ", &text));
+    }
+    for warning in &a.warnings {
+        out += &paint.warn(&wrap("warning   ", &plain(warning)));
+    }
+    if out.len() > before {
+        out.push('\n');
+    }
 
     let head = format!(
         "{:<24}{:>8}     {:^20}{:>7}",
@@ -199,6 +218,17 @@ pub(crate) fn table(input: &ReportInput<'_>, color: bool) -> String {
             e.n
         );
     }
+    let f = &a.penalised;
+    if f.failures > 0 {
+        let _ = writeln!(
+            out,
+            "{:<24}{:>8} mm  {:^20}{:>7} presses",
+            "RMSE, failures counted",
+            number(f.rmse_mm.value, 2),
+            interval(&f.rmse_mm, 1.0, 2),
+            f.rmse_mm.n,
+        );
+    }
     for d in &a.depths {
         let _ = writeln!(
             out,
@@ -232,20 +262,20 @@ pub(crate) fn table(input: &ReportInput<'_>, color: bool) -> String {
             c.sync
         );
     }
+    if f.failures > 0 {
+        let text = format!(
+            "{} failed, each counted as {} mm where failures count",
+            f.failures,
+            number(Some(f.penalty_mm), 1)
+        );
+        out += &wrap("penalty   ", &text);
+    }
     out += &left_out(a, false);
     out += &left_out(a, true);
     for (i, clock) in a.clocks.iter().enumerate() {
         out += &clock_lines(i + 1, clock.as_ref());
     }
-    if let Some(cal) = &a.calibration {
-        let text = format!(
-            "RMSE {} -> {} mm over {} calibrating presses",
-            number(Some(cal.rmse_before_mm), 2),
-            number(Some(cal.rmse_after_mm), 2),
-            cal.n
-        );
-        out += &wrap("fit       ", &text);
-    }
+    out += &studies::calibration(a);
     for (i, lost) in p.lost_bytes.iter().enumerate().filter(|(_, l)| **l > 0) {
         let text = format!("camera {}: {} bytes lost", i + 1, grouped(*lost));
         out += &paint.warn(&wrap("loss      ", &text));
@@ -259,11 +289,22 @@ pub(crate) fn table(input: &ReportInput<'_>, color: bool) -> String {
         let text = plain(&text);
         out += &paint.warn(&wrap("event     ", &text));
     }
-    if let Some(text) = crate::derive::disagreement(a) {
-        out += &paint.warn(&wrap("warning   ", &text));
+    let studies = studies::all(a);
+    if !studies.is_empty() {
+        out.push('\n');
+        out += &studies;
     }
-    for warning in &a.warnings {
-        out += &paint.warn(&wrap("warning   ", &plain(warning)));
+    out
+}
+
+/// What the audit found: before every number.
+fn findings(a: &Analysis) -> String {
+    use crate::page::findings::{fault, law};
+    let mut out = String::new();
+    for f in &a.findings {
+        let text = format!("{}. Broken: {}. {}", fault(f), law(f), f.evidence);
+        out += &wrap("fault     ", &plain(&text));
+        out += &wrap("          ", &plain(&format!("do: {}", f.advice)));
     }
     out
 }

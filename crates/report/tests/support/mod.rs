@@ -468,6 +468,10 @@ pub fn empty() -> Analysis {
         warnings: vec![],
         pictures: vec![],
         zooms: vec![],
+        penalised: Penalised {
+            failures: 0,
+            ..full.penalised
+        },
         threshold: None,
         coverage: None,
         cmre: None,

@@ -1,0 +1,210 @@
+//! Owns the studies in the results table for a terminal: a few lines each.
+
+use std::fmt::Write as _;
+
+use skinrig_analysis::result::{
+    Analysis, Estimate, Latency, Reduction, ReductionRow, ReferenceCode, Thinning,
+};
+
+use super::{plain, wrap};
+use crate::figures::model_name;
+use crate::format::{interval, number};
+
+/// Factors with a line of their own; the page has all.
+const FACTORS: [u32; 4] = [1, 16, 256, 1024];
+
+/// The calibration: error, model and why, how well it is determined.
+pub(super) fn calibration(a: &Analysis) -> String {
+    let Some(c) = &a.calibration else {
+        return String::new();
+    };
+    let mut text = format!(
+        "RMSE {} -> {} mm over {} calibrating presses; model {}, {} of {} parameters determined, {} of {} starts agree",
+        number(Some(c.rmse_before_mm), 2),
+        number(Some(c.rmse_after_mm), 2),
+        c.n,
+        model_name(c.model),
+        c.rank,
+        c.names.len(),
+        c.starts_agreeing,
+        c.starts,
+    );
+    if let Some(chosen) = c.compared.iter().find(|m| m.chosen) {
+        let _ = write!(
+            text,
+            "; {} mm {} on left-out locations, {} models compared",
+            number(chosen.rmse_mm.value, 2),
+            interval(&chosen.rmse_mm, 1.0, 2),
+            c.compared.len()
+        );
+    }
+    wrap("fit       ", &plain(&text))
+}
+
+/// All studies that were made.
+pub(super) fn all(a: &Analysis) -> String {
+    let mut out = String::new();
+    out += &areas(a);
+    out += &rates(a);
+    if let Some(l) = &a.latency {
+        out += &latency(l);
+    }
+    if let Some(r) = &a.reduction {
+        out += &reduction(r);
+    }
+    if let Some(r) = &a.reference {
+        out += &reference(r);
+    }
+    out
+}
+
+fn with(e: &Estimate, scale: f64, digits: usize) -> String {
+    let value = number(e.value.map(|v| v * scale), digits);
+    format!("{value} {}", interval(e, scale, digits))
+}
+
+fn areas(a: &Analysis) -> String {
+    let mut out = String::new();
+    if let Some(t) = &a.threshold {
+        let text = format!(
+            "{} cluster events, chosen on {} calibrating presses, leaves out {} of them",
+            t.events, t.n, t.left_out
+        );
+        out += &wrap("threshold ", &text);
+    }
+    if let Some(c) = &a.coverage {
+        let text = format!(
+            "skin {} mm², seen by both {} mm², probed {} mm² at {} locations",
+            number(Some(c.skin_mm2), 0),
+            number(Some(c.seen_by_both_mm2), 0),
+            number(c.probed_mm2, 0),
+            c.locations
+        );
+        out += &wrap("area      ", &text);
+        let text = format!(
+            "{} in the probed area; {} if the RMSE held over the skin",
+            with(&c.taxels_probed, 1.0, 1),
+            with(&c.taxels_skin, 1.0, 1)
+        );
+        out += &wrap("taxels    ", &text);
+    }
+    if let Some(c) = &a.cmre {
+        let text = format!(
+            "{} % (cells of {} mm, Gaussian of {} mm), n {}",
+            with(&c.percent, 1.0, 2),
+            c.settings.cell_mm,
+            c.settings.sigma_mm,
+            c.percent.n
+        );
+        out += &wrap("CMRE      ", &text);
+    }
+    out
+}
+
+fn rates(a: &Analysis) -> String {
+    let Some(r) = &a.bit_rates else {
+        return String::new();
+    };
+    let text = format!(
+        "press {} kB/s, idle {} kB/s at {} bits per event, n {}",
+        with(&r.press_bytes_per_s, 1e-3, 1),
+        with(&r.idle_bytes_per_s, 1e-3, 1),
+        r.bits_per_event,
+        r.press_bytes_per_s.n
+    );
+    wrap("data      ", &text)
+}
+
+fn latency(l: &Latency) -> String {
+    let chosen = l.chosen.and_then(|i| l.sweep.get(i as usize));
+    let text = format!(
+        "{} % of {} trials detected at h {}; onsets 5-95 % within {} ms; {} false alarms/s",
+        with(&l.detected_rate, 100.0, 1),
+        l.trials,
+        number(chosen.map(|r| r.threshold), 1),
+        with(&l.width_ms, 1.0, 1),
+        with(&l.false_alarms_per_s, 1.0, 2)
+    );
+    let mut out = wrap("detection ", &text);
+    out += &match &l.from_contact {
+        Some(c) => {
+            let text = format!(
+                "median {} ms after the measured contact, ± {} ms each; 5 % {} ms, 95 % {} ms; {} before contact, {} missed",
+                with(&c.median_ms, 1.0, 1),
+                number(Some(c.uncertainty_ms), 2),
+                number(c.p5_ms.value, 1),
+                number(c.p95_ms.value, 1),
+                c.before_contact,
+                c.missed
+            );
+            wrap("latency   ", &text)
+        }
+        None => wrap(
+            "latency   ",
+            "not from contact: the contacts were not measured on a clock of their own",
+        ),
+    };
+    if let Some(r) = &l.reduced {
+        let text = format!(
+            "{} % detected, 5-95 % within {} ms, {} false alarms/s",
+            with(&r.detected_rate, 100.0, 1),
+            with(&r.width_ms, 1.0, 1),
+            with(&r.false_alarms_per_s, 1.0, 2)
+        );
+        out += &wrap(
+            "          ",
+            &format!("1/{} of the events: {text}", r.factor),
+        );
+    }
+    out
+}
+
+fn reduction(study: &Reduction) -> String {
+    let within = format!("within {} mm (%)", study.within_mm);
+    let mut out = format!(
+        "{:<10}{:>6} {:>22} {:>9} {:>17} {:>12}\n",
+        "reduction", "1/k", "RMSE (mm)", "pass (%)", within, "located (%)"
+    );
+    for curve in &study.curves {
+        let kind = match curve.thinning {
+            Thinning::Exact => "exact",
+            Thinning::Bernoulli => "Bernoulli",
+        };
+        let shown = curve.rows.iter().filter(|r| FACTORS.contains(&r.factor));
+        for row in shown {
+            out += &reduction_line(kind, row);
+        }
+    }
+    let text = format!(
+        "n {} presses, {} seeds; pass below {} mm, the 95th percentile at 1/1",
+        study.presses,
+        study.seeds,
+        number(study.pass_threshold_mm, 2)
+    );
+    out + &wrap("          ", &text)
+}
+
+fn reduction_line(kind: &str, row: &ReductionRow) -> String {
+    let percent = |e: &Estimate| number(e.value.map(|v| 100.0 * v), 1);
+    format!(
+        "{kind:<10}{:>6} {:>22} {:>9} {:>17} {:>12}\n",
+        row.factor,
+        with(&row.rmse_mm, 1.0, 2),
+        percent(&row.pass_rate),
+        percent(&row.within_rate),
+        percent(&row.located_rate)
+    )
+}
+
+fn reference(r: &ReferenceCode) -> String {
+    let text = format!(
+        "RMSE {} mm (x {}, y {}) in-sample, {} of {} presses inside the square: the public code's way, not comparable \
+         with the numbers above",
+        number(r.rmse_mm, 2),
+        number(r.rmse_x_mm, 2),
+        number(r.rmse_y_mm, 2),
+        r.inside,
+        r.presses
+    );
+    wrap("reference ", &text)
+}
