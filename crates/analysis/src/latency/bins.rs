@@ -3,10 +3,6 @@
 use crate::kept::{KeptEvent, KeptView};
 use crate::result::ClockFit;
 
-/// Share of a bin by which a window may fall short of a whole bin and still hold it: 0.6 s are 3000 bins of 0.2 ms
-/// whatever the binary fractions say.
-const ROUNDING: f64 = 1e-6;
-
 /// Consecutive bins; bin 0 begins at the contact, so that no bin mixes what was before it with what was after.
 ///
 /// A bin includes its start and excludes its end. (numpy's histogram closes the last bin; here an event at the end of
@@ -23,8 +19,8 @@ impl Grid {
     /// The whole bins of `bin_us` between two host times after the contact, µs.
     #[must_use]
     pub fn within(from_us: f64, to_us: f64, bin_us: f64) -> Self {
-        let first = (from_us / bin_us - ROUNDING).ceil() as i64;
-        let end = (to_us / bin_us + ROUNDING).floor() as i64;
+        let first = (from_us / bin_us).ceil() as i64;
+        let end = (to_us / bin_us).floor() as i64;
         Self {
             first,
             len: (end - first).max(0) as usize,
