@@ -41,7 +41,7 @@ pub fn calibrated(
     let settings = &input.settings;
     let nominal = &input.rig.nominal;
     let set = CalibrationSet::from_presses(presses);
-    let mut chosen = Chosen::for_set(&set, nominal, settings);
+    let mut chosen = choose(&set, nominal, settings);
     let threshold = match (settings.cluster_threshold, &chosen.errors_mm) {
         (ThresholdRule::Calibrated, Some(errors)) => {
             threshold::choose(set.sights(), errors, settings.min_cluster_events)
@@ -52,7 +52,7 @@ pub fn calibrated(
         leave_out(presses, choice.events);
         if choice.left_out > 0 {
             let kept = CalibrationSet::from_presses(presses);
-            chosen = Chosen::for_set(&kept, nominal, settings);
+            chosen = choose(&kept, nominal, settings);
         }
     }
     warnings.append(&mut chosen.warnings);
@@ -80,12 +80,27 @@ fn leave_out(presses: &mut [PressResult], threshold: u32) {
 }
 
 /// A calibration and the errors of its presses at a geometry that has not seen them.
-struct Chosen {
-    geometry: StereoGeometry,
-    calibration: Option<CalibrationResult>,
-    /// In the order of the presses; `None` when there are none, or too few locations for cross-validation.
-    errors_mm: Option<Vec<f64>>,
-    warnings: Vec<String>,
+#[derive(Debug, Clone, PartialEq)]
+pub struct Chosen {
+    /// The geometry; the nominal one where no calibration was possible.
+    pub geometry: StereoGeometry,
+    /// How it was found.
+    pub calibration: Option<CalibrationResult>,
+    /// In the order of the presses, mm; `None` when there are none, or too few locations for cross-validation.
+    pub errors_mm: Option<Vec<f64>>,
+    /// What a reader must know.
+    pub warnings: Vec<String>,
+}
+
+/// Fits the nested models to the set, compares them by leave-locations-out cross-validation and takes the one that
+/// `settings.calibration` names; of `Auto` the smallest within one standard error of the best.
+#[must_use]
+pub fn choose(
+    set: &CalibrationSet,
+    nominal: &StereoGeometry,
+    settings: &AnalysisSettings,
+) -> Chosen {
+    Chosen::for_set(set, nominal, settings)
 }
 
 impl Chosen {
@@ -122,7 +137,8 @@ impl Chosen {
         let places = different_places(sights);
         let largest = affordable(places, wanted);
         let mut warnings = Vec::new();
-        if largest != wanted && wanted != CalibrationModel::Auto {
+        let named = wanted != CalibrationModel::Auto;
+        if named && largest != wanted && largest != CalibrationModel::None {
             warnings.push(format!(
                 "the calibrating presses touch too few places for the calibration `{}`: `{}` is used",
                 model_name(wanted),
@@ -131,31 +147,27 @@ impl Chosen {
         }
         let contenders = contenders(sights, &start, places, settings);
         let choice = choice(sights, &contenders);
-        let index = if wanted == CalibrationModel::Auto {
-            choice.or_else(|| {
-                let best = contenders.iter().rposition(Contender::is_determined);
-                let name = best.map_or("none", |i| model_name(contenders[i].model));
+        let index = match wanted {
+            CalibrationModel::Auto => choice.or_else(|| {
+                let best = contenders.iter().rposition(Contender::is_determined)?;
                 warnings.push(format!(
-                    "too few calibrating places ({places}) to compare calibrations by cross-validation: `{name}`, the \
-                     largest that they determine, is used"
+                    "too few calibrating places ({places}) to compare calibrations by cross-validation: `{}`, the \
+                     largest that they determine, is used",
+                    model_name(contenders[best].model)
                 ));
-                best
-            })
-        } else {
-            contenders
-                .iter()
-                .position(|c| c.model == largest && c.fit.is_some())
+                Some(best)
+            }),
+            _ => contenders.iter().position(|c| c.model == largest),
         };
-        let Some(used) = index.map(|i| &contenders[i]) else {
-            if largest != CalibrationModel::None {
-                warnings.push(
-                    "the calibration found no plausible geometry: the nominal one is used"
-                        .to_owned(),
-                );
-            }
-            return Self::nominal(*nominal, warnings);
-        };
-        let Some(fit) = &used.fit else {
+        let used = index.map(|i| &contenders[i]);
+        let Some((used, fit)) = used.and_then(|c| Some((c, c.fit.as_ref()?))) else {
+            warnings.push(if largest == CalibrationModel::None {
+                format!(
+                    "{places} calibrating places are too few for any calibration: the nominal camera geometry is used"
+                )
+            } else {
+                "the calibration found no plausible geometry: the nominal one is used".to_owned()
+            });
             return Self::nominal(*nominal, warnings);
         };
         if let Some(better) = choice.map(|i| &contenders[i]) {
@@ -308,8 +320,8 @@ fn concerns(result: &CalibrationResult, sights: &[Sight]) -> Vec<String> {
     let count = result.names.len();
     if (result.rank as usize) < count {
         out.push(format!(
-            "the calibrating presses determine {} of the {count} parameters of the calibration `{}`: what they leave \
-             open ({}) stays where the nominal geometry has it; calibrate at more places, spread over the skin",
+            "the calibrating presses determine {} of the {count} parameters of the calibration `{}`: the values of {} \
+             are one choice of many that fit equally well; calibrate at more places, spread over the skin",
             result.rank,
             model_name(result.model),
             open.join(", ")

@@ -6,7 +6,7 @@ use skinrig_model::StereoGeometry;
 use super::parameters::{Parameters, is_plausible, parameters_of, with_parameters};
 use super::problem::Problem;
 use super::solver::minimise;
-use super::{COARSE_BOUND_MM, best, error_lengths};
+use super::{best, error_lengths};
 use crate::seeded;
 use crate::sets::Sight;
 
@@ -90,13 +90,11 @@ fn fitted(
     if 2 * sights.len() < count {
         return None;
     }
-    let problem = Problem {
-        sights,
-        base: start,
-        count,
-        bound_mm: COARSE_BOUND_MM,
-    };
-    let ends = [*full, parameters_of(start)].map(|from| minimise(&problem, from));
+    let problem = Problem::coarse(sights, start, count);
+    let ends = [
+        minimise(&problem, *full),
+        problem.descend(parameters_of(start)),
+    ];
     let coarse = best(&ends, start)?;
     let problem = problem.with_fine_bound(&coarse.parameters);
     let fine = minimise(&problem, coarse.parameters).parameters;
@@ -177,13 +175,8 @@ mod tests {
         let mut sights = sights();
         let folds = Folds::deal(&sights, 3);
         let errors = |sights: &[Sight]| {
-            let problem = Problem {
-                sights,
-                base: &start,
-                count: 8,
-                bound_mm: COARSE_BOUND_MM,
-            };
-            let full = minimise(&problem, parameters_of(&start)).parameters;
+            let problem = Problem::coarse(sights, &start, 8);
+            let full = problem.descend(parameters_of(&start)).parameters;
             let geometry = |fold: usize| {
                 let kept: Vec<Sight> = (0..sights.len())
                     .filter(|i| folds.of_sight[*i] != fold)

@@ -5,7 +5,7 @@
 //! press with two centroids takes part to the end: one far outside the skin pulls no more than c, one whose rays
 //! meet behind a camera or not at all counts c. c is 25 mm (a quarter of the skin) while the starts compete, then
 //! ten robust standard deviations of the best solution's errors, so that the last fit is ordinary least squares
-//! for all but outliers.
+//! for all but outliers. Each start first goes downhill on a smooth stand-in for the error (`problem`).
 //!
 //! [`calibrate`] fits one model; `choose` fits the nested ones, compares them by `crossval` and takes the
 //! smallest that does; `threshold` finds how many cluster events a press needs to be worth its place.
@@ -25,11 +25,12 @@ use crate::result::CalibrationResult;
 use crate::seeded;
 use crate::sets::{CalibrationSet, Sight};
 pub(crate) use choose::{Calibrated, calibrated};
+pub use choose::{Chosen, choose};
 use parameters::{
     MODELS, NAMES, PARAMETERS, Parameters, SPREAD, is_plausible, parameters_of, with_parameters,
 };
 pub use parameters::{model_name, parameter_count};
-use problem::{Eyes, Problem};
+use problem::{Eyes, Measure, Problem};
 use solver::{Descent, minimise};
 
 /// Bound on an error vector while the starts compete, mm: a quarter of the skin's side.
@@ -40,7 +41,7 @@ const FINE_BOUND_SIGMAS: f64 = 10.0;
 const LEAST_BOUND_MM: f64 = 1.0;
 /// Median of the length of a standard normal 2-vector, `sqrt(2 ln 2)`.
 const RAYLEIGH_MEDIAN: f64 = 1.177_410_022_515_474_7;
-/// Starts: the nominal geometry and perturbed ones.
+/// Starts: the nominal geometry, the same grown model by model, and perturbed ones.
 const STARTS: u32 = 10;
 /// Starts whose RMSE differs by no more than this ended in the same optimum, mm.
 const SAME_OPTIMUM_MM: f64 = 1e-6;
@@ -84,7 +85,8 @@ fn different_places(sights: &[Sight]) -> usize {
 ///
 /// `None` when the model has no parameters, there are fewer residuals than parameters, or no start led to a plausible
 /// geometry (positions within 60 mm of the start, |skew| < 45 degrees, lenses monotone). When the data do not
-/// determine all parameters - `rank` says so - what they leave open stays where it started.
+/// determine all parameters, `rank` says so and the solution is one of many: the one that the unperturbed start slides
+/// into.
 #[must_use]
 pub fn calibrate(
     set: &CalibrationSet,
@@ -114,16 +116,14 @@ impl Fit {
         if count == 0 || 2 * sights.len() < count {
             return None;
         }
-        let problem = Problem {
-            sights,
-            base: start,
-            count,
-            bound_mm: COARSE_BOUND_MM,
-        };
+        let problem = Problem::coarse(sights, start, count);
         let base = parameters_of(start);
         let ends: Vec<Descent> = (0..STARTS)
             .into_par_iter()
-            .map(|attempt| minimise(&problem, perturbed(base, count, attempt, seed)))
+            .map(|attempt| match attempt {
+                1 => problem.grown(base),
+                _ => problem.descend(perturbed(base, count, attempt, seed)),
+            })
             .collect();
         let coarse = best(&ends, start)?;
         let rmse = |d: &Descent| (d.cost / sights.len() as f64).sqrt();
@@ -133,7 +133,7 @@ impl Fit {
         let starts_agreeing = agreeing.count() as u32;
         let mut fit = Self::finish(&problem, coarse, model);
         if (fit.result.rank as usize) < count && is_plausible(start, &ends[0].parameters) {
-            // Many solutions are equally good: the one that the unperturbed start slides into.
+            // Many solutions are equally good: take the one nearest to the start, the same from every seed.
             fit = Self::finish(&problem, &ends[0], model);
         }
         fit.result.starts_agreeing = starts_agreeing;
@@ -208,6 +208,37 @@ fn perturbed(base: Parameters, count: usize, attempt: u32, seed: u64) -> Paramet
 }
 
 impl<'a> Problem<'a> {
+    /// The problem while the starts compete.
+    fn coarse(sights: &'a [Sight], base: &'a StereoGeometry, count: usize) -> Self {
+        Problem {
+            sights,
+            base,
+            count,
+            measure: Measure::Error,
+            bound_mm: COARSE_BOUND_MM,
+        }
+    }
+
+    /// Downhill from anywhere: first along the arcs, then along the errors.
+    fn descend(&self, from: Parameters) -> Descent {
+        let smooth = Problem {
+            measure: Measure::Arc,
+            ..*self
+        };
+        minimise(self, minimise(&smooth, from).parameters)
+    }
+
+    /// Downhill with the smallest model, from its end with the next, up to this one: no model ends above a smaller one.
+    fn grown(&self, from: Parameters) -> Descent {
+        let of = |count: usize| Problem { count, ..*self };
+        let counts = MODELS.map(parameter_count).into_iter();
+        let mut end = of(parameter_count(MODELS[0])).descend(from);
+        for count in counts.skip(1).take_while(|c| *c <= self.count) {
+            end = minimise(&of(count), end.parameters);
+        }
+        end
+    }
+
     /// The same with the bound of the last fit, from the errors at `parameters`.
     fn with_fine_bound(&self, parameters: &Parameters) -> Problem<'a> {
         let mut lengths = error_lengths(self.sights, &with_parameters(self.base, parameters));

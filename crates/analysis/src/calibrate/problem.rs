@@ -1,4 +1,9 @@
-//! The least-squares problem: bounded error vectors of the calibrating presses and their analytic derivatives.
+//! The least-squares problem: bounded residuals of the calibrating presses and their analytic derivatives.
+//!
+//! There are two measures of how well a geometry places a press. What counts is the [error](Measure::Error), estimate
+//! minus truth. It is hard to follow from afar: it has poles where rays are parallel and jumps where they meet at a
+//! camera. The [arc](Measure::Arc) from ray to truth is smooth everywhere, and each camera's concerns that camera alone:
+//! it leads from any start into the valley whose bottom the error then finds.
 
 use nalgebra::{DMatrix, DVector, SMatrix};
 use skinrig_model::{CameraModel, LensAngle, SENSOR_WIDTH, StereoGeometry};
@@ -110,6 +115,39 @@ impl Eyes {
         }
         Some((error, slope))
     }
+
+    /// For each camera the arc from its ray to the truth, counter-clockwise, mm, and its derivative by all parameters.
+    ///
+    /// With v = truth - p the arc is `|v| (angle of v - phi)`, phi as above.
+    fn arcs(&self, sight: &Sight) -> ([f64; 2], [[f64; PARAMETERS]; 2]) {
+        let mut arcs = [0.0; 2];
+        let mut slope = [[0.0; PARAMETERS]; 2];
+        for (k, eye) in self.0.iter().enumerate() {
+            let (angle, d) = eye.ray(sight.columns[k]);
+            let p = eye.camera.position;
+            let v = [sight.truth.x_mm - p.x_mm, sight.truth.y_mm - p.y_mm];
+            let range = libm::hypot(v[0], v[1]);
+            let turn = libm::atan2(d[0] * v[1] - d[1] * v[0], d[0] * v[0] + d[1] * v[1]);
+            arcs[k] = range * turn;
+            let per_degree = range * 1f64.to_radians();
+            let by = &mut slope[k];
+            by[2 * k] = v[1] / range - range * eye.axis_turn[0] - turn * v[0] / range;
+            by[2 * k + 1] = -v[0] / range - range * eye.axis_turn[1] - turn * v[1] / range;
+            by[4 + k] = per_degree;
+            by[6 + k] = per_degree * angle.by_w;
+            by[8 + k] = per_degree * angle.by_half_fov * eye.half_fov_deg;
+        }
+        (arcs, slope)
+    }
+}
+
+/// What the two residuals of a press are, mm.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Measure {
+    /// Estimate minus truth, x and y; the bound is on the length of the vector.
+    Error,
+    /// Arc about camera 1 and camera 2 from the ray to the truth; each is bounded.
+    Arc,
 }
 
 /// Sum of squared residuals, half of its gradient `Jᵀr`, and the normal matrix `JᵀJ`.
@@ -119,13 +157,14 @@ pub struct Normal {
     pub matrix: SMatrix<f64, PARAMETERS, PARAMETERS>,
 }
 
-/// Bounded error vectors of presses as functions of the first `count` parameters.
+/// Bounded residuals of presses as functions of the first `count` parameters.
 #[derive(Clone, Copy)]
 pub struct Problem<'a> {
     pub sights: &'a [Sight],
     pub base: &'a StereoGeometry,
     pub count: usize,
-    /// What an error vector can count at most, mm.
+    pub measure: Measure,
+    /// What an error vector, or an arc, can count at most, mm.
     pub bound_mm: f64,
 }
 
@@ -173,8 +212,31 @@ impl Problem<'_> {
         (residuals, jacobian)
     }
 
-    /// `e / sqrt(1 + (e / c)²)` and its slope. A press without a fix counts c and has no slope to follow.
     fn bounded(&self, eyes: &Eyes, sight: &Sight) -> ([f64; 2], [[f64; PARAMETERS]; 2]) {
+        match self.measure {
+            Measure::Error => self.bounded_error(eyes, sight),
+            Measure::Arc => self.bounded_arcs(eyes, sight),
+        }
+    }
+
+    /// `r / sqrt(1 + (r / c)²)` of each arc, and its slope.
+    fn bounded_arcs(&self, eyes: &Eyes, sight: &Sight) -> ([f64; 2], [[f64; PARAMETERS]; 2]) {
+        let (mut arcs, mut slope) = eyes.arcs(sight);
+        for (r, by) in arcs.iter_mut().zip(&mut slope) {
+            let ratio = *r / self.bound_mm;
+            let shrink = 1.0 / (1.0 + ratio * ratio).sqrt();
+            *r *= shrink;
+            let factor = shrink * shrink * shrink;
+            by.iter_mut().for_each(|b| *b *= factor);
+            if !r.is_finite() || !by.iter().all(|b| b.is_finite()) {
+                (*r, *by) = (self.bound_mm, [0.0; PARAMETERS]);
+            }
+        }
+        (arcs, slope)
+    }
+
+    /// `e / sqrt(1 + (e / c)²)` and its slope. A press without a fix counts c and has no slope to follow.
+    fn bounded_error(&self, eyes: &Eyes, sight: &Sight) -> ([f64; 2], [[f64; PARAMETERS]; 2]) {
         let flat = [[0.0; PARAMETERS]; 2];
         let c = self.bound_mm;
         let Some((e, mut slope)) = eyes.linearised(sight) else {
@@ -236,26 +298,29 @@ mod tests {
         ] {
             let base = lens(kind);
             let p = parameters_of(&base);
-            let problem = Problem {
-                sights: &sights,
-                base: &base,
-                count: PARAMETERS,
-                bound_mm: 25.0,
-            };
-            let (_, jacobian) = problem.rows(&p);
-            for k in 0..PARAMETERS {
-                let h = 1e-6;
-                let at = |delta: f64| {
-                    let mut q = p;
-                    q[k] += delta;
-                    problem.rows(&q).0
+            for measure in [Measure::Error, Measure::Arc] {
+                let problem = Problem {
+                    sights: &sights,
+                    base: &base,
+                    count: PARAMETERS,
+                    measure,
+                    bound_mm: 25.0,
                 };
-                let slope = (at(h) - at(-h)) / (2.0 * h);
-                let worst = (slope - jacobian.column(k)).amax();
-                assert!(
-                    worst < 1e-7 * (1.0 + jacobian.column(k).amax()),
-                    "{kind:?}, parameter {k}: {worst}"
-                );
+                let (_, jacobian) = problem.rows(&p);
+                for k in 0..PARAMETERS {
+                    let h = 1e-6;
+                    let at = |delta: f64| {
+                        let mut q = p;
+                        q[k] += delta;
+                        problem.rows(&q).0
+                    };
+                    let slope = (at(h) - at(-h)) / (2.0 * h);
+                    let worst = (slope - jacobian.column(k)).amax();
+                    assert!(
+                        worst < 1e-7 * (1.0 + jacobian.column(k).amax()),
+                        "{kind:?}, {measure:?}, parameter {k}: {worst}"
+                    );
+                }
             }
         }
     }
@@ -269,6 +334,7 @@ mod tests {
                 sights: &sights,
                 base: &base,
                 count,
+                measure: Measure::Error,
                 bound_mm: 25.0,
             };
             let (r, j) = problem.rows(&p);

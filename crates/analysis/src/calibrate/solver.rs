@@ -120,6 +120,7 @@ mod tests {
     use skinrig_model::{Point2, PressId, StereoGeometry};
 
     use super::super::parameters::parameters_of;
+    use super::super::problem::Measure;
     use super::*;
     use crate::seeded;
     use crate::sets::Sight;
@@ -170,11 +171,19 @@ mod tests {
             })
             .collect();
         let base = StereoGeometry::PAPER;
-        for (count, bound_mm) in [(4, 25.0), (6, 5.0), (8, 25.0), (10, 25.0), (10, 5.0)] {
+        let (error, arc) = (Measure::Error, Measure::Arc);
+        for (count, measure, bound_mm) in [
+            (4, error, 25.0),
+            (6, error, 5.0),
+            (8, error, 25.0),
+            (10, error, 25.0),
+            (10, arc, 5.0),
+        ] {
             let problem = Problem {
                 sights: &sights,
                 base: &base,
                 count,
+                measure,
                 bound_mm,
             };
             let start = parameters_of(&base);

@@ -1,0 +1,385 @@
+//! The choice of a calibration on planted geometries with noise: the model, its errors, its seeds, hopeless data.
+
+#![expect(clippy::unwrap_used, reason = "tests")]
+
+use rand_xoshiro::Xoshiro256PlusPlus;
+use rand_xoshiro::rand_core::{Rng, SeedableRng};
+use rayon::prelude::*;
+use skinrig_analysis::calibrate::{Chosen, calibrate, choose};
+use skinrig_analysis::result::{LocationOutcome, PressResult, PressView};
+use skinrig_analysis::sets::CalibrationSet;
+use skinrig_model::{
+    AnalysisSettings, CalibrationModel, LensKind, LensModel, Point2, PressId, PressRole,
+    StereoGeometry,
+};
+
+/// The drawn rig: where calibrations start.
+const DRAWN: StereoGeometry =
+    StereoGeometry::paper_like([45.0, -36.0, 45.0, 40.0, 0.0, 0.0, 0.0, 0.0]);
+
+struct Noise(Xoshiro256PlusPlus);
+
+impl Noise {
+    fn unit(&mut self) -> f64 {
+        (self.0.next_u64() >> 11) as f64 / (1u64 << 53) as f64
+    }
+    /// Standard normal but for the farthest tails.
+    fn normal(&mut self) -> f64 {
+        (0..12).map(|_| self.unit()).sum::<f64>() - 6.0
+    }
+}
+
+fn view(u: f64) -> Option<PressView> {
+    Some(PressView {
+        events: 100,
+        on_events: 50,
+        clusters: 1,
+        cluster_events: 100,
+        centroid_u: Some(u),
+        centroid_v: Some(270.0),
+        rate_per_s: 1e3,
+        idle_rate_per_s: 10.0,
+        idle_s: 0.5,
+    })
+}
+
+/// Presses at these places, `repeats` times, as `geometry` sees them with this noise of the centroids.
+fn presses(
+    geometry: &StereoGeometry,
+    places: &[Point2],
+    repeats: usize,
+    noise_px: f64,
+    seed: u64,
+) -> Vec<PressResult> {
+    let mut noise = Noise(Xoshiro256PlusPlus::seed_from_u64(seed));
+    let mut rows = Vec::new();
+    for _ in 0..repeats {
+        for (location, at) in places.iter().enumerate() {
+            let columns = geometry.cameras.map(|c| c.column_of_point(*at));
+            let [Some(a), Some(b)] = columns else {
+                continue;
+            };
+            let columns = [a, b].map(|u| u + noise_px * noise.normal());
+            rows.push(PressResult {
+                press: PressId(rows.len() as u32),
+                role: PressRole::Calibrate,
+                repetition: 0,
+                location: location as u32,
+                planned: *at,
+                depth_mm: 2.0,
+                truth: Some(*at),
+                verdict: "valid".to_owned(),
+                reason: None,
+                rule: None,
+                timing: None,
+                views: columns.map(view),
+                location_outcome: LocationOutcome::Missing,
+            });
+        }
+    }
+    rows
+}
+
+/// `side` by `side` places over the 64 mm that the published path covers.
+fn grid(side: u32) -> Vec<Point2> {
+    let step = 64.0 / f64::from(side - 1);
+    let at = |i: u32| step * f64::from(i);
+    (0..side * side)
+        .map(|i| Point2::new(-22.0 + at(i / side), -30.0 + at(i % side)))
+        .collect()
+}
+
+fn set(geometry: &StereoGeometry, places: &[Point2], noise_px: f64, seed: u64) -> CalibrationSet {
+    CalibrationSet::from_presses(&presses(geometry, places, 1, noise_px, seed))
+}
+
+fn settings(calibration: CalibrationModel, seed: u64) -> AnalysisSettings {
+    AnalysisSettings {
+        calibration,
+        seed,
+        bootstrap_resamples: 20,
+        ..AnalysisSettings::default()
+    }
+}
+
+fn auto(set: &CalibrationSet, seed: u64) -> Chosen {
+    choose(set, &DRAWN, &settings(CalibrationModel::Auto, seed))
+}
+
+/// How often `Auto` takes each model over 24 seeds of noise (1.5 px, about 0.4 mm).
+fn picks(geometry: &StereoGeometry) -> Vec<CalibrationModel> {
+    let places = grid(9);
+    (0..24u64)
+        .into_par_iter()
+        .map(|seed| {
+            let chosen = auto(&set(geometry, &places, 1.5, seed), seed);
+            assert_eq!(chosen.warnings, Vec::<String>::new());
+            chosen.calibration.unwrap().model
+        })
+        .collect()
+}
+
+fn share(picks: &[CalibrationModel], model: CalibrationModel) -> usize {
+    picks.iter().filter(|p| **p == model).count()
+}
+
+#[test]
+fn auto_takes_what_the_scene_requires_and_no_more() {
+    let moved = [43.0, -33.5, 47.0, 38.0];
+    let planted = |rest: [f64; 4]| {
+        let [x1, y1, x2, y2] = moved;
+        let [s1, s2, w1, w2] = rest;
+        StereoGeometry::paper_like([x1, y1, x2, y2, s1, s2, w1, w2])
+    };
+    let plain = picks(&planted([0.0; 4]));
+    let skewed = picks(&planted([-1.9, -1.5, 0.0, 0.0]));
+    let distorted = picks(&planted([-1.9, -1.5, -0.17, 0.074]));
+    let mut wide = planted([-1.9, -1.5, -0.17, 0.074]);
+    for camera in &mut wide.cameras {
+        camera.lens = camera.lens.with(55.0, camera.lens.coefficients().1);
+    }
+    let wide = picks(&wide);
+    assert!(share(&plain, CalibrationModel::Positions) > 18, "{plain:?}");
+    assert!(
+        share(&skewed, CalibrationModel::PositionsSkews) > 18,
+        "{skewed:?}"
+    );
+    assert!(
+        share(&distorted, CalibrationModel::Full) > 18,
+        "{distorted:?}"
+    );
+    assert!(share(&wide, CalibrationModel::FullScale) > 18, "{wide:?}");
+}
+
+#[test]
+fn intervals_of_two_standard_errors_hold_the_planted_value() {
+    let planted = [43.0, -33.5, 47.0, 38.0, -1.2, 0.4, -0.11, 0.03];
+    let geometry = StereoGeometry::paper_like(planted);
+    let places = grid(9);
+    let inside: Vec<Vec<bool>> = (0..200u64)
+        .into_par_iter()
+        .map(|seed| {
+            let set = set(&geometry, &places, 1.0, 1000 + seed);
+            let (_, result) = calibrate(&set, &DRAWN, CalibrationModel::Full, seed).unwrap();
+            let pairs = result.values.iter().zip(&result.standard_errors);
+            pairs
+                .zip(planted)
+                .map(|((value, error), planted)| (value - planted).abs() <= 1.96 * error.unwrap())
+                .collect()
+        })
+        .collect();
+    // Binomial: 190 of 200 expected, standard deviation 3.1.
+    for p in 0..8 {
+        let held = inside.iter().filter(|row| row[p]).count();
+        assert!((178..=199).contains(&held), "parameter {p}: {held} of 200");
+    }
+}
+
+#[test]
+fn every_seed_and_every_number_of_threads_finds_the_same_optimum() {
+    let geometry = StereoGeometry::paper_like([
+        42.51, -33.337, 41.947, 36.103, -2.388, 0.302, -0.1138, 0.0168,
+    ]);
+    let mut rows = presses(&geometry, &grid(16), 1, 8.0, 4);
+    for i in (0..rows.len()).step_by(20) {
+        rows[i].views[0] = view((i as f64 * 37.0) % 640.0);
+    }
+    let set = CalibrationSet::from_presses(&rows);
+    assert!(set.sights().len() > 240);
+    for model in [
+        CalibrationModel::Positions,
+        CalibrationModel::Full,
+        CalibrationModel::FullScale,
+    ] {
+        let fits: Vec<_> = (0..6)
+            .map(|seed| calibrate(&set, &DRAWN, model, seed).unwrap().1)
+            .collect();
+        for fit in &fits {
+            assert!((fit.rmse_after_mm - fits[0].rmse_after_mm).abs() < 1e-6);
+            assert!(2 * fit.starts_agreeing > fit.starts, "{fit:?}");
+            assert!(
+                fit.termination.starts_with("converged"),
+                "{}",
+                fit.termination
+            );
+            for (a, b) in fit.values.iter().zip(&fits[0].values) {
+                assert!((a - b).abs() < 1e-5 * (1.0 + b.abs()), "{:?}", fit.values);
+            }
+        }
+    }
+    let in_pool = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .unwrap();
+        pool.install(|| auto(&set, 1))
+    };
+    let one = in_pool(1);
+    assert_eq!(one, in_pool(2));
+    assert_eq!(one.calibration.unwrap().compared.len(), 4);
+}
+
+#[test]
+fn every_lens_is_found_through_its_own_projection() {
+    use LensKind::{Equidistant, Equisolid, Exponential, Rectilinear, Stereographic};
+    for kind in [
+        Exponential,
+        Equidistant,
+        Rectilinear,
+        Stereographic,
+        Equisolid,
+    ] {
+        let mut planted =
+            StereoGeometry::paper_like([43.0, -33.5, 47.0, 38.0, -1.2, 0.4, 0.0, 0.0]);
+        for (camera, w) in planted.cameras.iter_mut().zip([-0.08, 0.06]) {
+            camera.lens = LensModel::new(kind, 57.0, w);
+        }
+        let set = set(&planted, &grid(9), 0.0, 1);
+        let settings = AnalysisSettings {
+            lens: kind,
+            ..settings(CalibrationModel::FullScale, 1)
+        };
+        let chosen = choose(&set, &DRAWN, &settings);
+        let result = chosen.calibration.unwrap();
+        assert_eq!(result.lens, kind);
+        assert!(result.rmse_after_mm < 1e-7, "{kind:?}: {result:?}");
+        for (found, planted) in chosen.geometry.cameras.iter().zip(&planted.cameras) {
+            assert!(found.position.distance_mm(planted.position) < 1e-4);
+            let (found, planted) = (found.lens.coefficients(), planted.lens.coefficients());
+            assert!((found.0 - planted.0).abs() < 1e-4 && (found.1 - planted.1).abs() < 1e-5);
+        }
+    }
+}
+
+#[test]
+fn a_named_model_is_used_compared_and_called_out() {
+    let geometry = StereoGeometry::PAPER;
+    let set = set(&geometry, &grid(9), 1.0, 1);
+    let named = choose(&set, &DRAWN, &settings(CalibrationModel::Positions, 1));
+    let result = named.calibration.unwrap();
+    assert_eq!(result.model, CalibrationModel::Positions);
+    let chosen: Vec<bool> = result.compared.iter().map(|c| c.chosen).collect();
+    assert_eq!(chosen, [true, false, false, false]);
+    assert!(named.warnings.len() == 1 && named.warnings[0].starts_with(
+        "the calibration `positions` named by the protocol is clearly worse than `full`: cross-validated RMSE "
+    ), "{:?}", named.warnings);
+    let full = choose(&set, &DRAWN, &settings(CalibrationModel::Full, 1));
+    assert_eq!(full.warnings, Vec::<String>::new());
+    // Comparing changes nothing in the fit.
+    let alone = calibrate(&set, &DRAWN, CalibrationModel::Full, 1)
+        .unwrap()
+        .1;
+    let result = full.calibration.unwrap();
+    assert_eq!(result.values, alone.values);
+    for row in &result.compared {
+        let (rmse, fitted) = (row.rmse_mm.value.unwrap(), row.fitted_rmse_mm.unwrap());
+        assert!(row.rmse_mm.low < row.rmse_mm.value && row.rmse_mm.value < row.rmse_mm.high);
+        assert!(
+            fitted < rmse,
+            "held-out presses err more than fitted ones: {row:?}"
+        );
+        assert!(row.standard_error_mm.unwrap() < 0.2 * rmse);
+    }
+    let none = choose(&set, &DRAWN, &settings(CalibrationModel::None, 1));
+    assert_eq!((none.geometry, none.calibration), (DRAWN, None));
+}
+
+#[test]
+fn too_few_places_take_the_largest_model_they_bear_and_say_so() {
+    let geometry = StereoGeometry::paper_like([43.0, -33.5, 47.0, 38.0, 0.0, 0.0, 0.0, 0.0]);
+    let places: Vec<Point2> = grid(3);
+    let of = |n: usize| {
+        let rows = presses(&geometry, &places[..n], 3, 0.3, 1);
+        auto(&CalibrationSet::from_presses(&rows), 1)
+    };
+    let four = of(4);
+    let result = four.calibration.unwrap();
+    assert_eq!(
+        (result.model, result.compared.len()),
+        (CalibrationModel::Positions, 0)
+    );
+    assert!(
+        four.warnings[0].contains("too few calibrating places (4)"),
+        "{:?}",
+        four.warnings
+    );
+    assert_eq!(four.errors_mm, None);
+    let nine = of(9);
+    let result = nine.calibration.unwrap();
+    let values: Vec<bool> = result
+        .compared
+        .iter()
+        .map(|c| c.rmse_mm.value.is_some())
+        .collect();
+    assert_eq!(values, [true, true, true, false]);
+    assert_eq!(nine.warnings, Vec::<String>::new());
+    let two = of(2);
+    assert_eq!((two.geometry, two.calibration), (DRAWN, None));
+    assert_eq!(
+        two.warnings,
+        [
+            "2 calibrating places are too few for any calibration: the nominal camera geometry is used"
+        ]
+    );
+}
+
+/// Places on one ray of camera 1: it sees all of them in the same column.
+#[test]
+fn what_the_data_leave_open_is_reported() {
+    let geometry = StereoGeometry::paper_like([45.0, -36.0, 45.0, 40.0, 0.5, 0.0, 0.0, 0.0]);
+    let camera = geometry.cameras[0];
+    let [dx, dy] = camera.direction(camera.angle_of_column_deg(330.0));
+    let places: Vec<Point2> = (0..12)
+        .map(|i| 25.0 + 4.0 * f64::from(i))
+        .map(|r| Point2::new(camera.position.x_mm + r * dx, camera.position.y_mm + r * dy))
+        .collect();
+    let on_one_ray = set(&geometry, &places, 0.0, 3);
+    let chosen = choose(&on_one_ray, &DRAWN, &settings(CalibrationModel::Full, 1));
+    let result = chosen.calibration.unwrap();
+    // Of camera 1 the places tell the ray and nothing else: two of its four parameters.
+    assert_eq!((result.rank, result.condition), (6, None));
+    let known: Vec<bool> = result.standard_errors.iter().map(Option::is_some).collect();
+    assert_eq!(known, [false, false, true, true, false, true, false, true]);
+    assert!(result.correlation[0].iter().all(Option::is_none));
+    assert!(
+        chosen.warnings[0].starts_with(
+            "the calibrating presses determine 6 of the 8 parameters of the calibration `full`"
+        ),
+        "{:?}",
+        chosen.warnings
+    );
+    // Left to itself, the choice takes a model that they do determine.
+    let result = auto(&on_one_ray, 1).calibration.unwrap();
+    assert_eq!(
+        (result.model, result.rank),
+        (CalibrationModel::Positions, 4)
+    );
+}
+
+#[test]
+fn hopeless_data_end_in_a_warning() {
+    let planted = StereoGeometry::paper_like([43.0, -33.5, 47.0, 38.0, -1.2, 0.4, -0.11, 0.03]);
+    let rows = presses(&planted, &grid(9), 1, 1.0, 1);
+    let broken = |change: fn(&mut PressResult)| {
+        let mut rows = rows.clone();
+        rows.iter_mut().for_each(change);
+        let chosen = auto(&CalibrationSet::from_presses(&rows), 1);
+        assert!(!chosen.warnings.is_empty());
+        chosen
+    };
+    broken(|p| p.views.swap(0, 1));
+    broken(|p| p.truth = p.truth.map(|t| Point2::new(t.x_mm * 1e-3, t.y_mm * 1e-3)));
+    broken(|p| p.truth = p.truth.map(|t| Point2::new(t.x_mm + 1e6, t.y_mm)));
+    broken(|p| p.truth = p.truth.map(|t| Point2::new(t.x_mm * 1e200, t.y_mm)));
+    broken(|p| p.truth = Some(Point2::new(10.0, 2.0)));
+    broken(|p| p.views = [view(320.0), view(320.0)]);
+    let nothing = broken(|p| p.truth = Some(Point2::new(f64::NAN, 0.0)));
+    assert_eq!((nothing.geometry, nothing.calibration), (DRAWN, None));
+    // The columns of other presses.
+    let mut shuffled = rows.clone();
+    for (i, row) in shuffled.iter_mut().enumerate() {
+        row.views = rows[(i * 37 + 11) % rows.len()].views;
+    }
+    let chosen = auto(&CalibrationSet::from_presses(&shuffled), 1);
+    assert!(!chosen.warnings.is_empty());
+}
