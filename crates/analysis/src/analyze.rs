@@ -1,24 +1,24 @@
 //! The analysis as a whole: from a session's values and events to one [`Analysis`].
 
-use skinrig_model::{CameraId, PressRole, PressTiming, PressVerdict};
+use skinrig_model::{CameraId, PressTiming};
 
 use crate::accumulate::{Accumulated, Accumulator, SLACK_US, Wanted, rate_bin_us};
-use crate::calibrate::{Calibrated, calibrated};
+use crate::calibrate::Calibrated;
 use crate::clock::{PressSpan, SUSPICIOUS_DRIFT_PPM, fit_marks, fit_rates};
 use crate::closeups::{Closeups, keep_plans, zoom_plans};
 use crate::error::AnalysisError;
 use crate::input::{EventSource, SessionInput};
+use crate::judge::{Judged, Seen, judge};
 use crate::keeper::KeepPlan;
 use crate::kept::{Keep, Kept, KeptPress};
 use crate::metrics::{Exclusions, metrics, penalised};
 use crate::rates::RateHistogram;
 use crate::result::{
-    ANALYSIS_VERSION, Activity, Analysis, ClockFit, ContactTiming, DepthResult, LocationOutcome,
-    PressPicture, PressResult, PressView, RateSeries, RateZoom,
+    ANALYSIS_VERSION, Activity, Analysis, ClockFit, ContactTiming, DepthResult, PressPicture,
+    PressResult, PressView, RateSeries, RateZoom,
 };
 use crate::segment::{Window, windows};
 use crate::sets::ScoreSet;
-use crate::triangulate::locate;
 use crate::{audit, bit_rates, check, cmre, coverage, latency, reduction, verdict};
 
 /// Analyses a session: one pass over each camera's events when its clock can be fitted from trigger marks, two
@@ -58,22 +58,15 @@ pub fn analyze_and_keep(
     });
     let cameras = [one?, two?];
     let mut warnings: Vec<String> = Vec::new();
-    let mut presses = rows(input, &cameras);
-    let Calibrated {
-        geometry,
-        calibration,
-        threshold,
-    } = calibrated(input, &mut presses, &mut warnings);
-    for row in &mut presses {
-        let column = |k: usize| row.views[k].and_then(|v| v.centroid_u);
-        row.location_outcome = locate(&geometry, &input.rig.outline, [column(0), column(1)]);
-        let judged = row.role != PressRole::Sync && row.verdict == PressVerdict::Valid.name();
-        if judged
-            && let Some(judgement) = verdict::location_rule(&row.location_outcome, &input.settings)
-        {
-            verdict::put(row, judgement);
-        }
-    }
+    let Judged {
+        presses,
+        calibrated:
+            Calibrated {
+                geometry,
+                calibration,
+                threshold,
+            },
+    } = judge(input, [cameras[0].seen(), cameras[1].seen()], &mut warnings);
     let scores = ScoreSet::from_presses(&presses, &input.outcomes);
     let measure = |set: &ScoreSet, exclusions| {
         metrics(
@@ -194,6 +187,16 @@ struct CameraResult {
     warnings: Vec<String>,
 }
 
+impl CameraResult {
+    fn seen(&self) -> Seen<'_> {
+        Seen {
+            has_clock: self.clock.is_some(),
+            views: &self.views,
+            data_lost: &self.data_lost,
+        }
+    }
+}
+
 /// The views of both cameras, press by press; a press that one camera lacks is left out.
 fn paired(presses: &[PressResult], plan: &Closeups, [one, two]: [Vec<KeepPlan>; 2]) -> Kept {
     let mut one: Vec<KeepPlan> = one;
@@ -219,7 +222,7 @@ fn paired(presses: &[PressResult], plan: &Closeups, [one, two]: [Vec<KeepPlan>; 
     }
 }
 
-fn timings(input: &SessionInput) -> impl Iterator<Item = (usize, PressTiming)> {
+pub(crate) fn timings(input: &SessionInput) -> impl Iterator<Item = (usize, PressTiming)> {
     let rows = input.outcomes.iter().enumerate();
     rows.filter_map(|(row, o)| Some((row, o.as_ref()?.timing?)))
 }
@@ -372,7 +375,7 @@ fn spans(input: &SessionInput) -> Vec<PressSpan> {
     spans
 }
 
-fn by_row(rows: usize, views: Vec<(usize, PressView)>) -> Vec<Option<PressView>> {
+pub(crate) fn by_row(rows: usize, views: Vec<(usize, PressView)>) -> Vec<Option<PressView>> {
     let mut out = vec![None; rows];
     for (row, view) in views {
         out[row] = Some(view);
@@ -380,49 +383,10 @@ fn by_row(rows: usize, views: Vec<(usize, PressView)>) -> Vec<Option<PressView>>
     out
 }
 
-fn lost_rows(rows: usize, windows: &[Window], gaps: &[(u64, u64)]) -> Vec<bool> {
+pub(crate) fn lost_rows(rows: usize, windows: &[Window], gaps: &[(u64, u64)]) -> Vec<bool> {
     let mut out = vec![false; rows];
     for window in windows.iter().filter(|w| w.overlaps(gaps)) {
         out[window.row] = true;
     }
     out
-}
-
-fn rows(input: &SessionInput, cameras: &[CameraResult; 2]) -> Vec<PressResult> {
-    let has_clock = [0, 1].map(|k| cameras[k].clock.is_some());
-    let pairs = input.planned.iter().zip(&input.outcomes).enumerate();
-    pairs
-        .map(|(i, (planned, outcome))| {
-            let views = [0, 1].map(|k| cameras[k].views[i]);
-            let data_lost = [0, 1].map(|k| cameras[k].data_lost[i]);
-            let mut judgement = verdict::from_data(
-                planned.role,
-                outcome.as_ref(),
-                has_clock,
-                data_lost,
-                &views,
-                &input.settings,
-            );
-            if input.settings.exclude_presses.contains(&planned.id.0) {
-                judgement = judgement.or_by_hand();
-            }
-            let mut row = PressResult {
-                press: planned.id,
-                role: planned.role,
-                repetition: planned.repetition,
-                location: planned.location,
-                planned: planned.at,
-                depth_mm: planned.depth_mm,
-                truth: outcome.as_ref().and_then(|o| o.measured_at),
-                verdict: String::new(),
-                reason: None,
-                rule: None,
-                timing: outcome.as_ref().and_then(|o| o.timing),
-                views,
-                location_outcome: LocationOutcome::Missing,
-            };
-            verdict::put(&mut row, judgement);
-            row
-        })
-        .collect()
 }

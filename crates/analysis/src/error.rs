@@ -77,4 +77,9 @@ pub enum AnalysisError {
         /// Row of the press in the plan.
         row: usize,
     },
+    /// No press can be located in any way.
+    #[error(
+        "expected scored presses with measured times in the clocks of both cameras, found none; `skinrig analyze` says what is missing"
+    )]
+    NothingToCompare,
 }

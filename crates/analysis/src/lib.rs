@@ -25,6 +25,7 @@ pub mod estimators;
 pub mod grid;
 mod hash;
 pub mod input;
+mod judge;
 mod keeper;
 pub mod kept;
 pub mod latency;
@@ -37,6 +38,7 @@ pub mod result;
 mod seeded;
 pub mod segment;
 pub mod sets;
+pub mod tradeoff;
 pub mod triangulate;
 mod verdict;
 

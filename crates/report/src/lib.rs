@@ -18,6 +18,7 @@ pub mod page;
 pub mod provenance;
 pub mod published;
 pub mod svg;
+pub mod tradeoff;
 
 mod document;
 mod format;

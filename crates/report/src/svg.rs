@@ -123,6 +123,12 @@ impl Svg {
         self
     }
 
+    /// Markup that is written already, by this builder or by hand.
+    pub(crate) fn raw(&mut self, markup: &str) -> &mut Self {
+        self.out.push_str(markup);
+        self
+    }
+
     /// Text at (x, y), anchored `start`, `middle` or `end`.
     pub fn text(&mut self, at: (f64, f64), class: &str, anchor: &str, text: &str) -> &mut Self {
         self.holding(

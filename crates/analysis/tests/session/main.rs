@@ -3,6 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 mod support;
+mod tradeoff;
 
 use proptest::prelude::*;
 use skinrig_analysis::result::LocationOutcome;

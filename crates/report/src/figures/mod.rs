@@ -16,6 +16,7 @@ mod reduction;
 mod residuals;
 mod skin;
 mod threshold;
+pub(crate) mod tradeoff;
 
 pub use activity::activity;
 pub use centroids::centroid_tracks;

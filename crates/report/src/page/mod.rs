@@ -81,7 +81,7 @@ const TEMPLATES: [(&str, &str); 14] = [
         include_str!("../../assets/sections/presses.html"),
     ),
 ];
-const PAGE_CSS: &str = include_str!("../../assets/page.css");
+pub(crate) const PAGE_CSS: &str = include_str!("../../assets/page.css");
 const SCRIPT: &str = include_str!("../../assets/report.js");
 
 /// JSON that may stand inside `<script>`: `<`, `>`, `&` and the line separators of JavaScript are written as

@@ -1,0 +1,108 @@
+//! Which rows are worth having, and which one to take.
+
+use serde::{Deserialize, Serialize};
+
+use super::{Row, Tradeoff};
+
+/// What accuracy is traded for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Cost {
+    /// CPU time per press.
+    Cpu,
+    /// Bytes per second.
+    Bytes,
+    /// Time from the contact to the estimate.
+    Delay,
+}
+
+impl Cost {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Cpu, Self::Bytes, Self::Delay];
+
+    /// What a row costs.
+    #[must_use]
+    pub const fn of(self, row: &Row) -> f64 {
+        match self {
+            Self::Cpu => row.cpu_us,
+            Self::Bytes => row.bytes_per_s,
+            Self::Delay => row.delay_ms,
+        }
+    }
+}
+
+/// For points (error, cost), true for those that no other one dominates: none is as good in both and better in one.
+/// `None` competes with nobody.
+#[must_use]
+pub fn pareto(points: &[Option<(f64, f64)>]) -> Vec<bool> {
+    let mut order: Vec<(usize, f64, f64)> = points
+        .iter()
+        .enumerate()
+        .filter_map(|(i, p)| p.map(|(error, cost)| (i, error, cost)))
+        .collect();
+    order.sort_by(|a, b| a.2.total_cmp(&b.2).then(a.1.total_cmp(&b.1)));
+    let mut out = vec![false; points.len()];
+    let mut best: Option<(f64, f64)> = None;
+    for (i, error, cost) in order {
+        // Equal to the last one on the front in both: neither dominates the other.
+        if best.is_none_or(|(e, c)| error < e || (error == e && cost == c)) {
+            out[i] = true;
+            best = Some((error, cost));
+        }
+    }
+    out
+}
+
+/// Marks what competes and what is on each front.
+pub(super) fn mark(result: &mut Tradeoff) {
+    for row in &mut result.rows {
+        let located = row.located_rate.value.unwrap_or(0.0);
+        row.competes = row.rmse_mm.value.is_some() && located >= result.least_located;
+    }
+    for cost in Cost::ALL {
+        let points: Vec<Option<(f64, f64)>> = result
+            .rows
+            .iter()
+            .map(|r| {
+                r.rmse_mm
+                    .value
+                    .filter(|_| r.competes)
+                    .map(|e| (e, cost.of(r)))
+            })
+            .collect();
+        for (row, on) in result.rows.iter_mut().zip(pareto(&points)) {
+            if on {
+                row.fronts.push(cost);
+            }
+        }
+    }
+}
+
+impl Tradeoff {
+    /// The cheapest row that competes and the upper end of whose 95 % interval of the RMSE is at most `target_mm`; of
+    /// equally cheap ones the most accurate.
+    #[must_use]
+    pub fn cheapest(&self, target_mm: f64, cost: Cost) -> Option<&Row> {
+        let meets = |r: &&Row| r.competes && r.rmse_mm.high.is_some_and(|high| high <= target_mm);
+        let rank = |r: &Row| (cost.of(r), r.rmse_mm.value.unwrap_or(f64::INFINITY));
+        self.rows
+            .iter()
+            .filter(meets)
+            .min_by(|a, b| order(rank(a), rank(b)))
+    }
+
+    /// The row with the smallest RMSE among those that compete and cost at most `budget`; of equal ones the cheapest.
+    #[must_use]
+    pub fn most_accurate(&self, budget: f64, cost: Cost) -> Option<&Row> {
+        let fits = |r: &&Row| r.competes && cost.of(r) <= budget;
+        let rank = |r: &Row| (r.rmse_mm.value.unwrap_or(f64::INFINITY), cost.of(r));
+        self.rows
+            .iter()
+            .filter(fits)
+            .min_by(|a, b| order(rank(a), rank(b)))
+    }
+}
+
+fn order(a: (f64, f64), b: (f64, f64)) -> std::cmp::Ordering {
+    a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1))
+}

@@ -1,0 +1,184 @@
+//! Speed against accuracy: the same presses located in many ways, each with its error and its costs.
+//!
+//! A session is read once. Then every [`Choice`] is judged as an analysis with its settings would judge it: windows,
+//! estimates, rules, a calibration of its own on the calibrating presses, metrics on the scored ones. Presses that a
+//! choice cannot locate lower its located rate. A choice *competes* when it locates at least the share
+//! [`Tradeoff::least_located`] of the presses; the fronts are made of what competes, by RMSE and one cost each.
+
+mod choice;
+mod front;
+mod replay;
+#[cfg(test)]
+mod tests;
+mod timing;
+
+pub use choice::{Choice, Region};
+pub use front::{Cost, pareto};
+
+use serde::{Deserialize, Serialize};
+use skinrig_model::{AnalysisSettings, CalibrationModel, PressRole, ReductionSettings};
+
+use crate::error::AnalysisError;
+use crate::input::{EventSource, SessionInput};
+use crate::kept::Keep;
+use crate::result::Estimate;
+use replay::Replay;
+use timing::Candidate;
+
+/// A choice that locates fewer presses than the session's own by more than this share does not compete.
+const LOCATED_MARGIN: f64 = 0.01;
+
+/// What to try.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Plan {
+    /// Every combination instead of one change at a time and promising combinations.
+    pub full: bool,
+    /// Timed runs per choice, at least 1.
+    pub repeats: u32,
+    /// Smallest located rate that competes, 0..=1; `None`: that of the session's own settings less 1 %.
+    pub least_located: Option<f64>,
+}
+
+/// The measured trade.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Tradeoff {
+    /// The session's settings.
+    pub settings: AnalysisSettings,
+    /// The calibration of all choices: the one that the session's analysis chose.
+    pub model: CalibrationModel,
+    /// Presses that calibrate: used, and attempted in the session.
+    pub calibrating: (u32, u32),
+    /// Presses that score: used, and attempted in the session.
+    pub scored: (u32, u32),
+    /// Located rate from which a choice competes.
+    pub least_located: f64,
+    /// Presses that were timed.
+    pub timed_presses: u32,
+    /// Timed runs per choice.
+    pub repeats: u32,
+    /// Mean length of a press with its margins, s: what bytes per second are over.
+    pub press_s: f64,
+    /// One row per choice, the session's own first.
+    pub rows: Vec<Row>,
+}
+
+/// One choice and what it gives.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Row {
+    /// The choice.
+    pub choice: Choice,
+    /// Rows of each camera that are read, both ends included.
+    pub rows: [(u16, u16); 2],
+    /// What selects it: (key, value) below `analysis` of a protocol that differ from the session's.
+    pub overrides: Vec<(String, String)>,
+    /// RMSE of the presses that count, mm.
+    pub rmse_mm: Estimate,
+    /// The same with every failed press at the penalty.
+    pub penalised_rmse_mm: Estimate,
+    /// Share of the attempted presses that count.
+    pub located_rate: Estimate,
+    /// Share within `within_mm`.
+    pub within_rate: Estimate,
+    /// Events per press, both cameras.
+    pub events_per_press: f64,
+    /// Bytes per second of both cameras during a press.
+    pub bytes_per_s: f64,
+    /// From the contact to the end of the window, ms.
+    pub delay_ms: f64,
+    /// CPU time from the events to the location, median over the repeats, µs per press.
+    pub cpu_us: f64,
+    /// Lowest and highest of the repeats, µs.
+    pub cpu_range_us: (f64, f64),
+    /// Locates enough presses.
+    pub competes: bool,
+    /// The costs whose front it is on.
+    pub fronts: Vec<Cost>,
+}
+
+/// Reads the session once and measures every choice of the plan. `stopwatch` gives the CPU time of this thread, s.
+///
+/// # Errors
+/// Those of [`crate::analyze`], and [`AnalysisError::NothingToCompare`].
+pub fn measure(
+    input: &SessionInput,
+    source: &dyn EventSource,
+    plan: Plan,
+    stopwatch: &mut dyn FnMut() -> f64,
+) -> Result<Tradeoff, AnalysisError> {
+    let session = &input.settings;
+    // Whole presses are kept, and no study of the analysis is wanted.
+    let mut reading = input.clone();
+    reading.settings = AnalysisSettings {
+        window_after_contact_ms: None,
+        reduction: ReductionSettings {
+            max_power: 0,
+            seeds: 1,
+            ..session.reduction.clone()
+        },
+        ..session.clone()
+    };
+    let (analysis, kept) = crate::analyze_and_keep(&reading, source, Keep::All)?;
+    let replay = Replay::new(input, &analysis, &kept).ok_or(AnalysisError::NothingToCompare)?;
+    let model = match (session.calibration, &analysis.calibration) {
+        (CalibrationModel::Auto, Some(found)) => found.model,
+        (CalibrationModel::Auto, None) => CalibrationModel::None,
+        (named, _) => named,
+    };
+    let press_s = replay.press_s(&reading.settings);
+    let mut rows = Vec::new();
+    let mut candidates = Vec::new();
+    for choice in choice::sweep(Choice::of(session), plan.full) {
+        let crop = replay.region_rows(&reading.settings, choice.region);
+        let settings = choice.settings(session, crop, model);
+        let outcome = replay.run(&settings);
+        let bits = bits_per_event(&settings);
+        rows.push(Row {
+            choice,
+            rows: crop,
+            overrides: choice::overrides(session, &settings),
+            rmse_mm: outcome.metrics.rmse_mm,
+            penalised_rmse_mm: outcome.penalised.rmse_mm,
+            located_rate: outcome.metrics.located_rate,
+            within_rate: outcome.metrics.within_rate,
+            events_per_press: outcome.events_per_press,
+            bytes_per_s: outcome.events_per_press * bits / 8.0 / press_s,
+            delay_ms: outcome.delay_ms,
+            cpu_us: 0.0,
+            cpu_range_us: (0.0, 0.0),
+            competes: false,
+            fronts: Vec::new(),
+        });
+        candidates.push(Candidate {
+            settings,
+            geometry: outcome.judged.calibrated.geometry,
+        });
+    }
+    let outline = &input.rig.outline;
+    let repeats = plan.repeats.max(1);
+    let (times, timed_presses) = timing::run(&replay, outline, &candidates, repeats, stopwatch);
+    for (row, time) in rows.iter_mut().zip(times) {
+        (row.cpu_us, row.cpu_range_us) = (time.median_us, time.range_us);
+    }
+    let own = rows[0].located_rate.value.unwrap_or(0.0);
+    let mut result = Tradeoff {
+        settings: session.clone(),
+        model,
+        calibrating: replay.counts(PressRole::Calibrate),
+        scored: replay.counts(PressRole::Score),
+        least_located: plan
+            .least_located
+            .unwrap_or((own - LOCATED_MARGIN).max(0.0)),
+        timed_presses,
+        repeats,
+        press_s,
+        rows,
+    };
+    front::mark(&mut result);
+    Ok(result)
+}
+
+/// Bits per event of the settings; a bin address is shorter than a pixel's by one bit per halving of columns and rows.
+fn bits_per_event(settings: &AnalysisSettings) -> f64 {
+    let saved = 2 * u32::from(settings.bin_px).trailing_zeros();
+    (settings.bits_per_event - f64::from(saved)).max(1.0)
+}

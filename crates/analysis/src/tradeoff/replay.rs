@@ -1,0 +1,312 @@
+//! The kept presses seen again under other settings.
+
+use skinrig_model::{AnalysisSettings, CameraId, PressOutcome, PressRole};
+
+use super::choice::Region;
+use crate::accumulate::{Tally, press_view};
+use crate::analyze::{by_row, lost_rows, timings};
+use crate::estimators::{PressEstimator, Thinning};
+use crate::input::SessionInput;
+use crate::judge::{Judged, Seen, judge};
+use crate::kept::{Kept, KeptEvent, KeptPress, KeptView};
+use crate::metrics::{Exclusions, metrics, penalised};
+use crate::result::{Analysis, ClockFit, Metrics, Penalised, PressView};
+use crate::segment::{Window, windows};
+use crate::sets::ScoreSet;
+
+/// A session whose presses can be located in many ways.
+pub struct Replay<'a> {
+    input: &'a SessionInput,
+    kept: &'a Kept,
+    clocks: [ClockFit; 2],
+    /// Rows of the plan that take part.
+    rows: Vec<usize>,
+}
+
+/// What one way of locating gave.
+pub struct Outcome {
+    pub metrics: Metrics,
+    pub penalised: Penalised,
+    pub judged: Judged,
+    /// Events of both cameras in the window, mean over the scored presses that were kept.
+    pub events_per_press: f64,
+    /// From the contact to the end of the window, ms, mean over the same.
+    pub delay_ms: f64,
+}
+
+impl<'a> Replay<'a> {
+    /// `None` when no scored press was kept or a camera has no clock. Presses with measured times that were not kept
+    /// take no part; if there are any, presses without times take none either.
+    pub fn new(input: &'a SessionInput, analysis: &Analysis, kept: &'a Kept) -> Option<Self> {
+        let [Some(one), Some(two)] = analysis.clocks else {
+            return None;
+        };
+        let is_kept = |row: usize| kept.presses.binary_search_by_key(&row, |k| k.row).is_ok();
+        let timed = |row: usize| {
+            input.outcomes[row]
+                .as_ref()
+                .is_some_and(|o| o.timing.is_some())
+        };
+        let used = |row: &usize| input.planned[*row].role != PressRole::Sync;
+        let all: Vec<usize> = (0..input.planned.len()).filter(used).collect();
+        let whole = all.iter().all(|row| is_kept(*row) || !timed(*row));
+        let rows: Vec<usize> = all
+            .into_iter()
+            .filter(|row| whole || is_kept(*row))
+            .collect();
+        let scored = |k: &KeptPress| input.planned[k.row].role == PressRole::Score;
+        kept.presses.iter().any(scored).then_some(Self {
+            input,
+            kept,
+            clocks: [one, two],
+            rows,
+        })
+    }
+
+    /// Presses of this role that take part, and how many of the plan's were attempted.
+    pub fn counts(&self, role: PressRole) -> (u32, u32) {
+        let of = |row: &usize| self.input.planned[*row].role == role;
+        let attempted = |row: &usize| of(row) && self.input.outcomes[*row].is_some();
+        let all = (0..self.input.planned.len()).filter(attempted).count();
+        (
+            self.rows.iter().filter(|r| attempted(r)).count() as u32,
+            all as u32,
+        )
+    }
+
+    /// Kept presses of a role.
+    pub fn presses(&self, role: PressRole) -> impl Iterator<Item = &'a KeptPress> {
+        let input = self.input;
+        self.kept
+            .presses
+            .iter()
+            .filter(move |k| input.planned[k.row].role == role)
+    }
+
+    fn windows(&self, camera: CameraId, settings: &AnalysisSettings) -> Vec<Window> {
+        windows(timings(self.input), &self.clocks[camera.index()], settings)
+    }
+
+    /// The windows of the rows that have one.
+    pub fn windows_by_row(
+        &self,
+        camera: CameraId,
+        settings: &AnalysisSettings,
+    ) -> Vec<Option<Window>> {
+        let mut out = vec![None; self.input.planned.len()];
+        for window in self.windows(camera, settings) {
+            out[window.row] = Some(window);
+        }
+        out
+    }
+
+    /// Mean length of a scored press's window, s.
+    pub fn press_s(&self, settings: &AnalysisSettings) -> f64 {
+        let windows = self.windows_by_row(CameraId::One, settings);
+        let lengths: Vec<f64> = self
+            .presses(PressRole::Score)
+            .filter_map(|p| Some(windows[p.row]?.length_s()))
+            .collect();
+        // A window of no length holds no events.
+        (lengths.iter().sum::<f64>() / lengths.len().max(1) as f64).max(1e-6)
+    }
+
+    /// Locates and judges all presses under `settings`.
+    pub fn run(&self, settings: &AnalysisSettings) -> Outcome {
+        let n = self.input.planned.len();
+        let mut views: [Vec<Option<PressView>>; 2] = [Vec::new(), Vec::new()];
+        let mut lost = [Vec::new(), Vec::new()];
+        let mut delays = Vec::new();
+        for camera in CameraId::ALL {
+            let k = camera.index();
+            let list = self.windows(camera, settings);
+            lost[k] = lost_rows(n, &list, &self.input.gaps[k]);
+            let by_rows = self.windows_by_row(camera, settings);
+            views[k] = by_row(n, self.views(camera, settings, &by_rows));
+            if camera == CameraId::One {
+                let ends = self.presses(PressRole::Score).filter_map(|press| {
+                    let view = &press.views[0];
+                    let end_us = by_rows[press.row]?.end_us;
+                    Some((end_us as f64 - view.start_us as f64 - view.contact_us) * 1e-3)
+                });
+                delays = ends.collect();
+            }
+        }
+        let events = self.presses(PressRole::Score).map(|press| {
+            let of = |k: usize| views[k][press.row].map_or(0, |v| v.events);
+            f64::from(of(0)) + f64::from(of(1))
+        });
+        let count = delays.len().max(1) as f64;
+        let (events_per_press, delay_ms) = (
+            events.sum::<f64>() / count,
+            delays.iter().sum::<f64>() / count,
+        );
+        let input = self.part(settings);
+        let pick = |k: usize| -> (Vec<Option<PressView>>, Vec<bool>) {
+            self.rows
+                .iter()
+                .map(|row| (views[k][*row], lost[k][*row]))
+                .unzip()
+        };
+        let (one, two) = (pick(0), pick(1));
+        let seen = [&one, &two].map(|(views, data_lost)| Seen {
+            has_clock: true,
+            views,
+            data_lost,
+        });
+        let judged = judge(&input, seen, &mut Vec::new());
+        let scores = ScoreSet::from_presses(&judged.presses, &input.outcomes);
+        Outcome {
+            metrics: metrics(
+                &scores,
+                Exclusions::Applied,
+                &input.rig.outline,
+                settings.within_mm,
+                settings.bootstrap_resamples,
+                settings.seed,
+            ),
+            penalised: penalised(
+                &scores,
+                settings.failure_penalty_mm,
+                settings.bootstrap_resamples,
+                settings.seed,
+            ),
+            judged,
+            events_per_press,
+            delay_ms,
+        }
+    }
+
+    /// The rows that take part, as a session of their own.
+    fn part(&self, settings: &AnalysisSettings) -> SessionInput {
+        let outcome = |row: &usize| -> Option<PressOutcome> { self.input.outcomes[*row].clone() };
+        SessionInput {
+            planned: self
+                .rows
+                .iter()
+                .map(|row| self.input.planned[*row])
+                .collect(),
+            outcomes: self.rows.iter().map(outcome).collect(),
+            settings: settings.clone(),
+            ..self.input.clone()
+        }
+    }
+
+    fn views(
+        &self,
+        camera: CameraId,
+        settings: &AnalysisSettings,
+        windows: &[Option<Window>],
+    ) -> Vec<(usize, PressView)> {
+        let k = camera.index();
+        let filter = Filter::new(camera, settings);
+        let mut estimator = PressEstimator::new(settings, settings.crop_v[k]);
+        let mut events = Vec::new();
+        let mut out = Vec::new();
+        for press in &self.kept.presses {
+            let Some(window) = windows[press.row] else {
+                continue;
+            };
+            let view = &press.views[k];
+            filter.window(view, &window, &mut events);
+            let tally = Tally {
+                events: events.len() as u32,
+                on: events.iter().filter(|e| e.is_on()).count() as u32,
+                idle: filter.idle(view, &window),
+            };
+            let sighting = estimator.sight(&events, after(view, window.start_us));
+            out.push((press.row, press_view(&window, tally, &sighting)));
+        }
+        out
+    }
+
+    /// The rows of a region, per camera: those next to each other that hold most of what the calibrating presses
+    /// add to the idle rate; of equal ones the first. The whole crop without calibrating presses.
+    pub fn region_rows(&self, settings: &AnalysisSettings, region: Region) -> [(u16, u16); 2] {
+        let parts = match region {
+            Region::Full => return settings.crop_v,
+            Region::Half => 2,
+            Region::Quarter => 4,
+        };
+        CameraId::ALL.map(|camera| {
+            let (first, last) = settings.crop_v[camera.index()];
+            let mut rows = vec![0.0; usize::from(last - first) + 1];
+            let windows = self.windows_by_row(camera, settings);
+            for press in self.presses(PressRole::Calibrate) {
+                let Some(window) = windows[press.row] else {
+                    continue;
+                };
+                let view = &press.views[camera.index()];
+                let [idle, start, end] =
+                    [window.idle_start_us, window.start_us, window.end_us].map(|t| after(view, t));
+                for event in view.between(start, end) {
+                    rows[usize::from(event.y() - first)] += 1.0;
+                }
+                let share = window.length_s() / window.idle_s();
+                for event in view
+                    .between(idle, start)
+                    .iter()
+                    .filter(|_| share.is_finite())
+                {
+                    rows[usize::from(event.y() - first)] -= share;
+                }
+            }
+            let height = rows.len().div_ceil(parts);
+            let mut best = (f64::NEG_INFINITY, 0);
+            for (from, part) in rows.windows(height).enumerate() {
+                let sum: f64 = part.iter().sum();
+                if sum > best.0 {
+                    best = (sum, from);
+                }
+            }
+            if self.presses(PressRole::Calibrate).next().is_none() {
+                return (first, last);
+            }
+            (first + best.1 as u16, first + (best.1 + height) as u16 - 1)
+        })
+    }
+}
+
+/// A time of the camera's clock in a view's, µs.
+pub fn after(view: &KeptView, camera_us: u64) -> u32 {
+    u32::try_from(camera_us.saturating_sub(view.start_us)).unwrap_or(u32::MAX)
+}
+
+/// Which events reach the estimator.
+pub struct Filter {
+    thinning: Thinning,
+    rows: (u16, u16),
+}
+
+impl Filter {
+    pub fn new(camera: CameraId, settings: &AnalysisSettings) -> Self {
+        Self {
+            thinning: Thinning::new(settings.thinning, camera, settings.seed),
+            rows: settings.crop_v[camera.index()],
+        }
+    }
+
+    fn passes(&self, view: &KeptView, event: KeptEvent) -> bool {
+        let (x, y) = (event.x(), event.y());
+        (self.rows.0..=self.rows.1).contains(&y)
+            && self
+                .thinning
+                .keeps_at(view.start_us + u64::from(event.t_us()), x, y, event.is_on())
+    }
+
+    /// The events of a window.
+    pub fn window(&self, view: &KeptView, window: &Window, out: &mut Vec<KeptEvent>) {
+        let events = view.between(after(view, window.start_us), after(view, window.end_us));
+        out.clear();
+        out.extend(events.iter().filter(|e| self.passes(view, **e)));
+    }
+
+    /// How many there are in the idle time before it.
+    fn idle(&self, view: &KeptView, window: &Window) -> u64 {
+        let events = view.between(
+            after(view, window.idle_start_us),
+            after(view, window.start_us),
+        );
+        events.iter().filter(|e| self.passes(view, **e)).count() as u64
+    }
+}

@@ -1,0 +1,161 @@
+//! Laws of the fronts and of the selection, and of the choices that are tried.
+
+use proptest::prelude::*;
+use skinrig_model::CalibrationModel;
+
+use super::*;
+
+fn row(rmse: Option<f64>, cost: f64, located: f64) -> Row {
+    let estimate = |value: Option<f64>| Estimate {
+        value,
+        low: value.map(|v| 0.9 * v),
+        high: value.map(|v| 1.1 * v),
+        n: 20,
+    };
+    Row {
+        choice: Choice::of(&AnalysisSettings::default()),
+        rows: [(185, 360), (200, 355)],
+        overrides: Vec::new(),
+        rmse_mm: estimate(rmse),
+        penalised_rmse_mm: estimate(rmse),
+        located_rate: estimate(Some(located)),
+        within_rate: estimate(Some(located)),
+        events_per_press: cost,
+        bytes_per_s: cost,
+        delay_ms: 100.0,
+        cpu_us: cost,
+        cpu_range_us: (cost, cost),
+        competes: false,
+        fronts: Vec::new(),
+    }
+}
+
+fn tradeoff(rows: Vec<Row>) -> Tradeoff {
+    let mut result = Tradeoff {
+        settings: AnalysisSettings::default(),
+        model: CalibrationModel::Full,
+        calibrating: (20, 20),
+        scored: (20, 20),
+        least_located: 0.9,
+        timed_presses: 20,
+        repeats: 1,
+        press_s: 0.5,
+        rows,
+    };
+    front::mark(&mut result);
+    result
+}
+
+/// Few different numbers, so that many are equal.
+fn rows() -> impl Strategy<Value = Vec<Row>> {
+    let one = (proptest::option::weighted(0.9, 1u8..8), 1u8..8, 0u8..=10);
+    proptest::collection::vec(one, 0..30).prop_map(|all| {
+        let row_of = |(e, c, l): (Option<u8>, u8, u8)| {
+            row(e.map(f64::from), f64::from(c), f64::from(l) / 10.0)
+        };
+        all.into_iter().map(row_of).collect()
+    })
+}
+
+proptest! {
+    #[test]
+    fn the_front_holds_exactly_what_nothing_dominates(rows in rows()) {
+        let result = tradeoff(rows);
+        let values = |r: &Row| (r.rmse_mm.value.unwrap_or(f64::INFINITY), r.cpu_us);
+        for one in &result.rows {
+            let (e, c) = values(one);
+            let dominated = result.rows.iter().filter(|r| r.competes).any(|other| {
+                let (f, d) = values(other);
+                f <= e && d <= c && (f < e || d < c)
+            });
+            prop_assert_eq!(one.fronts.contains(&Cost::Cpu), one.competes && !dominated);
+            let expected = one.rmse_mm.value.is_some() && one.located_rate.value.unwrap() >= 0.9;
+            prop_assert_eq!(one.competes, expected);
+        }
+    }
+
+    #[test]
+    fn what_is_selected_meets_the_demand_and_nothing_cheaper_or_better_does(
+        rows in rows(),
+        target in 0.5..9.0f64,
+        budget in 0.5..9.0f64,
+    ) {
+        let result = tradeoff(rows);
+        let meets = |r: &&Row| r.competes && r.rmse_mm.high.unwrap() <= target;
+        match result.cheapest(target, Cost::Cpu) {
+            None => prop_assert!(!result.rows.iter().any(|r| meets(&r))),
+            Some(found) => {
+                prop_assert!(meets(&found));
+                prop_assert!(result.rows.iter().filter(meets).all(|r| r.cpu_us >= found.cpu_us));
+            }
+        }
+        let fits = |r: &&Row| r.competes && r.cpu_us <= budget;
+        match result.most_accurate(budget, Cost::Cpu) {
+            None => prop_assert!(!result.rows.iter().any(|r| fits(&r))),
+            Some(found) => {
+                prop_assert!(fits(&found));
+                let error = found.rmse_mm.value;
+                prop_assert!(result.rows.iter().filter(fits).all(|r| r.rmse_mm.value >= error));
+                prop_assert!(found.fronts.contains(&Cost::Cpu), "the best within a budget is on the front");
+            }
+        }
+    }
+}
+
+#[test]
+fn an_rmse_without_an_interval_meets_no_target() {
+    let mut unsure = row(Some(1.0), 1.0, 1.0);
+    unsure.rmse_mm.high = None;
+    assert!(tradeoff(vec![unsure]).cheapest(5.0, Cost::Cpu).is_none());
+}
+
+#[test]
+fn a_sweep_begins_with_the_sessions_choice_and_tries_nothing_twice() {
+    let session = Choice::of(&AnalysisSettings::default());
+    let (some, all) = (choice::sweep(session, false), choice::sweep(session, true));
+    assert_eq!((some[0], all[0]), (session, session));
+    assert!((60..100).contains(&some.len()), "{}", some.len());
+    assert_eq!(all.len(), 7 * 11 * 5 * 6 * 3);
+    assert!(some.iter().all(|choice| all.contains(choice)));
+}
+
+#[test]
+fn overrides_say_what_differs_and_no_more() {
+    let session = AnalysisSettings::default();
+    let choice = Choice {
+        thinning: 8,
+        window_ms: Some(50.0),
+        ..Choice::of(&session)
+    };
+    let rows = [(200, 280), (200, 355)];
+    let settings = choice.settings(&session, rows, CalibrationModel::Full);
+    let lines: Vec<String> = choice::overrides(&session, &settings)
+        .into_iter()
+        .map(|(key, value)| format!("{key}={value}"))
+        .collect();
+    assert_eq!(
+        lines,
+        [
+            "analysis.thinning=8",
+            "analysis.window_after_contact=50 ms",
+            "analysis.crop.camera1=[200 px, 280 px]",
+            "analysis.calibration=full",
+        ]
+    );
+    let cut = AnalysisSettings {
+        window_after_contact_ms: Some(50.0),
+        ..session
+    };
+    let whole = Choice {
+        window_ms: None,
+        ..Choice::of(&cut)
+    };
+    let settings = whole.settings(&cut, cut.crop_v, cut.calibration);
+    assert_eq!(
+        choice::overrides(&cut, &settings),
+        [(
+            "analysis.window_after_contact".to_owned(),
+            "60000 ms".to_owned()
+        )]
+    );
+}

@@ -1,0 +1,96 @@
+//! CPU time of locating a press.
+
+use skinrig_model::{CameraId, PressRole, StereoGeometry};
+
+use super::replay::{Filter, Replay, after};
+use crate::estimators::PressEstimator;
+use crate::kept::{KeptEvent, KeptPress};
+use crate::metrics::quantile;
+use crate::segment::Window;
+use crate::triangulate::locate;
+use skinrig_model::{AnalysisSettings, SkinOutline};
+
+/// Most presses that are timed.
+const MOST_PRESSES: usize = 24;
+
+/// One way of locating, ready to be timed.
+pub struct Candidate {
+    pub settings: AnalysisSettings,
+    pub geometry: StereoGeometry,
+}
+
+/// Median, lowest and highest time of a press over the repeats, µs.
+pub struct Time {
+    pub median_us: f64,
+    pub range_us: (f64, f64),
+}
+
+/// What the timed part reads: per press and camera the events and the start of the window.
+type Prepared = Vec<[(Vec<KeptEvent>, u32); 2]>;
+
+/// Times each candidate `repeats` times after one run that does not count. Within a repeat every candidate runs once, so
+/// that a slow moment of the machine meets all. The stopwatch gives seconds of CPU time of this thread.
+///
+/// Timed is what a computer beside the skin would do with the events that reach it: counting them, the estimate in both
+/// cameras, the intersection. What is dropped before it (thinning, rows, time window) costs nothing here.
+pub fn run(
+    replay: &Replay<'_>,
+    outline: &SkinOutline,
+    candidates: &[Candidate],
+    repeats: u32,
+    stopwatch: &mut dyn FnMut() -> f64,
+) -> (Vec<Time>, u32) {
+    let scored: Vec<&KeptPress> = replay.presses(PressRole::Score).collect();
+    let count = scored.len().min(MOST_PRESSES);
+    let presses: Vec<&KeptPress> = (0..count)
+        .map(|i| scored[i * scored.len() / count])
+        .collect();
+    let mut times = vec![Vec::with_capacity(repeats as usize); candidates.len()];
+    for repeat in 0..=repeats {
+        for (candidate, times) in candidates.iter().zip(&mut times) {
+            let prepared = prepare(replay, &presses, &candidate.settings);
+            let mut estimators = CameraId::ALL.map(|camera| {
+                let rows = candidate.settings.crop_v[camera.index()];
+                PressEstimator::new(&candidate.settings, rows)
+            });
+            let begun = stopwatch();
+            for views in &prepared {
+                let columns = [0, 1].map(|k| {
+                    let (events, from_us) = &views[k];
+                    estimators[k].sight(events, *from_us).column
+                });
+                std::hint::black_box(locate(&candidate.geometry, outline, columns));
+            }
+            let spent_s = stopwatch() - begun;
+            if repeat > 0 {
+                times.push(spent_s * 1e6 / count.max(1) as f64);
+            }
+        }
+    }
+    let summary = |mut times: Vec<f64>| Time {
+        median_us: quantile(&mut times, 0.5).unwrap_or(0.0),
+        range_us: (
+            quantile(&mut times, 0.0).unwrap_or(0.0),
+            quantile(&mut times, 1.0).unwrap_or(0.0),
+        ),
+    };
+    (times.into_iter().map(summary).collect(), count as u32)
+}
+
+fn prepare(replay: &Replay<'_>, presses: &[&KeptPress], settings: &AnalysisSettings) -> Prepared {
+    let windows = CameraId::ALL.map(|camera| replay.windows_by_row(camera, settings));
+    let filters = CameraId::ALL.map(|camera| Filter::new(camera, settings));
+    let of = |press: &KeptPress, k: usize, window: Option<Window>| {
+        let mut events = Vec::new();
+        let view = &press.views[k];
+        let Some(window) = window else {
+            return (events, 0);
+        };
+        filters[k].window(view, &window, &mut events);
+        (events, after(view, window.start_us))
+    };
+    presses
+        .iter()
+        .map(|press| [0, 1].map(|k| of(press, k, windows[k][press.row])))
+        .collect()
+}

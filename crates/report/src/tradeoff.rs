@@ -1,0 +1,259 @@
+//! Owns the presentation of a tradeoff: table for the terminal, page with its figure.
+
+use std::fmt::Write as _;
+
+use skinrig_analysis::result::Estimate;
+use skinrig_analysis::tradeoff::{Choice, Cost, Region, Row, Tradeoff};
+use skinrig_model::{CentroidRule, Estimator, Precision};
+
+use crate::figures::tradeoff as figure;
+use crate::format::{interval, number};
+use crate::svg::{FIGURE_CSS, Svg};
+
+/// More rows than this are not all printed: what is on a front is, and the rest is in the files.
+const MOST_ROWS: usize = 120;
+const LABEL: usize = 31;
+
+/// A choice in a few words: estimator, then what is not at its plainest.
+#[must_use]
+pub fn label(choice: &Choice) -> String {
+    let mut out = match (choice.estimator, choice.centroid) {
+        (Estimator::Dbscan, CentroidRule::LargestCluster) => "dbscan",
+        (Estimator::Dbscan, CentroidRule::AllClusters) => "dbscan all",
+        (Estimator::ColumnMedian, _) => "median",
+        (Estimator::HistogramPeak, _) => "peak",
+        (Estimator::Streaming, _) => "streaming",
+    }
+    .to_owned();
+    if choice.precision == Precision::F32 {
+        out += " f32";
+    }
+    if let Some(ms) = choice.window_ms {
+        let _ = write!(out, ", {ms} ms");
+    }
+    if choice.thinning > 1 {
+        let _ = write!(out, ", 1/{}", choice.thinning);
+    }
+    if choice.bin_px > 1 {
+        let _ = write!(out, ", bin {}", choice.bin_px);
+    }
+    match choice.region {
+        Region::Full => {}
+        Region::Half => out += ", half rows",
+        Region::Quarter => out += ", quarter rows",
+    }
+    out
+}
+
+/// The fronts of a row as letters: c for CPU time, b for bytes, d for delay.
+fn fronts(row: &Row) -> String {
+    let letter = |(cost, letter): (Cost, char)| {
+        if row.fronts.contains(&cost) { letter } else { ' ' }
+    };
+    [(Cost::Cpu, 'c'), (Cost::Bytes, 'b'), (Cost::Delay, 'd')]
+        .map(letter)
+        .iter()
+        .collect()
+}
+
+fn percent(e: &Estimate) -> String {
+    number(e.value.map(|v| 100.0 * v), 1)
+}
+
+/// Three digits, or whole from 100 on.
+pub(crate) fn short(value: f64) -> String {
+    let digits = if value >= 100.0 { 0 } else if value >= 10.0 { 1 } else { 2 };
+    number(Some(value), digits)
+}
+
+/// The rows in the order in which they are read: the session's own, then by RMSE those on a front, then the others.
+fn ordered(result: &Tradeoff) -> Vec<&Row> {
+    let (first, rest) = match result.rows.split_first() {
+        Some((first, rest)) => (Some(first), rest),
+        None => (None, &[][..]),
+    };
+    let rmse = |r: &&Row| r.rmse_mm.value.unwrap_or(f64::INFINITY);
+    let (mut on, others): (Vec<&Row>, Vec<&Row>) = rest.iter().partition(|r| !r.fronts.is_empty());
+    on.sort_by(|a, b| rmse(a).total_cmp(&rmse(b)));
+    let others = if result.rows.len() > MOST_ROWS { Vec::new() } else { others };
+    first.into_iter().chain(on).chain(others).collect()
+}
+
+/// The table for a terminal: at most 100 columns, ends with a newline.
+#[must_use]
+pub fn terminal_table(result: &Tradeoff, color: bool) -> String {
+    let (used, of) = result.scored;
+    let mut out = format!(
+        "{} choices on {used} of {of} scored presses, each calibrated (model {}) on {} of {} others.\n\
+         A choice competes when it locates at least {} % of the presses; others are in brackets.\n\
+         Front: c CPU time, b bytes, d delay. CPU: median of {} runs over {} presses, both cameras.\n\n",
+        result.rows.len(),
+        model(result),
+        result.calibrating.0,
+        result.calibrating.1,
+        number(Some(100.0 * result.least_located), 1),
+        result.repeats,
+        result.timed_presses,
+    );
+    let _ = writeln!(
+        out,
+        "{:<4}{:<LABEL$} {:>6} {:>16} {:>4} {:>7} {:>6} {:>7} {:>7} {:>6}",
+        "", "", "RMSE", "95 % interval", "n", "located", "within", "CPU", "sent", "delay"
+    );
+    let _ = writeln!(
+        out,
+        "{:<4}{:<LABEL$} {:>6} {:>16} {:>4} {:>7} {:>6} {:>7} {:>7} {:>6}",
+        "", "", "mm", "mm", "", "%", "%", "µs", "kB/s", "ms"
+    );
+    for (i, row) in ordered(result).into_iter().enumerate() {
+        let mut name = label(&row.choice);
+        if !row.competes {
+            name = format!("({name})");
+        }
+        let line = format!(
+            "{:<4}{:<LABEL$} {:>6} {:>16} {:>4} {:>7} {:>6} {:>7} {:>7} {:>6}",
+            fronts(row),
+            name,
+            number(row.rmse_mm.value, 2),
+            interval(&row.rmse_mm, 1.0, 2),
+            row.rmse_mm.n,
+            percent(&row.located_rate),
+            percent(&row.within_rate),
+            short(row.cpu_us),
+            short(row.bytes_per_s / 1e3),
+            short(row.delay_ms),
+        );
+        let line = line.trim_end();
+        let _ = if color && !row.fronts.is_empty() {
+            writeln!(out, "\u{1b}[1m{line}\u{1b}[0m")
+        } else {
+            writeln!(out, "{line}")
+        };
+        if i == 0 {
+            let _ = writeln!(out, "{:<4}^ the session's own settings", "");
+        }
+    }
+    if result.rows.len() > MOST_ROWS {
+        out += "\nOnly choices on a front are shown; all are in the files.\n";
+    }
+    out
+}
+
+fn model(result: &Tradeoff) -> String {
+    serde_json::to_value(result.model)
+        .ok()
+        .and_then(|v| v.as_str().map(str::to_owned))
+        .unwrap_or_default()
+}
+
+/// The lines of a protocol that select a row, indented below `analysis:`; nothing for the session's own settings.
+#[must_use]
+pub fn protocol_lines(row: &Row) -> String {
+    if row.overrides.is_empty() {
+        return String::new();
+    }
+    let mut out = "analysis:\n".to_owned();
+    let mut crop = String::new();
+    for (key, value) in &row.overrides {
+        let key = key.strip_prefix("analysis.").unwrap_or(key);
+        if let Some(camera) = key.strip_prefix("crop.") {
+            let comma = if crop.is_empty() { "" } else { ", " };
+            let _ = write!(crop, "{comma}{camera}: {value}");
+        } else {
+            let _ = writeln!(out, "  {key}: {value}");
+        }
+    }
+    if !crop.is_empty() {
+        let _ = writeln!(out, "  crop: {{{crop}}}");
+    }
+    out
+}
+
+/// The page: figure and table of all rows; needs no network and no other file.
+#[must_use]
+pub fn page(result: &Tradeoff, session: &str) -> String {
+    let mut page = Svg::new();
+    page.open("html", &[("lang", &"en")]);
+    page.open("head", &[]);
+    page.leaf("meta", &[("charset", &"utf-8")]);
+    page.leaf(
+        "meta",
+        &[("name", &"viewport"), ("content", &"width=device-width, initial-scale=1")],
+    );
+    page.leaf("meta", &[("name", &"color-scheme"), ("content", &"light dark")]);
+    page.holding("title", &[], &format!("Speed against accuracy: {session}"));
+    // Style sheets hold none of the characters that XML escapes but `>`, which CSS needs as it is.
+    page.raw(&format!("<style>{FIGURE_CSS}{}{EXTRA_CSS}</style>", crate::page::PAGE_CSS));
+    page.close();
+    page.open("body", &[]);
+    page.open("header", &[]).open("div", &[("class", &"top")]).open("div", &[]);
+    page.holding("p", &[("class", &"brand")], "skinrig tradeoff");
+    page.holding("h1", &[], "Speed against accuracy");
+    page.holding("p", &[("class", &"sub")], &format!("session {session}"));
+    page.close().close().close();
+    page.open("main", &[]);
+    let figure = figure::fronts(result);
+    page.open("figure", &[("class", &"card figure"), ("data-testid", &"figure-tradeoff")]);
+    page.raw(&figure.svg);
+    page.holding("figcaption", &[], &figure.caption);
+    page.close();
+    page.open("div", &[("class", &"card scroll")]);
+    table(&mut page, result);
+    page.close();
+    format!("<!doctype html>\n{}\n", page.finish())
+}
+
+const EXTRA_CSS: &str = "main{padding-bottom:40px}.card{margin-top:18px}table.trade td,table.trade th{white-space:nowrap}\
+table.trade tr.front td{font-weight:600}table.trade tr.out td{opacity:.55}table.trade td.num,table.trade th.num{text-align:right}";
+
+fn table(page: &mut Svg, result: &Tradeoff) {
+    page.open("table", &[("class", &"trade")]);
+    page.open("thead", &[]).open("tr", &[]);
+    page.holding("th", &[("scope", &"col")], "Choice");
+    for head in [
+        "Front",
+        "RMSE (mm)",
+        "95 % interval",
+        "n",
+        "Penalised (mm)",
+        "Located (%)",
+        "Within (%)",
+        "CPU (µs)",
+        "CPU range",
+        "Sent (kB/s)",
+        "Delay (ms)",
+    ] {
+        page.holding("th", &[("scope", &"col"), ("class", &"num")], head);
+    }
+    page.close().close();
+    page.open("tbody", &[]);
+    for (i, row) in ordered(result).into_iter().enumerate() {
+        let class = match (row.competes, row.fronts.is_empty()) {
+            (false, _) => "out",
+            (true, false) => "front",
+            (true, true) => "",
+        };
+        page.open("tr", &[("class", &class)]);
+        let own = if i == 0 { " (the session's own)" } else { "" };
+        page.holding("td", &[], &format!("{}{own}", label(&row.choice)));
+        let names = row.fronts.iter().map(|c| figure::name(*c));
+        let (low, high) = row.cpu_range_us;
+        for cell in [
+            names.collect::<Vec<_>>().join(", "),
+            number(row.rmse_mm.value, 2),
+            interval(&row.rmse_mm, 1.0, 2),
+            row.rmse_mm.n.to_string(),
+            number(row.penalised_rmse_mm.value, 2),
+            percent(&row.located_rate),
+            percent(&row.within_rate),
+            short(row.cpu_us),
+            format!("{} to {}", short(low), short(high)),
+            short(row.bytes_per_s / 1e3),
+            short(row.delay_ms),
+        ] {
+            page.holding("td", &[("class", &"num")], &cell);
+        }
+        page.close();
+    }
+    page.close().close();
+}
