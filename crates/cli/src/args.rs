@@ -4,6 +4,8 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+use skinrig_protocol::quantity::{self, Dimension};
+
 use crate::exit::Exit;
 
 /// Runs tactile-skin experiments: protocol, robot, event cameras, session, analysis, report.
@@ -61,6 +63,13 @@ pub enum Command {
         after_help = "Example:\n  skinrig report sessions/NAME.session.sqlite --out report.html"
     )]
     Report(ReportArgs),
+
+    /// Measure speed against accuracy on a session: estimators, windows, thinning, bins, rows.
+    #[command(
+        after_help = "Examples:\n  skinrig tradeoff sessions/NAME.session.sqlite\n  \
+        skinrig tradeoff sessions/NAME.session.sqlite --target-rmse 6mm --budget 100us"
+    )]
+    Tradeoff(TradeoffArgs),
 
     /// Recompute every checksum, count and hash of a session.
     #[command(after_help = "Example:\n  skinrig verify sessions/NAME.session.sqlite")]
@@ -219,6 +228,85 @@ pub struct AnalyzeArgs {
     /// Fail (exit code 4) when the scored RMSE is above this, in mm.
     #[arg(long, value_name = "MM", value_parser = limit_mm)]
     pub max_rmse: Option<f64>,
+}
+
+/// What accuracy is traded for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum CostKind {
+    /// CPU time per press.
+    Cpu,
+    /// Bytes per second.
+    Bytes,
+    /// Time from the contact to the estimate.
+    Delay,
+}
+
+/// A length above 0, mm.
+fn length_mm(text: &str) -> Result<f64, String> {
+    above_zero(text, Dimension::Length)
+}
+
+/// A time above 0, s.
+fn time_s(text: &str) -> Result<f64, String> {
+    above_zero(text, Dimension::Time)
+}
+
+fn above_zero(text: &str, dimension: Dimension) -> Result<f64, String> {
+    match quantity::parse(text, &[dimension]) {
+        Ok(found) if found.value > 0.0 => Ok(found.value),
+        Ok(_) => Err(format!(
+            "expected {} above 0, found {text}",
+            dimension.name()
+        )),
+        Err(e) => Err(format!("expected {}, found {}", e.expected, e.found)),
+    }
+}
+
+/// A share of presses.
+fn percent(text: &str) -> Result<f64, String> {
+    match text.trim_end_matches('%').trim().parse::<f64>() {
+        Ok(value) if (0.0..=100.0).contains(&value) => Ok(value),
+        _ => Err(format!("expected a share from 0% to 100%, found {text}")),
+    }
+}
+
+/// Arguments of `tradeoff`.
+#[derive(Debug, Args)]
+pub struct TradeoffArgs {
+    /// The session file.
+    pub session: PathBuf,
+
+    /// Override one analysis setting of the session's protocol before anything is traded.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub overrides: Vec<String>,
+
+    /// Name the cheapest choice whose RMSE is at most this at the upper end of its 95 % interval, for example `6mm`.
+    #[arg(long, value_name = "LENGTH", value_parser = length_mm)]
+    pub target_rmse: Option<f64>,
+
+    /// What is cheap with `--target-rmse`.
+    #[arg(long, value_enum, default_value = "cpu")]
+    pub cost: CostKind,
+
+    /// Name the most accurate choice within this CPU time per press, for example `100us`.
+    #[arg(long, value_name = "TIME", value_parser = time_s)]
+    pub budget: Option<f64>,
+
+    /// Smallest share of located presses that competes; that of the session's own settings less 1 % when absent.
+    #[arg(long, value_name = "PERCENT", value_parser = percent)]
+    pub min_located: Option<f64>,
+
+    /// Timed runs per choice.
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub repeats: u32,
+
+    /// Try every combination (thousands) instead of one change at a time and promising combinations.
+    #[arg(long)]
+    pub full: bool,
+
+    /// Where to write the page, and beside it the results as JSON; beside the session when absent.
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
 }
 
 /// Arguments of `report`.

@@ -23,6 +23,7 @@ pub mod show;
 pub mod signals;
 pub mod sink;
 pub mod source;
+pub mod tradeoff;
 pub mod verify;
 
 use std::ffi::OsString;
@@ -71,6 +72,7 @@ fn dispatch(cli: &Cli, arguments: &[OsString]) -> Outcome {
         Command::Show(a) => show::show(a, json),
         Command::Analyze(a) => results::analyze(a, json),
         Command::Report(a) => results::report(a, json),
+        Command::Tradeoff(a) => tradeoff::tradeoff(a, json),
         Command::Verify(a) => verify::verify(a, json),
         Command::Import(a) => import::import(a, &command_line(arguments), json),
         Command::Export(a) => export::export(a, json),

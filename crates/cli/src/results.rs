@@ -57,11 +57,19 @@ pub struct Choices<'a> {
     pub reference_code: bool,
 }
 
-/// Analyses a session, with the settings it was recorded with or with others.
+/// A session ready to be analysed.
+pub(crate) struct Opened {
+    pub(crate) reader: SessionReader,
+    pub(crate) header: RunHeader,
+    pub(crate) input: SessionInput,
+    pub(crate) events: SessionEvents,
+}
+
+/// Opens a session with the settings it was recorded with or with others.
 ///
 /// # Errors
 /// [`Failure::input`] for files that are no readable session or settings that do not parse.
-pub fn analyze_session(path: &Path, choices: Choices<'_>) -> Result<Results, Failure> {
+pub(crate) fn open(path: &Path, choices: Choices<'_>) -> Result<Opened, Failure> {
     let unreadable = |e: RecorderError| Failure::input(e);
     let reader = SessionReader::open(path).map_err(unreadable)?;
     let header = reader.header().map_err(unreadable)?;
@@ -75,9 +83,24 @@ pub fn analyze_session(path: &Path, choices: Choices<'_>) -> Result<Results, Fai
     let settings = settings(&header, document.analysis, choices)?;
     let input = session_input(&reader, settings, document.geometry).map_err(unreadable)?;
     let events = SessionEvents::new(path, header.stream_formats);
-    let analysis = skinrig_analysis::analyze(&input, &events).map_err(Failure::input)?;
-    let provenance =
-        crate::provenance::provenance(&reader, &header, &analysis).map_err(unreadable)?;
+    Ok(Opened {
+        reader,
+        header,
+        input,
+        events,
+    })
+}
+
+/// Analyses a session, with the settings it was recorded with or with others.
+///
+/// # Errors
+/// [`Failure::input`] for files that are no readable session or settings that do not parse.
+pub fn analyze_session(path: &Path, choices: Choices<'_>) -> Result<Results, Failure> {
+    let session = open(path, choices)?;
+    let analysis =
+        skinrig_analysis::analyze(&session.input, &session.events).map_err(Failure::input)?;
+    let provenance = crate::provenance::provenance(&session.reader, &session.header, &analysis)
+        .map_err(|e: RecorderError| Failure::input(e))?;
     Ok(Results {
         session: path.to_owned(),
         analysis,
@@ -194,7 +217,7 @@ pub fn write_results(
 }
 
 /// Writes a whole file or none: a full disk leaves no half of it.
-fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+pub(crate) fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     let mut partial = path.as_os_str().to_owned();
     partial.push(".partial");
     let partial = PathBuf::from(partial);

@@ -48,7 +48,11 @@ pub fn label(choice: &Choice) -> String {
 /// The fronts of a row as letters: c for CPU time, b for bytes, d for delay.
 fn fronts(row: &Row) -> String {
     let letter = |(cost, letter): (Cost, char)| {
-        if row.fronts.contains(&cost) { letter } else { ' ' }
+        if row.fronts.contains(&cost) {
+            letter
+        } else {
+            ' '
+        }
     };
     [(Cost::Cpu, 'c'), (Cost::Bytes, 'b'), (Cost::Delay, 'd')]
         .map(letter)
@@ -62,7 +66,13 @@ fn percent(e: &Estimate) -> String {
 
 /// Three digits, or whole from 100 on.
 pub(crate) fn short(value: f64) -> String {
-    let digits = if value >= 100.0 { 0 } else if value >= 10.0 { 1 } else { 2 };
+    let digits = if value >= 100.0 {
+        0
+    } else if value >= 10.0 {
+        1
+    } else {
+        2
+    };
     number(Some(value), digits)
 }
 
@@ -75,7 +85,11 @@ fn ordered(result: &Tradeoff) -> Vec<&Row> {
     let rmse = |r: &&Row| r.rmse_mm.value.unwrap_or(f64::INFINITY);
     let (mut on, others): (Vec<&Row>, Vec<&Row>) = rest.iter().partition(|r| !r.fronts.is_empty());
     on.sort_by(|a, b| rmse(a).total_cmp(&rmse(b)));
-    let others = if result.rows.len() > MOST_ROWS { Vec::new() } else { others };
+    let others = if result.rows.len() > MOST_ROWS {
+        Vec::new()
+    } else {
+        others
+    };
     first.into_iter().chain(on).chain(others).collect()
 }
 
@@ -178,22 +192,39 @@ pub fn page(result: &Tradeoff, session: &str) -> String {
     page.leaf("meta", &[("charset", &"utf-8")]);
     page.leaf(
         "meta",
-        &[("name", &"viewport"), ("content", &"width=device-width, initial-scale=1")],
+        &[
+            ("name", &"viewport"),
+            ("content", &"width=device-width, initial-scale=1"),
+        ],
     );
-    page.leaf("meta", &[("name", &"color-scheme"), ("content", &"light dark")]);
+    page.leaf(
+        "meta",
+        &[("name", &"color-scheme"), ("content", &"light dark")],
+    );
     page.holding("title", &[], &format!("Speed against accuracy: {session}"));
     // Style sheets hold none of the characters that XML escapes but `>`, which CSS needs as it is.
-    page.raw(&format!("<style>{FIGURE_CSS}{}{EXTRA_CSS}</style>", crate::page::PAGE_CSS));
+    page.raw(&format!(
+        "<style>{FIGURE_CSS}{}{EXTRA_CSS}</style>",
+        crate::page::PAGE_CSS
+    ));
     page.close();
     page.open("body", &[]);
-    page.open("header", &[]).open("div", &[("class", &"top")]).open("div", &[]);
+    page.open("header", &[])
+        .open("div", &[("class", &"top")])
+        .open("div", &[]);
     page.holding("p", &[("class", &"brand")], "skinrig tradeoff");
     page.holding("h1", &[], "Speed against accuracy");
     page.holding("p", &[("class", &"sub")], &format!("session {session}"));
     page.close().close().close();
     page.open("main", &[]);
     let figure = figure::fronts(result);
-    page.open("figure", &[("class", &"card figure"), ("data-testid", &"figure-tradeoff")]);
+    page.open(
+        "figure",
+        &[
+            ("class", &"card figure"),
+            ("data-testid", &"figure-tradeoff"),
+        ],
+    );
     page.raw(&figure.svg);
     page.holding("figcaption", &[], &figure.caption);
     page.close();

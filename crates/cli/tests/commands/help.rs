@@ -2,9 +2,9 @@
 
 use crate::support::{ROOT, skinrig};
 
-const COMMANDS: [&str; 12] = [
+const COMMANDS: [&str; 13] = [
     "check", "plan", "run", "sessions", "show", "analyze", "report", "verify", "import", "export",
-    "inspect", "schema",
+    "inspect", "schema", "tradeoff",
 ];
 
 #[test]

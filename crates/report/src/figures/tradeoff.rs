@@ -42,7 +42,11 @@ fn value(cost: Cost, row: &Row) -> f64 {
 pub fn fronts(result: &Tradeoff) -> Figure {
     let shown = result.rows.iter().filter_map(|r| r.rmse_mm.value);
     let front = |r: &&Row| !r.fronts.is_empty();
-    let wanted = result.rows.iter().take(1).chain(result.rows.iter().filter(front));
+    let wanted = result
+        .rows
+        .iter()
+        .take(1)
+        .chain(result.rows.iter().filter(front));
     let ends = wanted.filter_map(|r| r.rmse_mm.high.or(r.rmse_mm.value));
     let top = nice_above(1.6 * ends.fold(0.0, f64::max));
     let above = shown.filter(|e| *e > top).count();
@@ -114,7 +118,10 @@ fn legend(svg: &mut Svg) {
 
 /// Circle, square, triangle or diamond.
 fn mark(svg: &mut Svg, estimator: Estimator, at: (f64, f64), solid: bool, title: &str) {
-    let class = ESTIMATORS.iter().find(|e| e.0 == estimator).map_or("", |e| e.1);
+    let class = ESTIMATORS
+        .iter()
+        .find(|e| e.0 == estimator)
+        .map_or("", |e| e.1);
     let (x, y) = at;
     let data = match estimator {
         Estimator::Dbscan => {
@@ -129,15 +136,27 @@ fn mark(svg: &mut Svg, estimator: Estimator, at: (f64, f64), solid: bool, title:
     } else {
         "fill:none;stroke-width:1.1;opacity:.55"
     };
-    svg.open("path", &[("class", &class), ("d", &data), ("style", &style)]);
+    svg.open(
+        "path",
+        &[("class", &class), ("d", &data), ("style", &style)],
+    );
     svg.holding("title", &[], title);
     svg.close();
 }
 
 fn panel(svg: &mut Svg, result: &Tradeoff, cost: Cost, left: f64, y: Scale, first: bool) {
     let right = left + WIDTH;
-    let costs = || result.rows.iter().map(|r| value(cost, r)).filter(|c| *c > 0.0);
-    let (low, high) = (costs().fold(f64::INFINITY, f64::min), costs().fold(0.0, f64::max));
+    let costs = || {
+        result
+            .rows
+            .iter()
+            .map(|r| value(cost, r))
+            .filter(|c| *c > 0.0)
+    };
+    let (low, high) = (
+        costs().fold(f64::INFINITY, f64::min),
+        costs().fold(0.0, f64::max),
+    );
     let exponents = if low <= high {
         (low.log10() - 0.08, high.log10() + 0.08)
     } else {
@@ -149,7 +168,11 @@ fn panel(svg: &mut Svg, result: &Tradeoff, cost: Cost, left: f64, y: Scale, firs
         let (c, e) = (value(cost, r), r.rmse_mm.value?);
         (c > 0.0 && e <= y.data.1).then(|| (x.at(c.log10()), y.at(e)))
     };
-    let mut front: Vec<&Row> = result.rows.iter().filter(|r| r.fronts.contains(&cost)).collect();
+    let mut front: Vec<&Row> = result
+        .rows
+        .iter()
+        .filter(|r| r.fronts.contains(&cost))
+        .collect();
     front.sort_by(|a, b| value(cost, a).total_cmp(&value(cost, b)));
     let mut steps: Vec<(f64, f64)> = Vec::new();
     for (px, py) in front.iter().filter_map(|r| place(r)) {
@@ -172,12 +195,23 @@ fn panel(svg: &mut Svg, result: &Tradeoff, cost: Cost, left: f64, y: Scale, firs
         if let (Some(l), Some(h)) = (row.rmse_mm.low, row.rmse_mm.high) {
             svg.line("axis", (px, y.at(l)), (px, y.at(h.min(y.data.1))));
         }
-        mark(svg, row.choice.estimator, (px, py), row.competes, &told(row));
+        mark(
+            svg,
+            row.choice.estimator,
+            (px, py),
+            row.competes,
+            &told(row),
+        );
     }
     if let Some((px, py)) = result.rows.first().and_then(place) {
         svg.leaf(
             "circle",
-            &[("class", &"select"), ("cx", &Px(px)), ("cy", &Px(py)), ("r", &Px(8.5))],
+            &[
+                ("class", &"select"),
+                ("cx", &Px(px)),
+                ("cy", &Px(py)),
+                ("r", &Px(8.5)),
+            ],
         );
     }
     labels(svg, &front, place, (left, right));
@@ -197,10 +231,14 @@ fn labels(
         let width = 5.9 * text.chars().count() as f64;
         let from = (px - width / 2.0).clamp(left + 2.0, (right - width).max(left + 2.0));
         let free = |y: f64| {
-            taken.iter().all(|(a, b, at)| from > *b + 6.0 || from + width < *a - 6.0 || (y - at).abs() > 12.0)
+            taken.iter().all(|(a, b, at)| {
+                from > *b + 6.0 || from + width < *a - 6.0 || (y - at).abs() > 12.0
+            })
         };
         let places = [30.0, 43.0, 56.0, 69.0, -30.0, -43.0, -56.0, -69.0, -82.0].map(|d| py + d);
-        let Some(y) = places.into_iter().find(|y| free(*y) && *y < BOTTOM - 4.0 && *y > TOP + 10.0)
+        let Some(y) = places
+            .into_iter()
+            .find(|y| free(*y) && *y < BOTTOM - 4.0 && *y > TOP + 10.0)
         else {
             continue;
         };
@@ -213,7 +251,10 @@ fn labels(
                 ("x", &Px(from)),
                 ("y", &Px(y)),
                 ("class", &"tick"),
-                ("style", &"paint-order:stroke;stroke:var(--paper);stroke-width:3px"),
+                (
+                    "style",
+                    &"paint-order:stroke;stroke:var(--paper);stroke-width:3px",
+                ),
             ],
             &text,
         );
@@ -238,7 +279,12 @@ fn axes(svg: &mut Svg, x: Scale, y: Scale, cost: Cost, first: bool) {
     let step = if all.len() > 1 { all[1] - all[0] } else { 1.0 };
     for t in &all {
         svg.line("grid", (left, y.at(*t)), (right, y.at(*t)));
-        svg.text((left - 7.0, y.at(*t) + 4.0), "tick", "end", &tick_label(*t, step));
+        svg.text(
+            (left - 7.0, y.at(*t) + 4.0),
+            "tick",
+            "end",
+            &tick_label(*t, step),
+        );
     }
     // 1, 2 and 5 of each power of ten; the powers alone over more than three of them.
     let wide = x.data.1 - x.data.0 > 3.0;
@@ -256,7 +302,12 @@ fn axes(svg: &mut Svg, x: Scale, y: Scale, cost: Cost, first: bool) {
     }
     svg.line("axis", (left, BOTTOM), (right, BOTTOM));
     svg.line("axis", (left, TOP), (left, BOTTOM));
-    svg.text(((left + right) / 2.0, BOTTOM + 38.0), "label", "middle", axis(cost));
+    svg.text(
+        ((left + right) / 2.0, BOTTOM + 38.0),
+        "label",
+        "middle",
+        axis(cost),
+    );
     if first {
         let (px, py) = (left - 40.0, (TOP + BOTTOM) / 2.0);
         svg.holding(
@@ -264,7 +315,10 @@ fn axes(svg: &mut Svg, x: Scale, y: Scale, cost: Cost, first: bool) {
             &[
                 ("class", &"label"),
                 ("text-anchor", &"middle"),
-                ("transform", &format_args!("translate({} {}) rotate(-90)", Px(px), Px(py))),
+                (
+                    "transform",
+                    &format_args!("translate({} {}) rotate(-90)", Px(px), Px(py)),
+                ),
             ],
             "RMSE (mm)",
         );

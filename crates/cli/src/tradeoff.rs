@@ -1,0 +1,132 @@
+//! `skinrig tradeoff`: what speed costs in accuracy, measured on a session.
+
+use std::io::IsTerminal;
+
+use rustix::time::{ClockId, clock_gettime};
+use skinrig_analysis::tradeoff::{Cost, Plan, Row, Tradeoff, measure};
+use skinrig_report::tradeoff::{label, page, protocol_lines, terminal_table};
+
+use crate::args::{CostKind, TradeoffArgs};
+use crate::exit::{Exit, Failure, Outcome};
+use crate::paths::beside;
+use crate::results::{Choices, Opened, open, write};
+
+/// CPU time of this thread, s.
+fn thread_cpu_s() -> f64 {
+    let now = clock_gettime(ClockId::ThreadCPUTime);
+    now.tv_sec as f64 + now.tv_nsec as f64 * 1e-9
+}
+
+impl From<CostKind> for Cost {
+    fn from(kind: CostKind) -> Self {
+        match kind {
+            CostKind::Cpu => Self::Cpu,
+            CostKind::Bytes => Self::Bytes,
+            CostKind::Delay => Self::Delay,
+        }
+    }
+}
+
+/// A demand and what meets it.
+struct Answer<'a> {
+    question: String,
+    row: Option<&'a Row>,
+}
+
+fn answers<'a>(result: &'a Tradeoff, args: &TradeoffArgs) -> Vec<Answer<'a>> {
+    let target = args.target_rmse.map(|mm| Answer {
+        question: format!(
+            "cheapest ({}) whose RMSE is at most {mm} mm at the upper end of its 95 % interval",
+            cost_name(args.cost)
+        ),
+        row: result.cheapest(mm, args.cost.into()),
+    });
+    let budget = args.budget.map(|s| Answer {
+        question: format!("most accurate within {} µs of CPU time per press", s * 1e6),
+        row: result.most_accurate(s * 1e6, Cost::Cpu),
+    });
+    target.into_iter().chain(budget).collect()
+}
+
+const fn cost_name(cost: CostKind) -> &'static str {
+    match cost {
+        CostKind::Cpu => "CPU time",
+        CostKind::Bytes => "bytes",
+        CostKind::Delay => "delay",
+    }
+}
+
+/// `skinrig tradeoff`.
+///
+/// # Errors
+/// What keeps a session from being analysed, files that cannot be written, and [`Failure::limit`] when nothing meets
+/// a demand.
+pub fn tradeoff(args: &TradeoffArgs, json: bool) -> Outcome {
+    let choices = Choices {
+        overrides: &args.overrides,
+        reference_code: false,
+    };
+    let Opened { input, events, .. } = open(&args.session, choices)?;
+    let plan = Plan {
+        full: args.full,
+        repeats: args.repeats,
+        least_located: args.min_located.map(|percent| percent / 100.0),
+    };
+    let result = measure(&input, &events, plan, &mut thread_cpu_s).map_err(Failure::input)?;
+    let answers = answers(&result, args);
+    let mut document = serde_json::json!({ "format": "skinrig-tradeoff", "format_version": 1, "tradeoff": result });
+    let found = answers.iter().map(|a| {
+        serde_json::json!({
+            "question": a.question,
+            "choice": a.row.map(|r| label(&r.choice)),
+            "row": a.row,
+            "protocol": a.row.map(protocol_lines),
+        })
+    });
+    document["answers"] = serde_json::Value::Array(found.collect());
+    let html_path = args
+        .out
+        .clone()
+        .unwrap_or_else(|| beside(&args.session, ".tradeoff.html"));
+    let json_path = html_path.with_extension("json");
+    let name = args
+        .session
+        .file_name()
+        .map(|n| n.to_string_lossy().into_owned());
+    let text = serde_json::to_string_pretty(&document).map_err(Failure::internal)?;
+    write(
+        &html_path,
+        page(&result, &name.unwrap_or_default()).as_bytes(),
+    )?;
+    write(&json_path, text.as_bytes())?;
+    if json {
+        document["files"] = serde_json::json!({ "page": html_path, "results": json_path });
+        crate::print_json(&document);
+    } else {
+        let table = terminal_table(&result, std::io::stdout().is_terminal());
+        crate::terminal::out(format_args!("{table}"));
+        for answer in &answers {
+            outln!("\n{}:", answer.question);
+            match answer.row {
+                None => outln!("  none of the choices tried"),
+                Some(row) if row.overrides.is_empty() => outln!("  the session's own settings"),
+                Some(row) => {
+                    outln!("  {}\n", label(&row.choice));
+                    for line in protocol_lines(row).lines() {
+                        outln!("  {line}");
+                    }
+                }
+            }
+        }
+        outln!("\npage     {}", html_path.display());
+        outln!("results  {}", json_path.display());
+    }
+    match answers.iter().find(|a| a.row.is_none()) {
+        None => Ok(Exit::Ok),
+        Some(unmet) => Err(Failure::limit(format!(
+            "expected a choice that is {}, found none among the {} tried\n  next: a weaker demand, or --full",
+            unmet.question,
+            result.rows.len()
+        ))),
+    }
+}
