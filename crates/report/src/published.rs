@@ -51,7 +51,8 @@ pub const FOOTNOTES: [Footnote; 7] = [
     },
     Footnote {
         mark: "c",
-        text: "105 and 46 taxels need a radius of 5.31 mm; 4.66 mm gives 136.7 over the skin and 67.7 over 4620 mm².",
+        text: "105 taxels over the skin, and 46 over 64 x 64 mm (the span of the grid, not the 4620 mm² named), need a \
+               radius of 5.31 mm; 4.66 mm gives 136.7 over the skin and 67.7 over 4620 mm².",
     },
     Footnote {
         mark: "d",

@@ -82,7 +82,7 @@ pub fn models(input: &ReportInput<'_>) -> Option<Figure> {
                 svg.path("dots strong c1", &dots([(x, y)]));
                 svg.text(
                     (x + 12.0, y + 4.0),
-                    "tick",
+                    "tick halo",
                     "start",
                     &number(Some(value), 2),
                 );

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use skinrig_analysis::result::{PicturePixel, PressPicture};
+use skinrig_analysis::result::{PicturePixel, PressPicture, PressView};
 use skinrig_model::SENSOR_WIDTH;
 
 use super::{Canvas, Figure};
@@ -29,7 +29,8 @@ pub fn press_pictures(input: &ReportInput<'_>) -> Option<Figure> {
     let size = (1240.0, 46.0 + row_height * presses.len() as f64 + 26.0);
     let caption = "Pixels with events during single presses, cropped rows of the sensor, camera 1 left, camera 2 \
          right. Colour: the polarity that the pixel saw more often. Pale pixels are not part of the cluster. \
-         Triangles: column of the centroid."
+         Cross: centroid of the cluster; triangles: its \
+         column, the only coordinate that locates."
         .to_owned();
     let mut canvas = Canvas::new(
         input,
@@ -51,14 +52,13 @@ pub fn press_pictures(input: &ReportInput<'_>) -> Option<Figure> {
                 50.0 + 610.0 * f64::from(camera as u8),
                 46.0 + row_height * i as f64,
             );
-            let u = input
+            let view = input
                 .analysis
                 .presses
                 .iter()
                 .find(|r| r.press.0 == *press)
-                .and_then(|r| r.views[camera])
-                .and_then(|v| v.centroid_u);
-            strip(&mut canvas, p, (x, y), k, u);
+                .and_then(|r| r.views[camera]);
+            strip(&mut canvas, p, (x, y), k, view);
         }
     }
     for (i, (name, class)) in [("ON", "on"), ("OFF", "off")].into_iter().enumerate() {
@@ -82,7 +82,13 @@ fn rows(p: &PressPicture) -> u32 {
     u32::from(p.rows.1.saturating_sub(p.rows.0)) + 1
 }
 
-fn strip(canvas: &mut Canvas<'_>, p: &PressPicture, at: (f64, f64), k: f64, centroid: Option<f64>) {
+fn strip(
+    canvas: &mut Canvas<'_>,
+    p: &PressPicture,
+    at: (f64, f64),
+    k: f64,
+    view: Option<PressView>,
+) {
     let svg = &mut canvas.svg;
     let height = f64::from(rows(p)) * k;
     let width = f64::from(SENSOR_WIDTH) * k;
@@ -140,8 +146,15 @@ fn strip(canvas: &mut Canvas<'_>, p: &PressPicture, at: (f64, f64), k: f64, cent
         let y = at.1 + (f64::from(v) - f64::from(p.rows.0) + 0.5) * k;
         svg.text((at.0 - 5.0, y + 4.0), "tick", "end", &v.to_string());
     }
-    if let Some(u) = centroid.filter(|u| u.is_finite()) {
+    if let Some(u) = view.and_then(|v| v.centroid_u).filter(|u| u.is_finite()) {
         let x = at.0 + u * k;
+        let v = view.and_then(|v| v.centroid_v).filter(|v| v.is_finite());
+        if let Some(v) = v {
+            let y = at.1 + (v - f64::from(p.rows.0) + 0.5) * k;
+            let cross = format!("M{} {}h14M{} {}v14", Px(x - 7.0), Px(y), Px(x), Px(y - 7.0));
+            svg.path("centroid under", &cross);
+            svg.path("centroid", &cross);
+        }
         svg.path("pointer", &format!("M{} {}l-4 -7h8Z", Px(x), Px(at.1)));
         svg.path(
             "pointer",

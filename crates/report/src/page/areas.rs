@@ -76,7 +76,7 @@ pub(super) fn coverage(a: &Analysis) -> Option<Grid> {
         "Taxels: circles of radius RMSE that fill the area. The RMSE was measured in the probed area only{cell}: the number \
          for the whole skin supposes that it holds everywhere, which nothing here shows."
     ));
-    grid.note("The published taxels need a radius of 5.31 mm, not the published RMSE of 4.66 mm.");
+    grid.note("The published taxels need a radius of 5.31 mm, not the published RMSE of 4.66 mm, and over 64 x 64 mm, not 4620 mm².");
     grid.download("coverage");
     Some(grid)
 }

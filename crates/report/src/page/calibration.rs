@@ -4,7 +4,7 @@ use skinrig_analysis::result::{Analysis, CalibrationResult};
 
 use super::grid::Grid;
 use crate::figures::model_name;
-use crate::format::{NONE, interval, number, words};
+use crate::format::{interval, number, words};
 
 /// The compared models.
 pub(super) fn models(a: &Analysis) -> Option<Grid> {
@@ -97,14 +97,9 @@ pub(super) fn fit(a: &Analysis) -> Option<Grid> {
         "starts in the best optimum",
         format!("{} of {}", c.starts_agreeing, c.starts),
     );
-    row(
-        "stopped",
-        if c.termination.is_empty() {
-            NONE.to_owned()
-        } else {
-            c.termination.clone()
-        },
-    );
+    if !c.termination.is_empty() {
+        grid.note(format!("The optimiser stopped: {}.", c.termination));
+    }
     if (c.rank as usize) < c.names.len() {
         grid.note("The data do not determine all parameters: see the correlation and the standard errors.");
     }

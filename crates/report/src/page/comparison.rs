@@ -8,8 +8,13 @@ use crate::comparison::{Cell, rows};
 use crate::format::{NONE, interval, number};
 use crate::published::{self, Metric};
 
-const fn digits(metric: Metric) -> usize {
+fn digits(metric: Metric, value: Option<f64>) -> usize {
     match metric {
+        Metric::PressRate | Metric::IdleRate | Metric::Samples
+            if value.is_some_and(|v| v >= 10.0) =>
+        {
+            usize::from(metric != Metric::Samples)
+        }
         Metric::ViewPoints | Metric::Bits => 0,
         Metric::LatencyWidth | Metric::LatencyFromContact | Metric::PassRate => 1,
         Metric::Samples | Metric::TaxelsSkin | Metric::TaxelsProbed => 1,
@@ -24,8 +29,9 @@ pub(crate) fn text(cell: &Cell, metric: Metric) -> String {
         Cell::Missing => NONE.to_owned(),
         Cell::Text(text) => (*text).to_owned(),
         Cell::Value(e) => {
-            let value = number(e.value, digits(metric));
-            match interval(e, 1.0, digits(metric)) {
+            let digits = digits(metric, e.value);
+            let value = number(e.value, digits);
+            match interval(e, 1.0, digits) {
                 none if none == NONE => value,
                 interval => format!("{value} {interval}"),
             }
