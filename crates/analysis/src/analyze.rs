@@ -21,6 +21,9 @@ use crate::segment::{Window, windows};
 use crate::sets::ScoreSet;
 use crate::{audit, bit_rates, check, cmre, coverage, latency, reduction, verdict};
 
+/// Windows that share less than this, µs, only touch: their ends are rounded.
+const OVERLAP_US: u64 = 100;
+
 /// Analyses a session: one pass over each camera's events when its clock can be fitted from trigger marks, two
 /// when it has to be aligned by event rates; both cameras at the same time.
 ///
@@ -312,7 +315,7 @@ fn camera_pass(
             done
         }
     };
-    if list.windows(2).any(|w| w[1].start_us < w[0].end_us) {
+    if list.windows(2).any(|w| w[1].start_us + OVERLAP_US < w[0].end_us) {
         warnings
             .push("press windows overlap: events in the overlap count in both presses".to_owned());
     }
