@@ -315,7 +315,10 @@ fn camera_pass(
             done
         }
     };
-    if list.windows(2).any(|w| w[1].start_us + OVERLAP_US < w[0].end_us) {
+    if list
+        .windows(2)
+        .any(|w| w[1].start_us + OVERLAP_US < w[0].end_us)
+    {
         warnings
             .push("press windows overlap: events in the overlap count in both presses".to_owned());
     }

@@ -1,20 +1,26 @@
 //! The public code's way of judging, computed without its wrong roots.
 //!
-//! It judges the presses that it was calibrated on (the first repetition, whatever their role here), drops estimates outside
+//! It calibrates on the presses that it judges (the first repetition, whatever their role here), drops estimates outside
 //! the enclosing square without counting them, and gives the spread of the error lengths as population standard
 //! deviation (numpy's default). Its data reduction keeps max(1, n / k) events of each press, clusters with a core threshold of
 //! one event, so that the centroid is the mean of all events left, drops no estimate, and lets a press without an
 //! estimate count with the largest error found at that factor, which can be a pass. The last is given beside the honest
 //! rate. Estimates are exact intersections: rays that meet behind a camera have none here.
 
-use skinrig_model::{CentroidRule, PressRole};
+use skinrig_model::{
+    CalibrationModel, CentroidRule, LensKind, PressRole, PressVerdict, StereoGeometry,
+};
 
+use crate::calibrate::calibrate;
+use crate::input::SessionInput;
 use crate::kept::Kept;
 use crate::metrics::{mean, quantile, root_mean_square};
 use crate::reduction::{Attempt, Outcome, Trials};
 use crate::result::{
     Analysis, LocationOutcome, PressResult, ReferenceCode, ReferenceReduction, Thinning,
 };
+use crate::sets::CalibrationSet;
+use crate::triangulate::locate;
 
 /// Core threshold of the published data reduction, events.
 const MIN_SAMPLES: u32 = 1;
@@ -24,28 +30,72 @@ const ERROR_OF_NOTHING_MM: f64 = 1.0;
 /// The published numbers of an analysed session. `kept` holds the presses of the first repetition, calibrating ones too;
 /// without them there is no data reduction.
 #[must_use]
-pub fn reference_code(analysis: &Analysis, kept: &Kept) -> ReferenceCode {
-    let presses: Vec<&PressResult> = analysis.presses.iter().filter(|p| is_used(p)).collect();
-    let with_centroids = presses.iter().filter(|p| {
-        let seen = |k: usize| p.views[k].is_some_and(|v| v.centroid_u.is_some());
-        seen(0) && seen(1)
-    });
-    let inside = presses.iter().filter_map(|p| {
+pub fn reference_code(input: &SessionInput, analysis: &Analysis, kept: &Kept) -> ReferenceCode {
+    let mut presses = used(input, analysis);
+    let geometry = calibrated_on_all(input, &mut presses);
+    for press in &mut presses {
+        press.location_outcome = locate(&geometry, &analysis.rig.outline, columns(press));
+    }
+    let judged: Vec<&PressResult> = presses
+        .iter()
+        .filter(|p| !is_left_out_by_hand(p, analysis))
+        .collect();
+    let with_centroids = judged
+        .iter()
+        .filter(|p| columns(p).iter().all(Option::is_some));
+    let inside = judged.iter().filter_map(|p| {
         let in_square = analysis.rig.outline.box_contains(p.estimate()?);
         p.error_mm().filter(|_| in_square)
     });
     let (mut x, mut y): (Vec<f64>, Vec<f64>) = inside.unzip();
     let mut lengths: Vec<f64> = x.iter().zip(&y).map(|(x, y)| libm::hypot(*x, *y)).collect();
     ReferenceCode {
-        presses: presses.len() as u32,
+        presses: judged.len() as u32,
         with_centroids: with_centroids.count() as u32,
         inside: lengths.len() as u32,
         std_of_errors_mm: population_std(&lengths),
         rmse_mm: root_mean_square(&mut lengths),
         rmse_x_mm: root_mean_square(&mut x),
         rmse_y_mm: root_mean_square(&mut y),
-        reduction: reduction(analysis, kept),
+        reduction: reduction(analysis, &geometry, &presses, kept),
     }
+}
+
+/// The presses of the first repetition that were done as planned and that the schedule uses, whatever their role.
+fn used(input: &SessionInput, analysis: &Analysis) -> Vec<PressResult> {
+    let rows = analysis.presses.iter().zip(&input.outcomes);
+    let of_first = rows.filter(|(p, outcome)| {
+        p.repetition == 0
+            && p.role != PressRole::Sync
+            && p.truth.is_some()
+            && outcome
+                .as_ref()
+                .is_some_and(|o| o.verdict == PressVerdict::Valid)
+    });
+    of_first.map(|(p, _)| p.clone()).collect()
+}
+
+fn is_left_out_by_hand(press: &PressResult, analysis: &Analysis) -> bool {
+    analysis.settings.exclude_presses.contains(&press.press.0)
+}
+
+fn columns(press: &PressResult) -> [Option<f64>; 2] {
+    [0, 1].map(|k| press.views[k].and_then(|v| v.centroid_u))
+}
+
+/// The paper's eight parameters on all of `presses`, which are marked as calibrating; the nominal geometry where they do
+/// not determine it.
+fn calibrated_on_all(input: &SessionInput, presses: &mut [PressResult]) -> StereoGeometry {
+    for press in presses.iter_mut() {
+        press.role = PressRole::Calibrate;
+    }
+    let mut start = input.rig.nominal;
+    for camera in &mut start.cameras {
+        camera.lens = camera.lens.as_kind(LensKind::Exponential);
+    }
+    let set = CalibrationSet::from_presses(presses);
+    let fit = calibrate(&set, &start, CalibrationModel::Full, input.settings.seed);
+    fit.map_or(start, |(geometry, _)| geometry)
 }
 
 /// Share of the presses that pass as the public code counts: an error strictly below the threshold, a press without an
@@ -66,26 +116,23 @@ pub fn honest_pass_rate(errors_mm: &[Option<f64>], threshold_mm: f64) -> f64 {
     share(passed.count(), errors_mm.len())
 }
 
-/// Presses of the first repetition with a measured position.
-fn is_used(press: &PressResult) -> bool {
-    press.repetition == 0 && press.role != PressRole::Sync && press.truth.is_some()
-}
-
-fn reduction(analysis: &Analysis, kept: &Kept) -> Vec<ReferenceReduction> {
+fn reduction(
+    analysis: &Analysis,
+    geometry: &StereoGeometry,
+    presses: &[PressResult],
+    kept: &Kept,
+) -> Vec<ReferenceReduction> {
     let attempts: Vec<Attempt<'_>> = kept
         .presses
         .iter()
-        .filter_map(|k| {
-            let row = analysis.presses.get(k.row).filter(|p| is_used(p))?;
-            Attempt::new(row, k)
-        })
+        .filter_map(|k| Attempt::new(presses.iter().find(|p| p.press == k.press)?, k))
         .collect();
     if attempts.is_empty() {
         return Vec::new();
     }
     let settings = &analysis.settings;
     let trials = Trials {
-        geometry: &analysis.geometry,
+        geometry,
         outline: &analysis.rig.outline,
         settings,
         min_samples: MIN_SAMPLES,

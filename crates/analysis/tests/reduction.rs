@@ -203,8 +203,10 @@ fn data_rates_are_means_over_the_presses_that_count() {
 fn the_published_way_judges_the_first_repetition_and_counts_nothing_as_missing() {
     let (mut input, source) = small();
     input.settings.centroid = skinrig_model::CentroidRule::AllClusters;
+    // What it calibrates on is then what this session calibrates on.
+    input.settings.calibration = skinrig_model::CalibrationModel::Full;
     let (a, kept) = analyze_and_keep(&input, &source, Keep::All).unwrap();
-    let r = reference_code(&a, &kept);
+    let r = reference_code(&input, &a, &kept);
     assert_eq!((r.presses, r.with_centroids, r.inside), (25, 25, 25));
     let first = a.presses.iter().filter(|p| p.role == PressRole::Calibrate);
     let errors: Vec<(f64, f64)> = first.map(|p| p.error_mm().unwrap()).collect();
@@ -231,5 +233,14 @@ fn the_published_way_judges_the_first_repetition_and_counts_nothing_as_missing()
     assert!(near(r.reduction[0].pass_rate, 23.0 / 25.0));
     // Kept for the scored repetition alone there is nothing to thin.
     let (_, scored) = analyze_and_keep(&input, &source, Keep::Scored).unwrap();
-    assert_eq!(reference_code(&a, &scored).reduction, []);
+    assert_eq!(reference_code(&input, &a, &scored).reduction, []);
+    // Presses left out by hand are not judged, those that a schedule does not use are not there at all.
+    input.settings.exclude_presses = vec![a.presses[3].press.0];
+    if let Some(outcome) = &mut input.outcomes[4] {
+        outcome.verdict = skinrig_model::PressVerdict::Excluded("not used".to_owned());
+    }
+    let (a, kept) = analyze_and_keep(&input, &source, Keep::All).unwrap();
+    let r = reference_code(&input, &a, &kept);
+    assert_eq!((r.presses, r.inside), (23, 23));
+    assert!(near(r.reduction[0].pass_rate, 22.0 / 24.0));
 }

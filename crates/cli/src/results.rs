@@ -4,7 +4,8 @@ use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
-use skinrig_analysis::{Analysis, SessionInput};
+use skinrig_analysis::reference_code::reference_code;
+use skinrig_analysis::{Analysis, Keep, SessionInput};
 use skinrig_model::{
     AnalysisSettings, CameraId, HostDuration, HostTime, PressOutcome, RigGeometry, RunHeader,
 };
@@ -97,8 +98,18 @@ pub(crate) fn open(path: &Path, choices: Choices<'_>) -> Result<Opened, Failure>
 /// [`Failure::input`] for files that are no readable session or settings that do not parse.
 pub fn analyze_session(path: &Path, choices: Choices<'_>) -> Result<Results, Failure> {
     let session = open(path, choices)?;
-    let analysis =
-        skinrig_analysis::analyze(&session.input, &session.events).map_err(Failure::input)?;
+    // The public code judges calibrating presses too.
+    let keep = if choices.reference_code {
+        Keep::All
+    } else {
+        Keep::Scored
+    };
+    let (input, events) = (&session.input, &session.events);
+    let (mut analysis, kept) =
+        skinrig_analysis::analyze_and_keep(input, events, keep).map_err(Failure::input)?;
+    analysis.reference = choices
+        .reference_code
+        .then(|| reference_code(input, &analysis, &kept));
     let provenance = crate::provenance::provenance(&session.reader, &session.header, &analysis)
         .map_err(|e: RecorderError| Failure::input(e))?;
     Ok(Results {
