@@ -1,6 +1,6 @@
 //! What an analysis asks of its input before it begins.
 
-use skinrig_model::{AnalysisSettings, CameraId, SENSOR_HEIGHT};
+use skinrig_model::{AnalysisSettings, CameraId, Point2, RigGeometry, SENSOR_HEIGHT};
 
 use crate::error::AnalysisError;
 use crate::estimators::BIN_SIDES_PX;
@@ -8,6 +8,9 @@ use crate::input::SessionInput;
 
 /// Largest DBSCAN radius, px.
 const MAX_EPS_PX: f64 = 50.0;
+/// Largest coordinate, length or skew that is taken for one: 1000 km. Squares of it and sums of them stay exact
+/// enough to be distances.
+const MAX_COORDINATE_MM: f64 = 1e9;
 /// Most bootstrap resamples.
 const MAX_RESAMPLES: u32 = 1_000_000;
 
@@ -30,18 +33,66 @@ pub fn input(input: &SessionInput) -> Result<(), AnalysisError> {
         }
     }
     settings(input)?;
-    for camera in CameraId::ALL {
-        let model = &input.rig.nominal.cameras[camera.index()];
-        let (p, a) = (model.position, model.aim);
-        let numbers = [p.x_mm, p.y_mm, a.x_mm, a.y_mm, model.skew_deg];
-        if !numbers.iter().all(|n| n.is_finite()) || p == a {
-            return Err(AnalysisError::Geometry {
-                camera,
-                found: format!("({}, {}) mm", p.x_mm, p.y_mm),
+    for planned in &input.planned {
+        let numbers = [planned.at.x_mm, planned.at.y_mm, planned.depth_mm];
+        if !numbers.iter().all(|n| n.abs() <= MAX_COORDINATE_MM) {
+            return Err(AnalysisError::Plan {
+                press: planned.id.0,
+                found: format!(
+                    "({}, {}) mm, depth {} mm",
+                    numbers[0], numbers[1], numbers[2]
+                ),
             });
         }
     }
-    Ok(())
+    geometry(&input.rig)
+}
+
+/// True for a point with finite coordinates within 1000 km of the origin.
+pub fn is_place(p: &Point2) -> bool {
+    p.x_mm.abs() <= MAX_COORDINATE_MM && p.y_mm.abs() <= MAX_COORDINATE_MM
+}
+
+/// Cameras and outline are such that rays, areas and distances are numbers.
+fn geometry(rig: &RigGeometry) -> Result<(), AnalysisError> {
+    for camera in CameraId::ALL {
+        let model = &rig.nominal.cameras[camera.index()];
+        let (p, a) = (model.position, model.aim);
+        let numbers = [p.x_mm, p.y_mm, a.x_mm, a.y_mm, model.skew_deg];
+        let edge_deg = model.lens.angle_deg(1.0).0;
+        let finite = numbers.iter().all(|n| n.abs() <= MAX_COORDINATE_MM);
+        let sees = edge_deg > 0.0 && edge_deg <= 360.0;
+        if !finite || !sees || p == a {
+            return Err(AnalysisError::Geometry {
+                camera,
+                found: format!(
+                    "({}, {}) mm, skew {}°, {:?}",
+                    p.x_mm, p.y_mm, model.skew_deg, model.lens
+                ),
+            });
+        }
+    }
+    let o = &rig.outline;
+    let side = |v: f64| v > 0.0 && v <= MAX_COORDINATE_MM;
+    let corner = |v: f64| v >= 0.0 && v <= 0.5 * o.width_mm.min(o.height_mm);
+    let placed = [o.centre.x_mm, o.centre.y_mm]
+        .iter()
+        .all(|n| n.abs() <= MAX_COORDINATE_MM);
+    if placed
+        && side(o.width_mm)
+        && side(o.height_mm)
+        && corner(o.chamfer_mm)
+        && corner(o.radius_mm)
+    {
+        Ok(())
+    } else {
+        Err(AnalysisError::Outline {
+            found: format!(
+                "{} x {} mm about ({}, {}), chamfer {} mm, radius {} mm",
+                o.width_mm, o.height_mm, o.centre.x_mm, o.centre.y_mm, o.chamfer_mm, o.radius_mm
+            ),
+        })
+    }
 }
 
 fn settings(input: &SessionInput) -> Result<(), AnalysisError> {
@@ -88,6 +139,12 @@ fn settings(input: &SessionInput) -> Result<(), AnalysisError> {
         (0.1..=10_000.0).contains(&s.rate_bin_ms),
         "a bin between 0.1 ms and 10 s",
         s.rate_bin_ms,
+    )?;
+    number(
+        "min_response_sigma",
+        (0.0..=1e6).contains(&s.min_response_sigma),
+        "a number of standard errors, 0 or more",
+        s.min_response_sigma,
     )?;
     number(
         "min_ray_sine",
@@ -234,14 +291,14 @@ fn studies(
     )?;
     number(
         "cmre.sigma_mm",
-        positive(c.sigma_mm, 1000.0),
-        "a length above 0",
+        (0.001..=1000.0).contains(&c.sigma_mm),
+        "a length between 0.001 mm and 1 m",
         c.sigma_mm,
     )?;
     number(
         "cmre.region_mm",
-        positive(c.region_mm, 1e6),
-        "a length above 0",
+        (0.001..=1e6).contains(&c.region_mm),
+        "a length between 0.001 mm and 1 km",
         c.region_mm,
     )
 }

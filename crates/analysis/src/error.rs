@@ -37,11 +37,29 @@ pub enum AnalysisError {
     },
     /// The rig's geometry cannot be used.
     #[error(
-        "expected finite camera positions away from the point they aim at, found {found} for {camera}; check the rig description of the session"
+        "expected a camera within 1000 km of the origin and away from the point it aims at, with a lens that sees, found {found} for {camera}; check the rig description of the session"
     )]
     Geometry {
         /// Which camera.
         camera: CameraId,
+        /// What was given.
+        found: String,
+    },
+    /// The skin's outline is no outline.
+    #[error(
+        "expected a skin outline with sides above 0 mm and corners that fit into them, found {found}; check the rig description of the session"
+    )]
+    Outline {
+        /// What was given.
+        found: String,
+    },
+    /// The plan has a number that is none.
+    #[error(
+        "expected finite positions and depths in the plan, found {found} for press {press}; check the session's plan"
+    )]
+    Plan {
+        /// Which press.
+        press: u32,
         /// What was given.
         found: String,
     },

@@ -3,6 +3,7 @@
 use skinrig_model::{PressRole, PressVerdict};
 
 use crate::calibrate::{Calibrated, calibrated};
+use crate::check;
 use crate::input::SessionInput;
 use crate::result::{LocationOutcome, PressResult, PressView};
 use crate::triangulate::locate;
@@ -72,7 +73,9 @@ fn rows(input: &SessionInput, seen: [Seen<'_>; 2]) -> Vec<PressResult> {
                 location: planned.location,
                 planned: planned.at,
                 depth_mm: planned.depth_mm,
-                truth: outcome.as_ref().and_then(|o| o.measured_at),
+                truth: outcome
+                    .as_ref()
+                    .and_then(|o| o.measured_at.filter(check::is_place)),
                 verdict: String::new(),
                 reason: None,
                 rule: None,

@@ -38,6 +38,7 @@ pub mod result;
 mod seeded;
 pub mod segment;
 pub mod sets;
+pub mod sums;
 pub mod tradeoff;
 pub mod triangulate;
 mod verdict;

@@ -9,6 +9,7 @@ use skinrig_model::{Point2, SkinOutline};
 use crate::result::{Estimate, Metrics, Penalised};
 use crate::seeded;
 use crate::sets::{ScoreSet, Scored};
+use crate::sums::{self, Sum};
 
 /// Share of a 95 % interval that lies outside on each side.
 const TAIL: f64 = 0.025;
@@ -31,7 +32,8 @@ pub enum Exclusions {
 struct Place {
     attempted: u32,
     within: u32,
-    errors: Vec<[f64; 2]>,
+    /// Sums of x², y², x and y of the errors.
+    totals: [f64; 4],
     lengths: Vec<f64>,
     /// Standard deviation between repetitions at each depth that has at least two.
     repeat_std: Vec<f64>,
@@ -102,47 +104,42 @@ fn place(group: &[&Scored], exclusions: Exclusions, within_mm: f64) -> Place {
         .filter(|repeats| repeats.len() >= 2)
         .map(|repeats| {
             let n = repeats.len() as f64;
-            let mean =
-                |f: fn(&Point2) -> f64| repeats.iter().map(|(_, at, _)| f(at)).sum::<f64>() / n;
-            let (mx, my) = (mean(|p| p.x_mm), mean(|p| p.y_mm));
-            let squares: f64 = repeats
-                .iter()
-                .map(|(_, at, _)| {
-                    let (dx, dy) = (at.x_mm - mx, at.y_mm - my);
-                    dx * dx + dy * dy
-                })
-                .sum();
-            (squares / (n - 1.0)).sqrt()
+            spread_mm(repeats.iter().map(|(_, at, _)| *at)) * (n / (n - 1.0)).sqrt()
         })
         .collect();
     let lengths: Vec<f64> = errors.iter().map(|e| libm::hypot(e[0], e[1])).collect();
+    let total = |f: fn(&[f64; 2]) -> f64| sums::sum(errors.iter().map(f));
     Place {
+        totals: [
+            total(|e| e[0] * e[0]),
+            total(|e| e[1] * e[1]),
+            total(|e| e[0]),
+            total(|e| e[1]),
+        ],
         attempted: group.len() as u32,
         within: lengths.iter().filter(|e| **e <= within_mm).count() as u32,
         lengths,
-        errors,
         repeat_std,
     }
 }
 
 fn evaluate(places: &[&Place]) -> Values {
-    let mut sums = [0.0; 4];
+    let mut totals = [Sum::default(); 4];
+    let mut std_sum = Sum::default();
     let mut lengths = Vec::new();
-    let (mut attempted, mut within, mut stds, mut std_sum) = (0u32, 0u32, 0u32, 0.0);
+    let (mut attempted, mut within, mut stds) = (0u32, 0u32, 0u32);
     for place in places {
         attempted += place.attempted;
         within += place.within;
         lengths.extend_from_slice(&place.lengths);
-        for [dx, dy] in &place.errors {
-            for (sum, term) in sums.iter_mut().zip([dx * dx, dy * dy, *dx, *dy]) {
-                *sum += term;
-            }
+        for (sum, term) in totals.iter_mut().zip(place.totals) {
+            sum.add(term);
         }
         stds += place.repeat_std.len() as u32;
-        std_sum += place.repeat_std.iter().sum::<f64>();
+        place.repeat_std.iter().for_each(|s| std_sum.add(*s));
     }
     let n = lengths.len() as u32;
-    let [xx, yy, x, y] = sums.map(|s| s / f64::from(n));
+    let [xx, yy, x, y] = totals.map(|s| s.total() / f64::from(n));
     let some = |value: f64| (n > 0).then_some(value);
     [
         (some((xx + yy).sqrt()), n),
@@ -152,7 +149,7 @@ fn evaluate(places: &[&Place]) -> Values {
         (some(y), n),
         (quantile(&mut lengths, 0.5), n),
         (quantile(&mut lengths, 0.95), n),
-        ((stds > 0).then(|| std_sum / f64::from(stds)), stds),
+        ((stds > 0).then(|| std_sum.total() / f64::from(stds)), stds),
         (
             (attempted > 0).then(|| f64::from(n) / f64::from(attempted)),
             attempted,
@@ -187,25 +184,18 @@ pub fn penalised(set: &ScoreSet, penalty_mm: Option<f64>, resamples: u32, seed: 
 
 /// Root mean square distance of points from their mean, mm; 0 without points.
 pub(crate) fn spread_mm(points: impl Iterator<Item = Point2> + Clone) -> f64 {
-    let n = points.clone().count().max(1) as f64;
-    let mean = |f: fn(&Point2) -> f64| points.clone().map(|p| f(&p)).sum::<f64>() / n;
-    let (x, y) = (mean(|p| p.x_mm), mean(|p| p.y_mm));
-    let squares: f64 = points
-        .map(|p| (p.x_mm - x).powi(2) + (p.y_mm - y).powi(2))
-        .sum();
-    (squares / n).sqrt()
+    let variance = |f: fn(Point2) -> f64| sums::variance(points.clone().map(f)).unwrap_or(0.0);
+    (variance(|p| p.x_mm) + variance(|p| p.y_mm)).sqrt()
 }
 
 /// The root mean square; `None` without values.
 pub(crate) fn root_mean_square(values: &mut [f64]) -> Option<f64> {
-    let squares: f64 = values.iter().map(|v| v * v).sum();
-    (!values.is_empty()).then(|| (squares / values.len() as f64).sqrt())
+    sums::root_mean_square(values.iter().copied())
 }
 
 /// The arithmetic mean; `None` without values.
 pub(crate) fn mean(values: &mut [f64]) -> Option<f64> {
-    let sum: f64 = values.iter().sum();
-    (!values.is_empty()).then(|| sum / values.len() as f64)
+    sums::mean(values.iter().copied())
 }
 
 /// `statistic` of all values, with the percentile interval of a bootstrap that draws whole locations. Each value comes

@@ -40,7 +40,10 @@ impl RateHistogram {
             self.beyond += 1;
             return;
         }
-        self.counts[self.last] = self.counts[self.last].saturating_add(1);
+        match self.counts[self.last].checked_add(1) {
+            Some(count) => self.counts[self.last] = count,
+            None => self.beyond += 1,
+        }
     }
 
     /// Makes `bin` the current one; false when that would take more than [`MAX_BINS`].
@@ -48,9 +51,10 @@ impl RateHistogram {
         if self.counts.is_empty() {
             self.first_bin = bin;
         }
-        let end = self.first_bin + self.counts.len() as u64;
-        let (low, high) = (bin.min(self.first_bin), (bin + 1).max(end));
-        if high - low > MAX_BINS {
+        // Last bins, not ends: the very last bin of 64 bits has no end.
+        let last = self.first_bin + (self.counts.len() as u64).saturating_sub(1);
+        let (low, high) = (bin.min(self.first_bin), bin.max(last));
+        if high - low >= MAX_BINS {
             return false;
         }
         if low < self.first_bin {
@@ -58,7 +62,7 @@ impl RateHistogram {
             self.counts.splice(0..0, std::iter::repeat_n(0, missing));
             self.first_bin = low;
         }
-        self.counts.resize((high - low) as usize, 0);
+        self.counts.resize((high - low) as usize + 1, 0);
         self.last = (bin - self.first_bin) as usize;
         self.last_us = bin * self.bin_us;
         true
@@ -82,7 +86,7 @@ impl RateHistogram {
         &self.counts
     }
 
-    /// Events whose time lies too far from the others to be counted.
+    /// Events that are not counted: their time lies too far from the others, or their bin is full (2^32 - 1).
     #[must_use]
     pub const fn beyond(&self) -> u64 {
         self.beyond

@@ -82,7 +82,7 @@ pub fn windows(
     let mut earlier_end = 0;
     for (window, cut_us) in &mut windows {
         let from = window.start_us.saturating_sub(IDLE_US).max(earlier_end);
-        if from + LEAST_IDLE_US <= window.start_us {
+        if window.start_us.saturating_sub(from) >= LEAST_IDLE_US {
             window.idle_start_us = from;
         }
         // A window that is cut short leaves the rest of its press, which is not idle time.

@@ -13,6 +13,7 @@
 
 use skinrig_model::{AnalysisSettings, CameraId, PressOutcome, PressRole, PressVerdict};
 
+use crate::check;
 use crate::result::{Estimate, LocationOutcome, PressCounts, PressResult, PressView};
 
 /// A verdict and the rule behind it.
@@ -106,10 +107,7 @@ pub fn from_data(
     if outcome.timing.is_none() {
         return Judgement::invalid("no measured times");
     }
-    if outcome
-        .measured_at
-        .is_none_or(|p| !p.x_mm.is_finite() || !p.y_mm.is_finite())
-    {
+    if outcome.measured_at.is_none_or(|p| !check::is_place(&p)) {
         return Judgement::invalid("no measured position");
     }
     for camera in CameraId::ALL {

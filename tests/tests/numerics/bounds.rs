@@ -33,6 +33,17 @@ bounds! {
     SCALE: "scale law" <= 2.0;
     TRANSLATION: "translation law" <= 2.0;
     CENTROID: "centroid of a cluster" <= 1.0;
+    CLOCK_MAP: "camera time of a host time" <= 3.0;
+    CLOCK_BACK: "host time of a camera time" <= 6.0;
+    WINDOW: "edge of a window" <= 8.0;
+    DRIFT: "drift from marks" <= 2e-3;
+    OFFSET: "camera time from marks" <= 0.5;
+    RATES_DRIFT: "drift from event rates" <= 5.0;
+    RATES_OFFSET: "camera time from event rates" <= 20.0;
+    SUM: "sum" <= 1.0;
+    RMS: "root mean square" <= 4.0;
+    VARIANCE: "variance" <= 8.0;
+    RATE: "event rate" <= 2.0;
 }
 
 /// Watches one bound: fails at the first error above it, and says at the end how near the worst one came.

@@ -4,8 +4,17 @@
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 mod bounds;
+mod calibration;
+mod clocks;
 mod laws;
 mod lens;
 mod precise;
 mod presses;
+mod rates;
 mod rays;
+mod reference_cases;
+mod same_bits;
+mod sums;
+#[path = "../../../crates/analysis/tests/session/support.rs"]
+mod support;
+mod wild;

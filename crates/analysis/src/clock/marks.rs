@@ -6,6 +6,7 @@ use skinrig_model::pulse::decode_marks;
 use skinrig_model::{Mark, SentMark, TriggerEdge};
 
 use super::line::{self, Pair};
+use super::{NO_CLOCK_DRIFT, NO_TIME_US};
 use crate::result::{ClockFit, ClockMethod};
 
 /// Residuals are never judged finer than this, µs: the camera's clock ticks in µs.
@@ -26,7 +27,8 @@ pub struct MarksFit {
 
 /// Fits a camera's clock from the edges on its trigger channel and the marks that were sent.
 ///
-/// `None` when fewer than three marks can be matched; the session then has to be aligned by its presses.
+/// `None` when fewer than three marks can be matched, when they lie on no line that could be a clock, or when their
+/// camera times are beyond 2^62 µs; the session then has to be aligned by its presses.
 /// Marks that were sent or seen several times (a repeated attempt sends the same name again) are matched by
 /// time once the others have given a first fit.
 #[must_use]
@@ -48,6 +50,9 @@ pub fn fit_marks(edges: &[TriggerEdge], channel: u8, sent: &[SentMark]) -> Optio
     }
     // Camera times relative to the first mark, exactly, so that large counters lose nothing.
     let reference = decoded.marks.first()?.t_us;
+    if decoded.marks.iter().any(|m| m.t_us >= NO_TIME_US) {
+        return None;
+    }
     let relative = |t_us: u64| t_us.wrapping_sub(reference) as i64 as f64;
 
     let mut pairs = Vec::new();
@@ -91,7 +96,7 @@ pub fn fit_marks(edges: &[TriggerEdge], channel: u8, sent: &[SentMark]) -> Optio
             }
         }
     }
-    let line = line::fit(&pairs, FLOOR_US)?;
+    let line = line::fit(&pairs, FLOOR_US).filter(|l| l.drift.abs() <= NO_CLOCK_DRIFT)?;
     let fit = ClockFit {
         method: ClockMethod::TriggerMarks,
         offset_us: reference as f64 + line.offset_us,

@@ -11,6 +11,7 @@
 //!    expected, at least half as strong as the median, counts +1, one that is not -1, one outside the recording 0. Half the distance to the next best is
 //!    the margin, in presses; a better neighbour is taken instead.
 
+use super::NO_TIME_US;
 use super::correlate::Correlator;
 use super::line::{self, Pair, median};
 use crate::rates::RateHistogram;
@@ -40,7 +41,7 @@ pub struct RatesFit {
 const MOST_BINS: f64 = 16_777_216.0;
 /// Bins that are merged for the first search.
 const MERGE: usize = 5;
-/// Largest drift of the first search.
+/// Largest drift of the first search; one found beyond it is searched for again, about itself.
 const MOST_DRIFT: f64 = 200e-6;
 /// Two drifts of the first search differ by this at the ends of the session, µs.
 const DRIFT_STEP_US: f64 = 150_000.0;
@@ -92,11 +93,22 @@ pub fn fit_rates(rates: &RateHistogram, presses: &[PressSpan]) -> Result<RatesFi
             span_us * 1e-6
         ));
     }
+    if rates.start_us() >= NO_TIME_US {
+        return Err(format!(
+            "expected camera times below 2^62 µs, found events at {} µs: the time base of the stream is broken",
+            rates.start_us()
+        ));
+    }
     let activity = Activity::new(rates, presses)?;
-    let mut map = first_map(&activity, presses);
+    let mut map = first_map(&activity, presses, 0.0);
     let period = period_us(presses);
     let mut line;
     (map, line) = refine(&activity, presses, map)?;
+    if line.drift.abs() > MOST_DRIFT {
+        // The presses ran away from the first search by more than their own lags show: search about this drift.
+        map = first_map(&activity, presses, line.drift);
+        (map, line) = refine(&activity, presses, map)?;
+    }
     let (shift, margin) = best_shift(&activity, presses, map, period);
     if shift != 0 {
         map.offset_us += f64::from(shift) * period;
@@ -213,8 +225,8 @@ impl Activity {
     }
 }
 
-/// The clock at which the press spans best match the activity.
-fn first_map(activity: &Activity, presses: &[PressSpan]) -> Map {
+/// The clock at which the press spans best match the activity, with a drift within [`MOST_DRIFT`] of `about`.
+fn first_map(activity: &Activity, presses: &[PressSpan], about: f64) -> Map {
     let bin_us = activity.bin_us * MERGE as f64;
     let mean = activity.values.iter().sum::<f64>() / activity.values.len() as f64;
     let merged: Vec<f64> = activity
@@ -229,7 +241,7 @@ fn first_map(activity: &Activity, presses: &[PressSpan]) -> Map {
         .max(presses[presses.len() - 1].release_us - middle_us)
         .max(1.0);
     let length = ((presses[presses.len() - 1].release_us + side_us - from_us) / bin_us
-        * (1.0 + MOST_DRIFT))
+        * (1.0 + about.abs() + MOST_DRIFT))
         .ceil() as usize
         + 1;
     let correlator = Correlator::new(&merged, length);
@@ -237,9 +249,9 @@ fn first_map(activity: &Activity, presses: &[PressSpan]) -> Map {
     let mut best: Option<(f64, Map)> = None;
     for step in -steps..=steps {
         let drift = if steps == 0 {
-            0.0
+            about
         } else {
-            MOST_DRIFT * f64::from(step) / f64::from(steps)
+            about + MOST_DRIFT * f64::from(step) / f64::from(steps)
         };
         // Time within the template of a host time: the middle of the session stays where it is.
         let place = |host_us: f64| {

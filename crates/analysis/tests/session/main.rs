@@ -335,7 +335,7 @@ fn contradictions_are_refused_with_their_place() {
         "`eps_px`, found NaN",
         "`min_samples`, found 0",
         "`crop_v`, found 300..=480",
-        "found (10, 2) mm for camera 2",
+        "found (10, 2) mm, skew -1.47°",
         "expected events within 640 x 480 px, found (640, ",
     ];
     for (found, wanted) in all.iter().zip(wanted) {

@@ -1,0 +1,28 @@
+//! The same session gives the same bytes, however many threads work and however its events are cut.
+
+use skinrig_analysis::{SessionInput, analyze};
+
+use crate::support::{Memory, session};
+
+fn bytes(threads: usize, input: &SessionInput, source: &Memory) -> String {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+    let work = || serde_json::to_string(&analyze(input, source).unwrap()).unwrap();
+    pool.build().unwrap().install(work)
+}
+
+#[test]
+fn one_thread_or_two_and_slices_of_any_size_give_identical_bytes() {
+    let (mut input, mut source) = session();
+    input.settings.study_presses = 8;
+    input.settings.reduction.seeds = 2;
+    let wanted = bytes(1, &input, &source);
+    assert!(wanted.len() > 100_000);
+    for (threads, slice) in [(2, 1000), (2, 1), (3, 4096), (1, usize::MAX)] {
+        source.slice = slice;
+        let found = bytes(threads, &input, &source);
+        assert!(found == wanted, "{threads} threads, slices of {slice}");
+    }
+    // And they are bytes of this session: another seed gives others.
+    input.settings.seed += 1;
+    assert!(bytes(2, &input, &source) != wanted);
+}
