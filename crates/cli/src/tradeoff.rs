@@ -42,7 +42,10 @@ fn answers<'a>(result: &'a Tradeoff, args: &TradeoffArgs) -> Vec<Answer<'a>> {
         row: result.cheapest(mm, args.cost.into()),
     });
     let budget = args.budget.map(|s| Answer {
-        question: format!("most accurate within {} µs of CPU time per press", s * 1e6),
+        question: format!(
+            "most accurate within {} µs of CPU time per press",
+            (s * 1e9).round() / 1e3
+        ),
         row: result.most_accurate(s * 1e6, Cost::Cpu),
     });
     target.into_iter().chain(budget).collect()

@@ -111,12 +111,12 @@ pub fn terminal_table(result: &Tradeoff, color: bool) -> String {
     );
     let _ = writeln!(
         out,
-        "{:<4}{:<LABEL$} {:>6} {:>16} {:>4} {:>7} {:>6} {:>7} {:>7} {:>6}",
+        "{:<4}{:<LABEL$} {:>6} {:>14} {:>4} {:>7} {:>6} {:>7} {:>7} {:>6}",
         "", "", "RMSE", "95 % interval", "n", "located", "within", "CPU", "sent", "delay"
     );
     let _ = writeln!(
         out,
-        "{:<4}{:<LABEL$} {:>6} {:>16} {:>4} {:>7} {:>6} {:>7} {:>7} {:>6}",
+        "{:<4}{:<LABEL$} {:>6} {:>14} {:>4} {:>7} {:>6} {:>7} {:>7} {:>6}",
         "", "", "mm", "mm", "", "%", "%", "µs", "kB/s", "ms"
     );
     for (i, row) in ordered(result).into_iter().enumerate() {
@@ -124,8 +124,11 @@ pub fn terminal_table(result: &Tradeoff, color: bool) -> String {
         if !row.competes {
             name = format!("({name})");
         }
+        if name.chars().count() > LABEL {
+            name = name.chars().take(LABEL - 1).chain(['…']).collect();
+        }
         let line = format!(
-            "{:<4}{:<LABEL$} {:>6} {:>16} {:>4} {:>7} {:>6} {:>7} {:>7} {:>6}",
+            "{:<4}{:<LABEL$} {:>6} {:>14} {:>4} {:>7} {:>6} {:>7} {:>7} {:>6}",
             fronts(row),
             name,
             number(row.rmse_mm.value, 2),

@@ -14,3 +14,4 @@ mod pipeline;
 mod replay;
 mod streams;
 mod support;
+mod tradeoff;

@@ -1,0 +1,108 @@
+//! Speed against accuracy: what is printed selects what was measured.
+
+use serde_json::Value;
+
+use crate::support::{Lab, skinrig, text};
+
+/// A campaign whose first round calibrates.
+fn session(lab: &Lab) -> String {
+    text(&lab.record(
+        "s",
+        &[
+            "--set",
+            "evaluation.calibrate=[1]",
+            "--set",
+            "evaluation.score=[2]",
+            "--set",
+            "analysis.calibration=positions",
+            "--set",
+            "analysis.bootstrap_resamples=50",
+        ],
+    ))
+}
+
+#[test]
+fn the_printed_lines_select_what_was_measured_to_the_last_bit() {
+    let lab = Lab::new();
+    let session = session(&lab);
+    let arguments = [
+        "--json",
+        "tradeoff",
+        &session,
+        "--repeats",
+        "1",
+        "--budget",
+        "10s",
+    ];
+    let said = skinrig(&arguments).code(0).json();
+    let rows = said["tradeoff"]["rows"].as_array().unwrap();
+    assert!(rows.len() > 60, "{}", rows.len());
+    // The session's own choice, and one with every kind of change.
+    let wanted = |key: &str| {
+        let has = |row: &&Value| row["overrides"].to_string().contains(key);
+        rows.iter()
+            .find(has)
+            .unwrap_or_else(|| panic!("no row with {key}"))
+    };
+    let keys = [
+        "estimator",
+        "precision",
+        "thinning",
+        "bin",
+        "window_after_contact",
+        "crop",
+    ];
+    for row in std::iter::once(&rows[0]).chain(keys.map(wanted).iter().copied()) {
+        let out = lab.text("one.json");
+        let mut arguments = vec![
+            "--json".to_owned(),
+            "analyze".into(),
+            session.clone(),
+            "--out".into(),
+            out,
+        ];
+        for pair in row["overrides"].as_array().unwrap() {
+            let (key, value) = (pair[0].as_str().unwrap(), pair[1].as_str().unwrap());
+            arguments.extend(["--set".to_owned(), format!("{key}={value}")]);
+        }
+        let analysis = &skinrig(&arguments).code(0).json()["analysis"];
+        assert_eq!(
+            analysis["scored"]["rmse_mm"], row["rmse_mm"],
+            "{}",
+            row["overrides"]
+        );
+        assert_eq!(
+            analysis["scored"]["located_rate"], row["located_rate"],
+            "{}",
+            row["overrides"]
+        );
+    }
+    assert!(said["answers"][0]["row"]["cpu_us"].as_f64().unwrap() > 0.0);
+    let page = std::fs::read_to_string(said["files"]["page"].as_str().unwrap()).unwrap();
+    assert!(page.contains("<svg") && page.contains("</html>"), "{page}");
+}
+
+#[test]
+fn a_demand_that_nothing_meets_ends_with_code_4_and_a_table_fits_a_terminal() {
+    let lab = Lab::new();
+    let session = session(&lab);
+    let said = skinrig(&[
+        "tradeoff",
+        &session,
+        "--repeats",
+        "1",
+        "--target-rmse",
+        "1 um",
+    ])
+    .code(4)
+    .complains(&["--full"]);
+    assert!(
+        said.out.lines().all(|l| l.chars().count() <= 100),
+        "{}",
+        said.out
+    );
+    assert!(said.out.contains("streaming f32"), "{}", said.out);
+    skinrig(&["tradeoff", &session, "--budget", "5 mm"])
+        .code(2)
+        .complains(&["time"]);
+}
