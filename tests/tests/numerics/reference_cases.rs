@@ -106,6 +106,10 @@ const CASES: &[(&str, &str, &str, &str)] = &[
     ("cmre", "far_outside", COVERAGE, CONTACT_MAPS),
     ("cmre", "gt_outside", COVERAGE, CONTACT_MAPS),
     ("cmre", "gt_on_edge", COVERAGE, CONTACT_MAPS),
+    ("passrate", "same", REFERENCE, PASS_RATE),
+    ("passrate", "none_found", REFERENCE, PASS_RATE),
+    ("passrate", "one_found", REFERENCE, PASS_RATE),
+    ("passrate", "half_missing", REFERENCE, PASS_RATE),
     (
         "latency",
         "normal",
@@ -187,6 +191,7 @@ const CALIBRATION: &str = "crates/analysis/tests/calibration.rs";
 const COVERAGE: &str = "crates/analysis/tests/coverage.rs";
 const LATENCY: &str = "crates/analysis/tests/latency.rs";
 const ACCUMULATE: &str = "crates/analysis/src/accumulate.rs";
+const REFERENCE: &str = "crates/analysis/src/reference_code.rs";
 const RAYS: &str = "tests/tests/numerics/rays.rs";
 const LENS: &str = "tests/tests/numerics/lens.rs";
 const PRESSES: &str = "tests/tests/numerics/presses.rs";
@@ -196,6 +201,7 @@ const SCIKIT: &str = "the_labels_are_those_of_scikit_learn";
 const CONTACT_MAPS: &str = "contact_maps_score_as_in_the_public_code_but_for_its_two_faults";
 const BACKGROUND: &str = "a_background_has_a_rate_whatever_is_in_it";
 const NO_ANSWER: &str = "trials_without_an_answer_are_answered_with_none";
+const PASS_RATE: &str = "a_press_that_is_not_found_passes_as_published_and_fails_here";
 const WINDOWS: &str =
     "windows_include_their_start_and_exclude_their_end_in_any_order_within_the_slack";
 
