@@ -40,7 +40,7 @@ bounds! {
     OFFSET: "camera time from marks" <= 0.5;
     RATES_DRIFT: "drift from event rates" <= 5.0;
     RATES_OFFSET: "camera time from event rates" <= 20.0;
-    SUM: "sum" <= 1.0;
+    SUM: "sum" <= 4.0;
     RMS: "root mean square" <= 4.0;
     VARIANCE: "variance" <= 8.0;
     RATE: "event rate" <= 2.0;

@@ -63,8 +63,12 @@ fn hold(n: u64) {
         let exact = s.exact(|x| (&x - &centre) * (&x - &centre)) / &count;
         let found = variance(s.values()).unwrap();
         if step == 0.0 {
-            // The mean of equal values is that value, so that nothing is left.
-            assert_eq!((mean(s.values()), found), (Some(0.1), 0.0));
+            // Equal values have no spread but that of the error of their mean.
+            let (mean, rounding) = (mean(s.values()).unwrap(), 4.0 * UNIT * 0.1);
+            assert!(
+                (mean - 0.1).abs() <= rounding && found <= rounding * rounding,
+                "{at}"
+            );
         } else {
             watch[2].see(
                 precise::error(found, &exact) / precise::near(&exact) / UNIT,
@@ -80,7 +84,7 @@ fn ten_million_values() {
 }
 
 #[test]
-#[ignore = "a minute: cargo test --release -p skinrig-tests --test numerics -- --ignored thousand_million"]
+#[ignore = "a minute or two: cargo test --release -p skinrig-tests --test numerics -- --ignored thousand_million"]
 fn a_thousand_million_values() {
     hold(1_000_000_007);
 }
