@@ -296,9 +296,9 @@ fn studies(
         c.sigma_mm,
     )?;
     number(
-        "cmre.region_mm",
-        (0.001..=1e6).contains(&c.region_mm),
+        "cmre.sr_mm",
+        (0.001..=1e6).contains(&c.sr_mm),
         "a length between 0.001 mm and 1 km",
-        c.region_mm,
+        c.sr_mm,
     )
 }

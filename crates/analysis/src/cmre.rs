@@ -71,7 +71,7 @@ pub struct ContactMap {
     extent_mm: (f64, f64),
     cell_mm: f64,
     sigma_mm: f64,
-    region_mm: f64,
+    sr_mm: f64,
     /// Cells along x and y; the last ones stand out where the side is no multiple of the cell.
     cells: (u32, u32),
 }
@@ -95,7 +95,7 @@ impl ContactMap {
         };
         let cell_mm = positive("cmre.cell_mm", settings.cell_mm)?;
         let sigma_mm = positive("cmre.sigma_mm", settings.sigma_mm)?;
-        let region_mm = positive("cmre.region_mm", settings.region_mm)?;
+        let sr_mm = positive("cmre.sr_mm", settings.sr_mm)?;
         let extent_mm = (outline.width_mm, outline.height_mm);
         let along = |side: f64| (side / cell_mm).ceil();
         let most = along(extent_mm.0).max(along(extent_mm.1));
@@ -114,7 +114,7 @@ impl ContactMap {
             extent_mm,
             cell_mm,
             sigma_mm,
-            region_mm,
+            sr_mm,
             cells: (along(extent_mm.0) as u32, along(extent_mm.1) as u32),
         })
     }
@@ -138,7 +138,7 @@ impl ContactMap {
         let dy = squares(self.corner.y_mm, estimate.y_mm, self.cells.1);
         let least = |d: &[f64]| d.iter().copied().fold(f64::INFINITY, f64::min);
         let nearest = (least(&dx), least(&dy));
-        let edge = (self.region_mm / SR_DIVISOR).powi(2);
+        let edge = (self.sr_mm / SR_DIVISOR).powi(2);
         let difference = |c: f64| libm::tanh(GAIN * c * c);
         let mut score = 0.0;
         for (i, x) in (0..).zip(&dx) {

@@ -120,7 +120,7 @@ fn contact_maps_score_as_in_the_public_code_but_for_its_two_faults() {
     let settings = CmreSettings {
         cell_mm: 5.0,
         sigma_mm: 1.0,
-        region_mm: 5.0,
+        sr_mm: 5.0,
     };
     let map = ContactMap::new(&SKIN, &settings).unwrap();
     let score = |estimate: (f64, f64), truth: (f64, f64)| {
@@ -174,11 +174,11 @@ fn contact_maps_score_as_in_the_public_code_but_for_its_two_faults() {
 
 #[test]
 fn contact_maps_without_sense_are_refused() {
-    let bad = |cell_mm: f64, sigma_mm: f64, region_mm: f64| {
+    let bad = |cell_mm: f64, sigma_mm: f64, sr_mm: f64| {
         let settings = CmreSettings {
             cell_mm,
             sigma_mm,
-            region_mm,
+            sr_mm,
         };
         ContactMap::new(&SKIN, &settings).unwrap_err().to_string()
     };
@@ -186,7 +186,7 @@ fn contact_maps_without_sense_are_refused() {
         (bad(0.0, 1.0, 5.0), "cmre.cell_mm"),
         (bad(0.1, 1.0, 5.0), "cmre.cell_mm"),
         (bad(5.0, f64::NAN, 5.0), "cmre.sigma_mm"),
-        (bad(5.0, 1.0, f64::INFINITY), "cmre.region_mm"),
+        (bad(5.0, 1.0, f64::INFINITY), "cmre.sr_mm"),
     ] {
         assert!(message.contains(name), "{message}");
     }

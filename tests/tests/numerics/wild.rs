@@ -86,7 +86,7 @@ fn spoil(input: &mut skinrig_analysis::SessionInput, source: &mut Memory, fault:
         15 => settings.min_ray_sine = x,
         16 => settings.cmre.cell_mm = x,
         17 => settings.cmre.sigma_mm = x,
-        18 => settings.cmre.region_mm = x,
+        18 => settings.cmre.sr_mm = x,
         19 => settings.latency.bin_ms = x,
         20 => settings.latency.alpha = x,
         21 => input.planned[row].at = Point2::new(x, 2.0),

@@ -156,7 +156,7 @@ fn cmre(f: &Field) -> Option<CmreSettings> {
     Some(CmreSettings {
         cell_mm: f.quantity("cell")?,
         sigma_mm: f.quantity("sigma")?,
-        region_mm: f.quantity("region")?,
+        sr_mm: f.quantity("sr")?,
     })
 }
 

@@ -52,7 +52,7 @@ fn absent_settings_are_the_documented_defaults() {
         "analysis.latency.background=after",
         "analysis.cmre.cell=4 mm",
         "analysis.cmre.sigma=2 mm",
-        "analysis.cmre.region=80 mm",
+        "analysis.cmre.sr=80 mm",
         "analysis.bootstrap_resamples=10",
         "analysis.seed=9",
         "analysis.estimator=streaming",

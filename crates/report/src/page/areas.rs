@@ -102,13 +102,13 @@ pub(super) fn cmre(a: &Analysis) -> Option<Grid> {
         a.scored.rmse_mm.n.to_string(),
     ]);
     grid.note(format!(
-        "Parameters: {} x {} cells of {} mm, Gaussian of {} mm, region of {} mm. None of them is published, so this number \
+        "Parameters: {} x {} cells of {} mm, Gaussian of {} mm, SR of {} mm. None of them is published, so this number \
          cannot be compared with the published 3.75 %; that one equals the share of the diagonal that an RMSE of 5.30 mm is.",
         c.cells.0,
         c.cells.1,
         number(Some(c.settings.cell_mm), 1),
         number(Some(c.settings.sigma_mm), 1),
-        number(Some(c.settings.region_mm), 0),
+        number(Some(c.settings.sr_mm), 0),
     ));
     if c.without_score > 0 {
         grid.note(format!(

@@ -248,7 +248,7 @@ fn cmre(c: &skinrig_analysis::result::Cmre) -> Table {
         ("cmre_percent", c.percent),
         ("cell_mm", plain(Some(c.settings.cell_mm), 0)),
         ("sigma_mm", plain(Some(c.settings.sigma_mm), 0)),
-        ("region_mm", plain(Some(c.settings.region_mm), 0)),
+        ("sr_mm", plain(Some(c.settings.sr_mm), 0)),
         ("without_score", plain(Some(f64::from(c.without_score)), 0)),
     ])
 }
