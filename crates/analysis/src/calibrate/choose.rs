@@ -204,6 +204,16 @@ impl Contender {
             .is_some_and(|f| f.result.rank as usize == parameter_count(self.model))
     }
 
+    /// Standard error of the cross-validated RMSE over locations, mm.
+    fn standard_error_mm(&self, sights: &[Sight]) -> Option<f64> {
+        let errors = self.errors_mm.as_deref()?;
+        let rmse = root_mean_square(errors);
+        let none = vec![0.0; errors.len()];
+        let (_, error) = mean_difference(&locations(sights), &squares(errors), &none);
+        // The error of a root is that of the square over twice the root.
+        error.map(|e| if rmse > 0.0 { e / (2.0 * rmse) } else { 0.0 })
+    }
+
     fn row(&self, sights: &[Sight], settings: &AnalysisSettings, chosen: bool) -> ModelComparison {
         let errors = self.errors_mm.as_deref();
         let values: Vec<(u32, f64)> = errors.map_or_else(Vec::new, |errors| {
@@ -212,17 +222,11 @@ impl Contender {
         });
         let rmse_mm: Estimate =
             bootstrap_over_locations(&values, settings.bootstrap_resamples, settings.seed, rms);
-        // The error of a root is that of the square over twice the root.
-        let standard_error_mm = errors.zip(rmse_mm.value).and_then(|(errors, rmse)| {
-            let none = vec![0.0; errors.len()];
-            let (_, error) = mean_difference(&locations(sights), &squares(errors), &none);
-            error.map(|e| if rmse > 0.0 { e / (2.0 * rmse) } else { 0.0 })
-        });
         ModelComparison {
             model: self.model,
             parameters: parameter_count(self.model) as u32,
             rmse_mm,
-            standard_error_mm,
+            standard_error_mm: self.standard_error_mm(sights),
             fitted_rmse_mm: self.fit.as_ref().map(|f| f.result.rmse_after_mm),
             chosen,
         }
@@ -263,25 +267,22 @@ fn contenders(
         .collect()
 }
 
-/// The smallest model whose cross-validated mean square error is within one standard error of the best one's.
-///
-/// The standard error is that of the *difference*, location by location: both models see the same presses, and what
-/// these have in common (a noisy press, a place where the skin is uneven) says nothing about the models.
+/// The smallest model whose cross-validated RMSE is within one standard error of the best one's: the
+/// one-standard-error rule (Breiman, Friedman, Olshen and Stone 1984, section 3.4.3). The standard error is that of the
+/// best model's own RMSE over locations, so that the rule can be checked on the table of the report.
 fn choice(sights: &[Sight], contenders: &[Contender]) -> Option<usize> {
-    let rmse = |i: &usize| contenders[*i].errors_mm.as_deref().map(root_mean_square);
-    let compared: Vec<usize> = (0..contenders.len())
-        .filter(|i| rmse(i).is_some())
+    let compared: Vec<(usize, f64)> = contenders
+        .iter()
+        .enumerate()
+        .filter_map(|(i, c)| Some((i, root_mean_square(c.errors_mm.as_deref()?))))
         .collect();
-    let best = compared.iter().min_by(|a, b| {
-        rmse(a)
-            .unwrap_or(f64::NAN)
-            .total_cmp(&rmse(b).unwrap_or(f64::NAN))
-    })?;
-    let best = &contenders[*best];
+    let (best, least) = *compared.iter().min_by(|a, b| a.1.total_cmp(&b.1))?;
+    let error = contenders[best].standard_error_mm(sights).unwrap_or(0.0);
+    let limit = least + error.max(NO_DIFFERENCE_MM);
     compared
         .iter()
-        .copied()
-        .find(|i| loses(sights, &contenders[*i], best).is_none_or(|sigmas| sigmas <= 1.0))
+        .find(|(_, rmse)| *rmse <= limit)
+        .map(|(i, _)| *i)
 }
 
 /// By how many standard errors of the paired difference `a` is worse than `b`; `None` when there is no difference.
