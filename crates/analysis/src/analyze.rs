@@ -4,7 +4,7 @@ use skinrig_model::{CameraId, PressTiming};
 
 use crate::accumulate::{Accumulated, Accumulator, SLACK_US, Wanted, rate_bin_us};
 use crate::calibrate::Calibrated;
-use crate::clock::{PressSpan, SUSPICIOUS_DRIFT_PPM, fit_marks, fit_rates};
+use crate::clock::{PressSpan, fit_marks, fit_rates};
 use crate::closeups::{Closeups, keep_plans, zoom_plans};
 use crate::error::AnalysisError;
 use crate::input::{EventSource, SessionInput};
@@ -277,12 +277,6 @@ fn camera_pass(
             }
         }
     };
-    if let Some(fit) = clock.filter(|c| c.drift_ppm.abs() > SUSPICIOUS_DRIFT_PPM) {
-        warnings.push(format!(
-            "the camera clock drifts by {:.0} ppm against the host clock (expected tens); one of them is broken or the alignment is wrong",
-            fit.drift_ppm
-        ));
-    }
     let list = clock.map_or_else(Vec::new, |c| windows(timings(input), &c, settings));
     let collected = match (clock, rates) {
         // Without a clock the events have been seen once already and there is nothing else to find.

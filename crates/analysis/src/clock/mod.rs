@@ -12,9 +12,6 @@ use skinrig_model::HostTime;
 
 use crate::result::ClockFit;
 
-/// A drift above this is no crystal's: both clocks are specified to tens of ppm.
-pub const SUSPICIOUS_DRIFT_PPM: f64 = 200.0;
-
 /// Camera times from here on, 2^62 µs (146 000 years), come from a broken time base, and no clock is fitted to them:
 /// windows and views about them would end beyond 64 bits.
 const NO_TIME_US: u64 = 1 << 62;

@@ -14,6 +14,7 @@ use skinrig_model::{CameraModel, Point2, PressRole, PressVerdict};
 pub use cells::{neighbour_distance_mm, probed_area_mm2};
 
 use crate::result::{Analysis, Coverage, Estimate};
+use crate::verdict::is_rule_on_data;
 
 /// Pieces per arc of the outline wherever an area is computed.
 pub const ARC_SEGMENTS: u32 = 256;
@@ -24,7 +25,8 @@ const BORDER_COLUMNS: [f64; 2] = [0.0, skinrig_model::SENSOR_WIDTH as f64];
 
 /// Areas and taxels of an analysed session; `None` when a camera has no direction (it sits on the point it aims at).
 ///
-/// Probed are the planned places of the scored presses that were attempted: only there is anything measured.
+/// Probed are the planned places of the calibrating and scored presses that were attempted and that neither the journal nor
+/// a hand leaves out.
 #[must_use]
 pub fn coverage(analysis: &Analysis) -> Option<Coverage> {
     let outline = &analysis.rig.outline;
@@ -110,14 +112,14 @@ pub fn taxels(area_mm2: Option<f64>, rmse_mm: &Estimate) -> Estimate {
     }
 }
 
-/// The planned places of the scored presses that were attempted, each once, and the number of their locations.
+/// The planned places of the presses that were attempted and are used, each once, and the number of their locations.
 fn probed_places(analysis: &Analysis) -> (Vec<Point2>, u32) {
     let missed = PressVerdict::Missed(String::new());
-    let scored = analysis
-        .presses
-        .iter()
-        .filter(|p| p.role == PressRole::Score && p.verdict != missed.name());
-    let mut locations: Vec<(u32, Point2)> = scored.map(|p| (p.location, p.planned)).collect();
+    let probed = analysis.presses.iter().filter(|p| {
+        let used = p.verdict != "excluded" || p.rule.as_deref().is_some_and(is_rule_on_data);
+        p.role != PressRole::Sync && p.verdict != missed.name() && used
+    });
+    let mut locations: Vec<(u32, Point2)> = probed.map(|p| (p.location, p.planned)).collect();
     locations.sort_by_key(|l| l.0);
     locations.dedup_by_key(|l| l.0);
     let count = locations.len() as u32;

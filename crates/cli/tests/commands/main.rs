@@ -4,6 +4,7 @@
 
 mod damage;
 mod dataset;
+mod evaluation;
 mod help;
 mod import;
 mod import_refusals;

@@ -1,0 +1,87 @@
+//! The evaluation as a laboratory meets it: the public code's choices, and recordings that are not what they claim.
+
+use skinrig_model::Point2;
+
+use crate::dataset::{Dataset, PRESSES, csv, positions};
+use crate::support::{Lab, only, read_json, skinrig, text};
+
+/// The findings of a recording that was imported with `spoil` done to its files.
+fn faults(spoil: impl FnOnce(&mut Dataset)) -> (Vec<String>, String) {
+    let lab = Lab::new();
+    let mut data = Dataset::new(&lab);
+    spoil(&mut data);
+    let said = skinrig(&data.arguments(&lab.path("s"))).code(0);
+    let results = read_json(&only(&lab.path("s"), ".results.json"));
+    let findings = results["analysis"]["findings"].as_array().unwrap();
+    let names = findings
+        .iter()
+        .map(|f| f["fault"].as_str().unwrap().to_owned());
+    (names.collect(), said.out)
+}
+
+fn write_positions(data: &Dataset, change: impl Fn(usize, Point2) -> Point2) {
+    let moved: Vec<Point2> = positions()
+        .into_iter()
+        .enumerate()
+        .map(|(i, p)| change(i, p))
+        .collect();
+    std::fs::write(&data.presses, csv(&moved)).unwrap();
+}
+
+#[test]
+fn a_recording_that_is_not_what_it_claims_is_named() {
+    let (names, _) = faults(|_| {});
+    assert!(names.is_empty(), "{names:?}");
+
+    let (names, out) = faults(|data| data.cameras.reverse());
+    assert_eq!(names[0], "cameras_swapped");
+    assert!(out.contains("swapped") && out.contains("camera"), "{out}");
+
+    let (names, _) = faults(|data| write_positions(data, |_, p| Point2::new(p.x_mm, 4.0 - p.y_mm)));
+    assert_eq!(names[0], "axis_mirrored");
+
+    let shifted = positions();
+    let (names, _) = faults(|data| write_positions(data, |i, _| shifted[(i + 1) % PRESSES]));
+    assert_eq!(names[0], "index_shifted");
+}
+
+#[test]
+fn the_public_codes_choices_stand_beside_the_sessions_own_results() {
+    let lab = Lab::new();
+    let data = Dataset::new(&lab);
+    skinrig(&data.arguments(&lab.path("s"))).code(0);
+    let own = only(&lab.path("s"), ".results.json");
+    let before = text(&own);
+    assert!(read_json(&own)["analysis"]["reference"].is_null());
+
+    let session = text(&only(&lab.path("s"), ".session.sqlite"));
+    // Presses follow each other twice as fast as in the published recording.
+    let arguments = [
+        "analyze",
+        &session,
+        "--reference-code",
+        "--set",
+        "analysis.window_before=750 ms",
+        "--set",
+        "analysis.window_after=750 ms",
+    ];
+    skinrig(&arguments).code(0);
+    assert_eq!(text(&own), before);
+    let beside = session.replace(".session.sqlite", ".reference-code.results.json");
+    let analysis = &read_json(std::path::Path::new(&beside))["analysis"];
+    let settings = &analysis["settings"];
+    assert_eq!(settings["window_anchor"], "middle");
+    assert_eq!(settings["centroid"], "all_clusters");
+    assert_eq!(
+        settings["window_before_ms"], 750.0,
+        "what the user says wins"
+    );
+    let reference = &analysis["reference"];
+    assert_eq!(reference["presses"], PRESSES);
+    assert_eq!(reference["inside"], PRESSES);
+    assert!(reference["rmse_mm"].as_f64().unwrap() < 1.0, "{reference}");
+    let rows = reference["reduction"].as_array().unwrap();
+    assert_eq!(rows.len(), 11);
+    // 11 of 12 lie below their own 95th percentile.
+    assert!((rows[0]["pass_rate"].as_f64().unwrap() - 11.0 / 12.0).abs() < 1e-12);
+}
