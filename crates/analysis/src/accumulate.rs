@@ -13,6 +13,7 @@ use crate::dbscan::Dbscan;
 use crate::error::AnalysisError;
 use crate::estimators::{PressEstimator, Sighting, Thinning};
 use crate::grid::PixelGrid;
+use crate::held::Held;
 use crate::keeper::{KeepPlan, Keeper};
 use crate::kept::KeptEvent;
 use crate::rates::RateHistogram;
@@ -36,6 +37,14 @@ pub struct ZoomPlan {
     pub release_s: f64,
 }
 
+/// Takes the place of events that are still to come.
+const NO_EVENT: CdEvent = CdEvent {
+    t_us: 0,
+    x: 0,
+    y: 0,
+    polarity: Polarity::Off,
+};
+
 /// What a pass is to collect.
 #[derive(Default)]
 pub struct Wanted<'a> {
@@ -49,6 +58,8 @@ pub struct Wanted<'a> {
     pub kept: Vec<KeepPlan>,
     /// The histogram to fill, when this pass is to fill it; it then counts the activity, too.
     pub rates: Option<RateHistogram>,
+    /// Where to hold the events of the crop for another pass.
+    pub held: Option<Held>,
 }
 
 /// What one camera gives.
@@ -74,7 +85,8 @@ pub struct Accumulator<'a> {
     zoom_next: usize,
     keeper: Keeper,
     activity: Option<ActivityGrid>,
-    /// The events of a slice that lie in the crop.
+    held: Option<Held>,
+    /// Room for the events of a slice that lie in the crop.
     inside: Vec<CdEvent>,
     bin_us: u64,
     views: Vec<(usize, PressView)>,
@@ -131,6 +143,8 @@ pub struct Accumulated {
     /// Whole views only.
     pub kept: Vec<KeepPlan>,
     pub activity: Option<Activity>,
+    /// The events of the crop, all that another pass needs; `None` unless all of them could be held and none was late.
+    pub held: Option<Held>,
     /// Events that came more than [`SLACK_US`] after newer ones.
     pub late: u64,
 }
@@ -144,6 +158,7 @@ impl<'a> Accumulator<'a> {
             zooms,
             kept,
             rates,
+            held,
         } = wanted;
         let zooms = zooms
             .into_iter()
@@ -157,7 +172,8 @@ impl<'a> Accumulator<'a> {
             settings,
             crop: settings.crop_v[camera.index()],
             activity: rates.is_some().then(ActivityGrid::new),
-            inside: Vec::new(),
+            held,
+            inside: vec![NO_EVENT; SLICE],
             rates,
             windows,
             pictured,
@@ -187,8 +203,15 @@ impl<'a> Accumulator<'a> {
             if self.error.is_some() {
                 return;
             }
-            let off_sensor = |e: &CdEvent| e.x >= SENSOR_WIDTH || e.y >= SENSOR_HEIGHT;
-            if let Some(event) = slice.iter().find(|e| off_sensor(e)) {
+            // Looks at every event without a branch; only a bad slice is searched.
+            let (mut on_sensor, mut in_order, mut last_us) = (true, true, 0);
+            for e in slice {
+                on_sensor &= (e.x < SENSOR_WIDTH) & (e.y < SENSOR_HEIGHT);
+                in_order &= last_us <= e.t_us;
+                last_us = e.t_us;
+            }
+            let off_sensor = |e: &&CdEvent| e.x >= SENSOR_WIDTH || e.y >= SENSOR_HEIGHT;
+            if !on_sensor && let Some(event) = slice.iter().find(off_sensor) {
                 self.error = Some(AnalysisError::OffSensor {
                     camera: self.camera,
                     x: event.x,
@@ -197,7 +220,7 @@ impl<'a> Accumulator<'a> {
                 });
                 return;
             }
-            if slice.is_sorted_by_key(|e| e.t_us) {
+            if in_order {
                 self.take_in_order(slice);
             } else {
                 slice.chunks(1).for_each(|event| self.take_in_order(event));
@@ -205,7 +228,7 @@ impl<'a> Accumulator<'a> {
         }
     }
 
-    /// Takes events by time, though the first may lie before those taken so far: what a window or a close-up wants of
+    /// Takes at most [`SLICE`] events by time, though the first may lie before those taken so far: what a window or a close-up wants of
     /// them lies side by side.
     fn take_in_order(&mut self, events: &[CdEvent]) {
         let newest_us = self.newest_us;
@@ -214,13 +237,19 @@ impl<'a> Accumulator<'a> {
             events.iter().for_each(|e| activity.add(e));
         }
         let (low, high) = self.crop;
-        let mut inside = std::mem::take(&mut self.inside);
-        inside.clear();
-        inside.extend(events.iter().filter(|e| (low..=high).contains(&e.y)));
-        if let Some(rates) = &mut self.rates {
-            inside.iter().for_each(|e| rates.add(e.t_us));
+        let mut room = std::mem::take(&mut self.inside);
+        // Stores every event and steps on for those in the crop: no branch to mispredict.
+        let mut count = 0;
+        for event in events {
+            room[count] = *event;
+            count += usize::from((low <= event.y) & (event.y <= high));
         }
-        let mut rest = &inside[..];
+        let inside = &room[..count];
+        if let Some(rates) = &mut self.rates {
+            rates.add_in_order(inside);
+        }
+        self.held.take_if(|held| !held.add(inside));
+        let mut rest = inside;
         while let Some(first) = rest.first() {
             self.newest_us = self.newest_us.max(first.t_us);
             if self.newest_us >= self.quiet_until_us {
@@ -230,7 +259,7 @@ impl<'a> Accumulator<'a> {
             self.count(quiet);
             rest = later;
         }
-        self.inside = inside;
+        self.inside = room;
         if let Some(last) = events.last() {
             self.newest_us = self.newest_us.max(last.t_us);
         }
@@ -438,6 +467,7 @@ impl<'a> Accumulator<'a> {
             rates: self.rates,
             views: self.views,
             pictures: self.pictures,
+            held: self.held.filter(|_| self.late == 0),
             late: self.late,
         })
     }

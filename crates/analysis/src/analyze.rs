@@ -7,6 +7,7 @@ use crate::calibrate::Calibrated;
 use crate::clock::{PressSpan, fit_marks, fit_rates};
 use crate::closeups::{Closeups, keep_plans, zoom_plans};
 use crate::error::AnalysisError;
+use crate::held::Held;
 use crate::input::{EventSource, SessionInput};
 use crate::judge::{Judged, Seen, judge};
 use crate::keeper::KeepPlan;
@@ -25,10 +26,11 @@ use crate::{audit, bit_rates, check, cmre, coverage, latency, reduction, verdict
 const OVERLAP_US: u64 = 100;
 
 /// Analyses a session: one pass over each camera's events when its clock can be fitted from trigger marks, two
-/// when it has to be aligned by event rates; both cameras at the same time.
+/// when it has to be aligned by event rates; both cameras at the same time. The second pass finds the events of the crop
+/// held in memory. It reads them again when there are more than 2^25 of a camera, or some came too late for their windows.
 ///
 /// The same input gives the same result to the last bit on the same machine. Memory does not grow with the
-/// number of events: it holds the rate histogram (4 bytes per `rate_bin_ms`), the table of presses, and one
+/// number of events, but for those held, 8 bytes each and at most 256 MiB per camera: it holds the rate histogram (4 bytes per `rate_bin_ms`), the table of presses, and one
 /// pixel grid per open window.
 ///
 /// # Errors
@@ -241,6 +243,7 @@ fn camera_pass(
     let mut warnings: Vec<String> = Vec::new();
     let mut rates = Some(RateHistogram::new(rate_bin_us(settings)));
     let mut activity = None;
+    let mut held = None;
     let marks = input
         .rig
         .trigger_channel
@@ -258,11 +261,12 @@ fn camera_pass(
         }
         let wanted = Wanted {
             rates: rates.take(),
+            held: Some(Held::default()),
             ..Wanted::default()
         };
         let empty = Accumulator::new(camera, settings, wanted);
         let first = pass(source, camera, empty)?;
-        (rates, activity) = (first.rates, first.activity);
+        (rates, activity, held) = (first.rates, first.activity, first.held);
         let found = rates
             .as_ref()
             .map_or_else(|| Err(String::new()), |r| fit_rates(r, &spans(input)));
@@ -287,6 +291,7 @@ fn camera_pass(
             zooms: Vec::new(),
             kept: Vec::new(),
             activity,
+            held: None,
             late: 0,
         },
         (Some(clock), rates) => {
@@ -302,8 +307,16 @@ fn camera_pass(
                 zooms: zoom_plans(input, plan, &clock),
                 kept: keep_plans(input, plan, &list, &clock),
                 rates: fresh,
+                held: None,
             };
-            let mut done = pass(source, camera, Accumulator::new(camera, settings, wanted))?;
+            let mut accumulator = Accumulator::new(camera, settings, wanted);
+            let mut done = match held {
+                Some(held) => {
+                    held.for_each_slice(|events| accumulator.take(events));
+                    accumulator.finish()?
+                }
+                None => pass(source, camera, accumulator)?,
+            };
             done.rates = done.rates.or(known);
             done.activity = done.activity.or(activity);
             done

@@ -73,6 +73,8 @@ pub struct Dbscan {
     /// Start of each row in `pixels`, one more than there are rows.
     row_start: Vec<usize>,
     prefix: Vec<u32>,
+    /// Pixels of a row, by column, that are not yet known to be core, and the events counted near them.
+    open: Vec<(u32, u32)>,
     core: PixelSet,
     core_columns: Vec<u16>,
     runs: Vec<Run>,
@@ -99,6 +101,7 @@ impl Dbscan {
             pixels: Vec::new(),
             row_start: Vec::new(),
             prefix: Vec::new(),
+            open: Vec::new(),
             core: PixelSet::default(),
             core_columns: Vec::new(),
             runs: Vec::new(),
@@ -121,7 +124,7 @@ impl Dbscan {
             return &self.clusters;
         }
         self.index_rows(grid);
-        self.find_core(grid);
+        self.find_core();
         self.find_runs(grid.height());
         self.join_runs();
         let count = self.number_clusters();
@@ -181,52 +184,67 @@ impl Dbscan {
             at += self.pixels[at..].partition_point(|&p| p < end);
         }
         self.row_start.push(at);
-        self.prefix.resize(height * (WIDTH + 1), 0);
+        let reach = self.half[0];
+        let stride = self.stride();
+        self.prefix.resize(height * stride, 0);
         for row in 0..height {
             if self.row_start[row] == self.row_start[row + 1] {
                 continue;
             }
-            let sums = &mut self.prefix[row * (WIDTH + 1)..(row + 1) * (WIDTH + 1)];
+            let sums = &mut self.prefix[row * stride..(row + 1) * stride];
+            let (before, sums) = sums.split_at_mut(reach + 1);
+            let (within, after) = sums.split_at_mut(WIDTH);
+            before.fill(0);
             let mut sum = 0;
-            sums[0] = 0;
-            for (s, c) in sums[1..].iter_mut().zip(grid.row(row)) {
+            for (s, c) in within.iter_mut().zip(grid.row(row)) {
                 sum += c;
                 *s = sum;
             }
+            after.fill(sum);
         }
     }
 
-    fn find_core(&mut self, grid: &PixelGrid) {
-        let height = grid.height();
-        for &pixel in &self.pixels {
-            let (x, y) = (pixel as usize % WIDTH, pixel as usize / WIDTH);
-            let in_row = |row: usize, half: usize| {
-                if self.row_start[row] == self.row_start[row + 1] {
-                    return 0;
-                }
-                let sums = &self.prefix[row * (WIDTH + 1)..(row + 1) * (WIDTH + 1)];
-                sums[(x + half + 1).min(WIDTH)] - sums[x.saturating_sub(half)]
-            };
+    /// Length of a row of `prefix`: a sum up to each column, and as many beyond both ends as a disc reaches.
+    fn stride(&self) -> usize {
+        WIDTH + 2 * self.half[0] + 1
+    }
+
+    fn find_core(&mut self) {
+        let (reach, stride) = (self.half[0], self.stride());
+        let height = self.row_start.len() - 1;
+        let mut open = std::mem::take(&mut self.open);
+        for row in 0..height {
+            let pixels = &self.pixels[self.row_start[row]..self.row_start[row + 1]];
+            let first = row * WIDTH;
+            open.clear();
+            open.extend(pixels.iter().map(|&p| (p - first as u32, 0)));
             // Near rows first: in a dense press the first row already decides.
-            let mut sum = grid.count(pixel);
-            if sum < self.min_samples {
-                sum = in_row(y, self.half[0]);
-                for (dy, &half) in self.half.iter().enumerate().skip(1) {
-                    if sum >= self.min_samples {
-                        break;
+            for (dy, &half) in self.half.iter().enumerate() {
+                let above = row.checked_sub(dy);
+                let below = (dy > 0).then_some(row + dy).filter(|r| *r < height);
+                for other in above.into_iter().chain(below) {
+                    if self.row_start[other] == self.row_start[other + 1] {
+                        continue;
                     }
-                    if y >= dy {
-                        sum += in_row(y - dy, half);
-                    }
-                    if y + dy < height {
-                        sum += in_row(y + dy, half);
+                    let sums = &self.prefix[other * stride..(other + 1) * stride];
+                    let (left, right) = (&sums[reach - half..], &sums[reach + half + 1..]);
+                    for (x, sum) in &mut open {
+                        *sum += right[*x as usize] - left[*x as usize];
                     }
                 }
-            }
-            if sum >= self.min_samples {
-                self.core.insert(pixel as usize);
+                open.retain(|&(x, sum)| {
+                    let is_core = sum >= self.min_samples;
+                    if is_core {
+                        self.core.insert(first + x as usize);
+                    }
+                    !is_core
+                });
+                if open.is_empty() {
+                    break;
+                }
             }
         }
+        self.open = open;
     }
 
     fn find_runs(&mut self, height: usize) {
@@ -285,7 +303,12 @@ impl Dbscan {
                 if other.first > run.last + half {
                     break;
                 }
+                // Most are joined already, and most of these know it themselves.
+                if self.parent[b] as usize == ra {
+                    continue;
+                }
                 let rb = find(&mut self.parent, b);
+                self.parent[b] = rb as u32;
                 if ra != rb && self.touch(run, other, half) {
                     // The smaller index is the root: it is the first run by row and column.
                     self.parent[ra.max(rb)] = ra.min(rb) as u32;

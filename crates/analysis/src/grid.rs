@@ -114,7 +114,7 @@ impl PixelGrid {
     /// row, into `out`.
     pub fn sorted_pixels(&self, out: &mut Vec<u32>) {
         out.clear();
-        out.extend(self.occupied.iter().map(|index| index as u32));
+        self.occupied.append_to(out);
     }
 
     /// Count of the pixel with this index.

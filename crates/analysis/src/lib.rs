@@ -24,6 +24,7 @@ mod error;
 pub mod estimators;
 pub mod grid;
 mod hash;
+mod held;
 pub mod input;
 mod judge;
 mod keeper;

@@ -45,6 +45,17 @@ impl PixelSet {
         ones(&self.words)
     }
 
+    /// Appends the indices in the set, ascending, to `out`.
+    pub fn append_to(&self, out: &mut Vec<u32>) {
+        for (i, &word) in self.words.iter().enumerate() {
+            let mut left = word;
+            while left != 0 {
+                out.push(i as u32 * u64::BITS + left.trailing_zeros());
+                left &= left - 1;
+            }
+        }
+    }
+
     /// The columns in the set of one row, ascending.
     pub fn columns(&self, row: usize) -> impl Iterator<Item = usize> {
         ones(self.row(row))
@@ -114,6 +125,9 @@ mod tests {
             let mut set = PixelSet::new(2);
             members.iter().for_each(|m| set.insert(*m));
             prop_assert!(set.iter().eq(members.iter().copied()));
+            let mut indices = Vec::new();
+            set.append_to(&mut indices);
+            prop_assert!(indices.iter().map(|i| *i as usize).eq(members.iter().copied()));
             for row in 0..2 {
                 let columns: Vec<usize> =
                     members.iter().filter(|m| *m / WIDTH == row).map(|m| m % WIDTH).collect();

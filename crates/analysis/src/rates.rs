@@ -1,5 +1,7 @@
 //! Event rates: a streamed histogram in fine bins, and the thinned course that a report draws.
 
+use skinrig_model::CdEvent;
+
 use crate::result::{ClockFit, RateSeries};
 
 /// Most fine bins of a histogram: 46 hours of 10 ms. A stream that claims to be longer has broken times.
@@ -35,15 +37,31 @@ impl RateHistogram {
 
     /// Counts an event at camera time `t_us`. Times may be out of order.
     pub fn add(&mut self, t_us: u64) {
+        self.add_many(t_us, 1);
+    }
+
+    /// Counts events that are in order of time among themselves.
+    pub fn add_in_order(&mut self, events: &[CdEvent]) {
+        let mut rest = events;
+        while let Some(first) = rest.first() {
+            let end_us = (first.t_us - first.t_us % self.bin_us).saturating_add(self.bin_us);
+            let same_bin = rest.partition_point(|e| e.t_us < end_us).max(1);
+            self.add_many(first.t_us, same_bin);
+            rest = &rest[same_bin..];
+        }
+    }
+
+    /// Counts `n` events in the bin of camera time `t_us`.
+    fn add_many(&mut self, t_us: u64, n: usize) {
         let elsewhere = t_us.wrapping_sub(self.last_us) >= self.bin_us || self.counts.is_empty();
         if elsewhere && !self.seek(t_us / self.bin_us) {
-            self.beyond += 1;
+            self.beyond += n as u64;
             return;
         }
-        match self.counts[self.last].checked_add(1) {
-            Some(count) => self.counts[self.last] = count,
-            None => self.beyond += 1,
-        }
+        let count = &mut self.counts[self.last];
+        let fitting = n.min((u32::MAX - *count) as usize);
+        *count += fitting as u32;
+        self.beyond += (n - fitting) as u64;
     }
 
     /// Makes `bin` the current one; false when that would take more than [`MAX_BINS`].

@@ -5,6 +5,8 @@
 mod support;
 mod tradeoff;
 
+use std::sync::atomic::{AtomicU32, Ordering};
+
 use proptest::prelude::*;
 use skinrig_analysis::result::LocationOutcome;
 use skinrig_analysis::{
@@ -110,6 +112,54 @@ fn the_same_input_gives_the_same_bits_however_it_is_sliced() {
     let mut other = first.clone();
     other.presses[30].views[1].as_mut().unwrap().cluster_events += 1;
     assert_ne!(results_hash(&first), results_hash(&other));
+}
+
+/// Counts the passes over each camera.
+struct Counted<'a>(&'a Memory, [AtomicU32; 2]);
+
+impl EventSource for Counted<'_> {
+    fn for_each_slice(
+        &self,
+        camera: CameraId,
+        each: &mut dyn FnMut(&[CdEvent]),
+    ) -> Result<(), String> {
+        self.1[camera.index()].fetch_add(1, Ordering::Relaxed);
+        self.0.for_each_slice(camera, each)
+    }
+}
+
+#[test]
+fn held_events_give_what_a_second_reading_gives() {
+    let (mut input, mut source) = session();
+    input.rig.trigger_channel = None;
+    input.marks.clear();
+    let passes = |source: &Memory| {
+        let counted = Counted(source, Default::default());
+        let found = analyze_and_keep(&input, &counted, Keep::All).unwrap();
+        (found, counted.1.map(AtomicU32::into_inner))
+    };
+    let ((held, kept), once) = passes(&source);
+    assert_eq!(once, [1, 1]);
+    assert!(held.presses.iter().any(|p| p.views[1].is_some()) && !held.zooms.is_empty());
+    // A late event outside the crop concerns no press, but might have: everything is read again.
+    for events in &mut source.events {
+        let t_us = events[0].t_us;
+        let y = input.settings.crop_v[0].0 - 1;
+        assert!(y < input.settings.crop_v[1].0);
+        events.push(CdEvent {
+            t_us,
+            x: 0,
+            y,
+            polarity: Polarity::On,
+        });
+    }
+    let ((mut read, kept_again), twice) = passes(&source);
+    assert_eq!(twice, [2, 2]);
+    assert_eq!(read.warnings.len(), held.warnings.len() + 2);
+    read.warnings.clone_from(&held.warnings);
+    read.activity.clone_from(&held.activity);
+    assert_eq!(read, held);
+    assert_eq!(kept_again, kept);
 }
 
 #[test]
