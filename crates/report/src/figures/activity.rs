@@ -1,9 +1,8 @@
 //! Owns the picture of accumulated pixel activity: events per pixel over the whole recording.
 
-use base64::Engine as _;
-use base64::engine::general_purpose::STANDARD;
 use skinrig_analysis::result::Activity;
 
+use super::raster::{image, indexed_png};
 use super::{Canvas, Figure};
 use crate::ReportInput;
 use crate::axes::{Axes, Scale};
@@ -78,16 +77,7 @@ fn panel(canvas: &mut Canvas<'_>, picture: &Activity, most: u64, (left, top): (f
     svg.leaf("rect", &tile);
     axes.draw(svg);
     match png(picture, most) {
-        Some(bytes) => {
-            let data = format!("data:image/png;base64,{}", STANDARD.encode(bytes));
-            let mut image: Vec<(&str, &dyn std::fmt::Display)> = vec![
-                ("class", &"raster"),
-                ("preserveAspectRatio", &"none"),
-                ("href", &data),
-            ];
-            image.extend_from_slice(&frame);
-            svg.leaf("image", &image);
-        }
+        Some(bytes) => image(svg, "raster", (left, top, PICTURE.0, PICTURE.1), &bytes),
         None => {
             let middle = (left + PICTURE.0 / 2.0, top + PICTURE.1 / 2.0);
             svg.text(middle, "empty", "middle", "no picture of this size");
@@ -122,24 +112,14 @@ fn level(count: u64, most: u64) -> u8 {
 
 /// The picture as a PNG with a palette; level 0 is transparent. `None` when the counts do not fill the picture.
 fn png(picture: &Activity, most: u64) -> Option<Vec<u8>> {
-    let (width, height) = (u32::from(picture.width), u32::from(picture.height));
-    if picture.counts.len() as u64 != u64::from(width) * u64::from(height) || width * height == 0 {
-        return None;
-    }
-    let pixels: Vec<u8> = picture.counts.iter().map(|c| level(*c, most)).collect();
-    let colours = (0..LEVELS)
-        .flat_map(|i| viridis_rgb(f64::from(i.saturating_sub(1)) / f64::from(LEVELS - 2)));
-    let mut bytes = vec![];
-    let mut encoder = png::Encoder::new(&mut bytes, width, height);
-    encoder.set_color(png::ColorType::Indexed);
-    encoder.set_depth(png::BitDepth::Eight);
-    encoder.set_compression(png::Compression::High);
-    encoder.set_palette(colours.collect::<Vec<u8>>());
-    encoder.set_trns(vec![0u8]);
-    let mut writer = encoder.write_header().ok()?;
-    writer.write_image_data(&pixels).ok()?;
-    writer.finish().ok()?;
-    Some(bytes)
+    let size = (u32::from(picture.width), u32::from(picture.height));
+    let levels: Vec<u8> = picture.counts.iter().map(|c| level(*c, most)).collect();
+    let colour = |i: u8| {
+        let [r, g, b] = viridis_rgb(f64::from(i.saturating_sub(1)) / f64::from(LEVELS - 2));
+        [r, g, b, if i == 0 { 0 } else { 255 }]
+    };
+    let palette: Vec<[u8; 4]> = (0..LEVELS).map(colour).collect();
+    indexed_png(size, &levels, &palette)
 }
 
 /// The colour scale with decades, at the right edge.
@@ -203,7 +183,9 @@ mod tests {
         let mut reader = png::Decoder::new(std::io::Cursor::new(bytes))
             .read_info()
             .unwrap();
-        assert_eq!(reader.info().trns.as_deref(), Some(&[0u8][..]));
+        let see_through = reader.info().trns.as_deref().unwrap();
+        assert_eq!(see_through.iter().position(|a| *a == 255), Some(1));
+        assert_eq!(see_through.iter().filter(|a| **a == 0).count(), 1);
         let mut pixels = [0; 6];
         reader.next_frame(&mut pixels).unwrap();
         assert_eq!(pixels[0], 0);

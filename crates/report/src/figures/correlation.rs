@@ -27,7 +27,7 @@ pub fn correlation(input: &ReportInput<'_>) -> Option<Figure> {
         "correlation",
         "Calibration: correlation of parameters",
         caption,
-        (620.0, 480.0),
+        (620.0, 540.0),
         &[],
     );
     let (left, top, side) = (196.0, 20.0, 340.0);
@@ -49,7 +49,6 @@ pub fn correlation(input: &ReportInput<'_>) -> Option<Figure> {
                 value.filter(|v| v.is_finite()),
             );
         }
-        // Columns carry the rows' numbers: names would not fit below each other.
         let (x, below) = (left + step * (i as f64 + 0.5), top + side + 15.0);
         svg.holding(
             "text",

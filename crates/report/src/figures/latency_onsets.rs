@@ -18,7 +18,7 @@ pub fn latency_onsets(input: &ReportInput<'_>) -> Option<Figure> {
     let caption = format!(
         "Detected onsets after the contact, {} presses within {} ms of the median onset. Lines: 5th percentile {} ms, \
          median {} ms, 95th percentile {} ms. Not drawn: {far} onsets further from the median, {missed} presses never \
-         detected. An onset before the contact is a false alarm.",
+         detected. An onset further before the contact than half the smoothing kernel reaches is a false alarm.",
         counted.len(),
         number(Some(study.settings.window_ms), 0),
         number(Some(low), 1),

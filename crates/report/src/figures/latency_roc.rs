@@ -35,7 +35,7 @@ pub fn latency_roc(input: &ReportInput<'_>) -> Option<Figure> {
     );
     let caption = format!(
         "Choice of the detector's threshold: share of {} trials with an onset within {} ms of the median onset, against \
-         false alarms per second of background ({} s looked at). A dot for each of {} thresholds. {choice}",
+         false alarms per second of background ({} s looked at). A dot for each of {} thresholds, some in one place. {choice}",
         study.trials,
         number(Some(study.settings.window_ms), 0),
         number(Some(study.background_s), 1),
@@ -94,19 +94,20 @@ pub fn latency_roc(input: &ReportInput<'_>) -> Option<Figure> {
         .collect();
     svg.path("line thin c1", &polyline(points.iter().copied(), false));
     svg.path("dots strong c1", &dots(points.iter().copied()));
-    for (row, (x, y)) in [rows.first(), rows.last()]
+    let named = chosen.map(|r| r.threshold);
+    let ends = [0, rows.len() - 1].map(|i| (rows[i], points[i]));
+    for (row, (x, y)) in ends
         .into_iter()
-        .flatten()
-        .zip([points[0], points[points.len() - 1]])
+        .filter(|(row, _)| Some(row.threshold) != named)
     {
         let text = format!("h = {}", number(Some(row.threshold), 1));
-        // Within the plot: to the right of a point at the left edge, else to its left.
+        // Above the line, the chosen one is named below it; within the plot: to the right of a point at the left edge, else to its left.
         let (dx, anchor) = if x < 130.0 {
             (10.0, "start")
         } else {
             (-10.0, "end")
         };
-        svg.text((x + dx, y + 14.0), "tick", anchor, &text);
+        svg.text((x + dx, y - 7.0), "tick halo", anchor, &text);
     }
     if let Some(r) = chosen {
         let (x, y) = place(r.false_alarms_per_s, r.detected_rate);
@@ -120,7 +121,12 @@ pub fn latency_roc(input: &ReportInput<'_>) -> Option<Figure> {
             ],
         );
         let text = format!("chosen, h = {}", number(Some(r.threshold), 2));
-        svg.text((x + 14.0, y + 18.0), "note", "start", &text);
+        let (dx, anchor) = if x < 400.0 {
+            (12.0, "start")
+        } else {
+            (-12.0, "end")
+        };
+        svg.text((x + dx, y + 21.0), "note halo", anchor, &text);
     }
     svg.path(
         "published",

@@ -90,7 +90,7 @@ pub fn skin_map(input: &ReportInput<'_>) -> Figure {
          their presses. Lines run from each measured position (truth) to its estimate, which ends in a dot \
          ({} presses at {} locations). Open squares: scored presses that do not count ({}; those never done are drawn \
          only at places without a disc). Thin grey line: press path of the first repetition. Tinted: fields of view of camera 1 and camera 2; dotted: their \
-         overlap, where a press can be located. Squares: the cells that the probed locations stand for.",
+         overlap, where a press can be located. Grey edge: the probed area, one square cell about each scored location.",
         counted.len(),
         locations.len(),
         others.len()
@@ -118,10 +118,23 @@ pub fn skin_map(input: &ReportInput<'_>) -> Figure {
         let class = format!("fov f{0} c{0}", i + 1);
         let seen = coverage.map(|c| &c.views[i]).filter(|v| !v.is_empty());
         let data = seen.map_or_else(|| layout.field_of_view(camera), |v| layout.polygons(v));
-        svg.path(&class, &data);
+        if seen.is_some_and(|v| v.len() > 1) {
+            svg.path(&format!("{class} no-edge"), &data);
+            let id = format!("skin-map-view-{}", i + 1);
+            layout.union_edge(svg, &id, &format!("fov-edge c{}", i + 1), &data);
+        } else {
+            svg.path(&class, &data);
+        }
     }
-    if let Some(c) = coverage {
-        svg.path("overlap-edge", &layout.polygons(&c.overlap));
+    match coverage.map(|c| &c.overlap) {
+        Some(pieces) if pieces.len() > 1 => {
+            let data = layout.polygons(pieces);
+            layout.union_edge(svg, "skin-map-overlap", "overlap-edge", &data);
+        }
+        Some(pieces) => {
+            svg.path("overlap-edge", &layout.polygons(pieces));
+        }
+        None => {}
     }
     svg.close();
     if let Some(cell) = coverage.and_then(|c| c.cell_mm) {
@@ -198,13 +211,13 @@ pub fn skin_map(input: &ReportInput<'_>) -> Figure {
     )
 }
 
-/// The squares that the probed locations stand for, within the outline.
+/// The edge of the area that the probed locations stand for, within the outline.
 fn cells(svg: &mut Svg, layout: &Layout, input: &ReportInput<'_>, cell_mm: f64) {
     let side = cell_mm * layout.axes.x.per_unit();
     let mut seen = std::collections::BTreeSet::new();
     let mut data = String::new();
-    let planned = input.analysis.presses.iter();
-    for p in planned.filter(|p| p.role != PressRole::Sync && p.timing.is_some()) {
+    let scored = input.analysis.presses.iter();
+    for p in scored.filter(|p| p.role == PressRole::Score && p.timing.is_some()) {
         if seen.insert(p.location) {
             let (x, y) = layout.px(p.planned);
             let (x, y) = (Px(x - side / 2.0), Px(y - side / 2.0));
@@ -218,7 +231,7 @@ fn cells(svg: &mut Svg, layout: &Layout, input: &ReportInput<'_>, cell_mm: f64) 
             ("clip-path", &"url(#skin-map-clip)"),
         ],
     );
-    svg.path("cell", &data);
+    layout.union_edge(svg, "skin-map-probed", "cell", &data);
     svg.close();
 }
 
@@ -248,7 +261,7 @@ fn legend(svg: &mut Svg) {
     row(svg, "seen by both", &|svg, y| {
         svg.line("overlap-edge", (x, y), (x + 18.0, y));
     });
-    row(svg, "probed cell", &|svg, y| {
+    row(svg, "probed area", &|svg, y| {
         svg.leaf(
             "rect",
             &[

@@ -11,6 +11,7 @@ mod legend;
 mod map;
 mod models;
 mod pictures;
+mod raster;
 mod rates;
 mod reduction;
 mod residuals;

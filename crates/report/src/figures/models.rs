@@ -64,6 +64,11 @@ pub fn models(input: &ReportInput<'_>) -> Option<Figure> {
         let y = axes.y.at(value + error);
         svg.line("ref", (66.0, y), (604.0, y));
     }
+    // A value on the line of one standard error is written below it.
+    let near_line = |value: f64| {
+        let line = best.map(|(value, error)| axes.y.at(value + error));
+        line.is_some_and(|line| (axes.y.at(value) - line).abs() < 9.0)
+    };
     for (i, row) in rows.iter().enumerate() {
         let x = axes.x.at(i as f64);
         let name = format!(
@@ -81,7 +86,10 @@ pub fn models(input: &ReportInput<'_>) -> Option<Figure> {
                 let y = axes.y.at(value);
                 svg.path("dots strong c1", &dots([(x, y)]));
                 svg.text(
-                    (x + 12.0, y + 4.0),
+                    (
+                        x + 12.0,
+                        y + 4.0 + 12.0 * f64::from(u8::from(near_line(value))),
+                    ),
                     "tick halo",
                     "start",
                     &number(Some(value), 2),
@@ -103,7 +111,7 @@ pub fn models(input: &ReportInput<'_>) -> Option<Figure> {
             }
         }
         if let Some(value) = finite(row.fitted_rmse_mm) {
-            svg.path("dots c2", &dots([(x - 12.0, axes.y.at(value))]));
+            svg.path("dots mid c2", &dots([(x - 12.0, axes.y.at(value))]));
         }
     }
     legend::line(
@@ -111,7 +119,7 @@ pub fn models(input: &ReportInput<'_>) -> Option<Figure> {
         (66.0, 18.0),
         &[
             (Sample::Dot("dots strong c1"), "locations left out"),
-            (Sample::Dot("dots c2"), "fitted presses"),
+            (Sample::Dot("dots mid c2"), "fitted presses"),
             (Sample::Line("ref"), "best + 1 standard error"),
         ],
     );

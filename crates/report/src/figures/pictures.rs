@@ -1,14 +1,23 @@
 //! Owns the pictures of single presses: pixels with events, by polarity.
 
-use std::fmt::Write as _;
-
-use skinrig_analysis::result::{PicturePixel, PressPicture, PressView};
+use skinrig_analysis::result::{PressPicture, PressView};
 use skinrig_model::SENSOR_WIDTH;
 
+use super::raster::{image, indexed_png};
 use super::{Canvas, Figure};
 use crate::ReportInput;
 use crate::axes::tick_label;
 use crate::svg::Px;
+
+/// Colours of a picture: no event, then ON and OFF outside the cluster, then ON and OFF in it. A picture cannot follow the
+/// page's theme, so they are read on light and on dark; those of `.pictured-on` and `.pictured-off` in the figure's style.
+const PALETTE: [[u8; 4]; 5] = [
+    [0, 0, 0, 0],
+    [0x10, 0xa5, 0x7c, 90],
+    [0xc4, 0x62, 0x9c, 90],
+    [0x10, 0xa5, 0x7c, 255],
+    [0xc4, 0x62, 0x9c, 255],
+];
 
 /// Pixels that saw mostly ON or mostly OFF events, one strip per press and camera; pixels outside the
 /// cluster are pale. `None` without any picture.
@@ -61,7 +70,10 @@ pub fn press_pictures(input: &ReportInput<'_>) -> Option<Figure> {
             strip(&mut canvas, p, (x, y), k, view);
         }
     }
-    for (i, (name, class)) in [("ON", "on"), ("OFF", "off")].into_iter().enumerate() {
+    for (i, (name, class)) in [("ON", "pictured-on"), ("OFF", "pictured-off")]
+        .into_iter()
+        .enumerate()
+    {
         let x = 1120.0 + 58.0 * i as f64;
         canvas.svg.leaf(
             "rect",
@@ -114,26 +126,13 @@ fn strip(
         "end",
         "column u (px) across, row v (px) down",
     );
-    // Run lengths in sensor pixels: the group carries place and size.
-    svg.open(
-        "g",
-        &[(
-            "transform",
-            &format_args!("translate({} {}) scale({k:.5})", Px(at.0), Px(at.1)),
-        )],
-    );
-    for (class, clustered, on) in [
-        ("on noise", false, true),
-        ("off noise", false, false),
-        ("on", true, true),
-        ("off", true, false),
-    ] {
-        let wanted = |q: &&PicturePixel| {
-            q.clustered == clustered && (q.on >= q.off) == on && q.v >= p.rows.0 && q.v <= p.rows.1
-        };
-        svg.path(class, &runs(p.pixels.iter().filter(wanted), p.rows.0));
+    match png(p) {
+        Some(bytes) => image(svg, "picture", (at.0, at.1, width, height), &bytes),
+        None => {
+            let middle = (at.0 + width / 2.0, at.1 + height / 2.0);
+            svg.text(middle, "empty", "middle", "no picture of this size");
+        }
     }
-    svg.close();
     for u in [0.0, 160.0, 320.0, 480.0, 640.0] {
         svg.text(
             (at.0 + u * k, at.1 + height + 19.0),
@@ -163,27 +162,54 @@ fn strip(
     }
 }
 
-/// Path data of horizontal runs of neighbouring pixels (given row by row), in pixels below `top`.
-fn runs<'a>(pixels: impl Iterator<Item = &'a PicturePixel>, top: u16) -> String {
-    let mut d = String::new();
-    let mut run: Option<(u16, u16, u16)> = None; // row, first and last column
-    let flush = |d: &mut String, run: Option<(u16, u16, u16)>| {
-        if let Some((v, from, to)) = run {
-            let n = u32::from(to - from) + 1;
-            let _ = write!(d, "M{from} {}h{n}v1h-{n}z", v - top);
-        }
-    };
-    for q in pixels {
-        match run {
-            Some((v, from, to)) if v == q.v && to.checked_add(1) == Some(q.u) => {
-                run = Some((v, from, q.u))
-            }
-            other => {
-                flush(&mut d, other);
-                run = Some((q.v, q.u, q.u));
-            }
-        }
+/// The picture as a PNG, a pixel of the sensor each; pixels outside the rows or the sensor are left out.
+fn png(p: &PressPicture) -> Option<Vec<u8>> {
+    let size = (u32::from(SENSOR_WIDTH), rows(p));
+    let mut indices = vec![0u8; (size.0 * size.1) as usize];
+    let inside = |u: u16, v: u16| u < SENSOR_WIDTH && (p.rows.0..=p.rows.1).contains(&v);
+    for q in p.pixels.iter().filter(|q| inside(q.u, q.v)) {
+        let at = u32::from(q.v - p.rows.0) * size.0 + u32::from(q.u);
+        indices[at as usize] = 1 + u8::from(q.on < q.off) + 2 * u8::from(q.clustered);
     }
-    flush(&mut d, run);
-    d
+    indexed_png(size, &indices, &PALETTE)
+}
+
+#[cfg(test)]
+mod tests {
+    use skinrig_analysis::result::PicturePixel;
+
+    use super::*;
+
+    /// Decoded, every pixel has its polarity and its cluster; what lies outside the rows is not drawn elsewhere.
+    #[test]
+    fn the_picture_holds_every_pixel_within_its_rows() {
+        let pixel = |u, v, on, off, clustered| PicturePixel {
+            u,
+            v,
+            on,
+            off,
+            clustered,
+        };
+        let picture = PressPicture {
+            press: skinrig_model::PressId(1),
+            camera: skinrig_model::CameraId::One,
+            rows: (10, 11),
+            pixels: vec![
+                pixel(0, 10, 1, 0, true),
+                pixel(639, 11, 0, 3, false),
+                pixel(2, 11, 2, 2, false),
+                pixel(5, 12, 1, 0, true),
+                pixel(640, 10, 1, 0, true),
+                pixel(7, 9, 0, 1, true),
+                pixel(3, 10, 0, 1, true),
+            ],
+        };
+        let mut reader = png::Decoder::new(std::io::Cursor::new(png(&picture).unwrap()))
+            .read_info()
+            .unwrap();
+        let mut indices = [0; 2 * 640];
+        reader.next_frame(&mut indices).unwrap();
+        let drawn: Vec<(usize, u8)> = (0..).zip(indices).filter(|(_, i)| *i > 0).collect();
+        assert_eq!(drawn, [(0, 3), (3, 4), (642, 1), (1279, 2)]);
+    }
 }

@@ -101,6 +101,44 @@ impl Layout {
         )
     }
 
+    /// Strokes the outer edge of shapes that touch or overlap as if they were one: a mask hides the strokes within.
+    /// `id` must be unique in the page.
+    pub(super) fn union_edge(&self, svg: &mut Svg, id: &str, class: &str, shapes: &str) {
+        let (x, y) = (self.axes.x.px, self.axes.y.px);
+        let (left, top) = (x.0.min(x.1), y.0.min(y.1));
+        let (width, height) = ((x.1 - x.0).abs(), (y.1 - y.0).abs());
+        svg.open("mask", &[("id", &id), ("maskUnits", &"userSpaceOnUse")]);
+        svg.leaf(
+            "rect",
+            &[
+                ("x", &Px(left)),
+                ("y", &Px(top)),
+                ("width", &Px(width)),
+                ("height", &Px(height)),
+                ("fill", &"#fff"),
+            ],
+        );
+        // The thin stroke closes the seam between shapes that touch.
+        svg.leaf(
+            "path",
+            &[
+                ("d", &shapes),
+                ("fill", &"#000"),
+                ("stroke", &"#000"),
+                ("stroke-width", &"0.3"),
+            ],
+        );
+        svg.close();
+        svg.leaf(
+            "path",
+            &[
+                ("class", &class),
+                ("d", &shapes),
+                ("mask", &format_args!("url(#{id})")),
+            ],
+        );
+    }
+
     pub(super) fn cameras(&self, svg: &mut Svg, input: &ReportInput<'_>) {
         for (i, camera) in input.analysis.geometry.cameras.iter().enumerate() {
             let (x, y) = self.px(camera.position);

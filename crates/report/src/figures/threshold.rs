@@ -20,7 +20,8 @@ pub fn threshold(input: &ReportInput<'_>) -> Option<Figure> {
     if rows.is_empty() {
         return None;
     }
-    let caption = format!(
+    let floor = choice.candidates.first().map(|(events, _)| *events) == Some(choice.events);
+    let mut caption = format!(
         "Choice of the least number of cluster events, on the {} calibrating presses alone. Cost of a threshold: root \
          mean square over presses of the error, where a press left out counts {} mm, the error of an answer that knows \
          nothing. Ring: the threshold chosen, {} events in the weaker camera; it leaves out {} of them.",
@@ -29,6 +30,9 @@ pub fn threshold(input: &ReportInput<'_>) -> Option<Figure> {
         choice.events,
         choice.left_out,
     );
+    if floor {
+        caption += " It is the least one tried: no higher one costs less.";
+    }
     let mut canvas = Canvas::new(
         input,
         "threshold",
@@ -89,8 +93,15 @@ pub fn threshold(input: &ReportInput<'_>) -> Option<Figure> {
                 ("r", &"8"),
             ],
         );
-        let text = format!("{} events", choice.events);
-        svg.text((x, y - 14.0), "note", "middle", &text);
+        let least = if floor { ", the least tried" } else { "" };
+        let text = format!("{} events{least}", choice.events);
+        // To the side where there is room.
+        let (dx, anchor) = if x < 400.0 {
+            (4.0, "start")
+        } else {
+            (-4.0, "end")
+        };
+        svg.text((x + dx, y - 14.0), "note halo", anchor, &text);
     }
     Some(canvas.finish(&format!("n = {} presses", choice.n), "threshold", ""))
 }

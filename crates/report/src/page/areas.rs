@@ -101,6 +101,12 @@ pub(super) fn cmre(a: &Analysis) -> Option<Grid> {
         NONE.to_owned(),
         a.scored.rmse_mm.n.to_string(),
     ]);
+    if c.percent.value.is_some_and(|v| v < 0.0) {
+        grid.note(
+            "Below 0: the public code's formula falls below 0 for an estimate between the true cell and the next one. It \
+             is a score of cells, not a share; the share of the diagonal is one.",
+        );
+    }
     grid.note(format!(
         "Parameters: {} x {} cells of {} mm, Gaussian of {} mm, SR of {} mm. None of them is published, so this number \
          cannot be compared with the published 3.75 %; that one equals the share of the diagonal that an RMSE of 5.30 mm is.",

@@ -249,7 +249,7 @@ pub(super) fn reference(a: &Analysis) -> Option<Grid> {
     ]);
     grid.note(
         "In-sample: the presses that calibrated are the ones judged, and those outside the enclosing square are left out. \
-         It can only look better than it is. Held-out: repetitions that did not calibrate.",
+         It favours what was fitted. Held-out: repetitions that did not calibrate.",
     );
     Some(grid)
 }

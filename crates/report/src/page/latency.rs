@@ -105,6 +105,14 @@ fn notes(grid: &mut Grid, l: &Latency) {
         l.unusable,
         l.shortened,
     ));
+    if l.false_alarms_per_s.value == Some(0.0) && l.background_s > 0.0 {
+        grid.note(format!(
+            "No false alarm in {} s: the rate is below {} per second with 95 % confidence (3 / time); an interval over \
+             locations cannot tell.",
+            number(Some(l.background_s), 1),
+            number(Some(3.0 / l.background_s), 3),
+        ));
+    }
     grid.note(format!(
         "A detector that runs live would know an onset {} ms after its reported time.",
         number(Some(l.decision_delay_ms), 1)
@@ -146,7 +154,8 @@ pub(super) fn from_contact(a: &Analysis) -> Option<Grid> {
     grid.row(part("of it: clocks of the cameras", c.from_clocks_ms));
     grid.row(part("of it: resolution of the contact", c.from_contact_ms));
     grid.note(format!(
-        "{} onsets before the contact (false alarms) and {} presses never detected are not part of the percentiles. Where \
+        "{} onsets further before the contact than half the smoothing kernel reaches (false alarms) and {} presses never \
+         detected are not part of the percentiles. Where \
          the surface is taken to be shifts all contacts alike and is not in the budget.",
         c.before_contact, c.missed
     ));

@@ -3,7 +3,7 @@
 use skinrig_analysis::result::{Analysis, Estimate, Thinning};
 
 use super::grid::Grid;
-use crate::format::{grouped, interval, number};
+use crate::format::{NONE, grouped, interval, number};
 
 /// A kind of thinning for people.
 pub(crate) const fn thinning(kind: Thinning) -> &'static str {
@@ -23,9 +23,9 @@ pub(super) fn reduction(a: &Analysis) -> Option<Grid> {
         &[
             "Thinning",
             "#k",
-            "#events per press and camera",
+            "#events",
             "#RMSE (mm)",
-            "#of single seeds (mm)",
+            "#single seeds (mm)",
             "#pass (%)",
             &within,
             "#located (%)",
@@ -34,6 +34,9 @@ pub(super) fn reduction(a: &Analysis) -> Option<Grid> {
         ],
     );
     let with = |e: &Estimate, scale: f64, digits| {
+        if e.value.is_none() {
+            return NONE.to_owned();
+        }
         format!(
             "{} {}",
             number(e.value.map(|v| v * scale), digits),
@@ -51,7 +54,7 @@ pub(super) fn reduction(a: &Analysis) -> Option<Grid> {
                 number(bytes.map(|b| b / 1e3), digits)
             };
             let seeds = row.rmse_of_seeds_mm.map_or_else(
-                || "–".to_owned(),
+                || NONE.to_owned(),
                 |(low, high)| format!("{} to {}", number(Some(low), 2), number(Some(high), 2)),
             );
             grid.marked_row(
@@ -75,7 +78,8 @@ pub(super) fn reduction(a: &Analysis) -> Option<Grid> {
         }
     }
     grid.note(format!(
-        "n = {} presses, means over {} seeds, intervals over locations. Marked: the published factor.",
+        "n = {} presses, means over {} seeds, in brackets 95 % intervals over locations. Events: per press and camera. Marked: \
+         the published factor.",
         study.presses, study.seeds
     ));
     grid.download("reduction");
