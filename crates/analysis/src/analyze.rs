@@ -20,7 +20,7 @@ use crate::result::{
 };
 use crate::segment::{Window, windows};
 use crate::sets::ScoreSet;
-use crate::{audit, bit_rates, check, cmre, coverage, latency, reduction, verdict};
+use crate::{audit, bit_rates, caveats, check, cmre, coverage, latency, reduction, verdict};
 
 /// Windows that share less than this, µs, only touch: their ends are rounded.
 const OVERLAP_US: u64 = 100;
@@ -175,6 +175,7 @@ fn evaluate(analysis: &mut Analysis, input: &SessionInput, kept: &Kept) {
     analysis.bit_rates = bit_rates::bit_rates(analysis);
     analysis.reduction = reduction::study(analysis, kept);
     analysis.latency = latency::study(analysis, kept);
+    analysis.warnings.extend(caveats::caveats(analysis));
     analysis.findings = audit::audit(input, analysis);
 }
 

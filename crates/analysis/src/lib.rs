@@ -14,6 +14,7 @@ mod analyze;
 pub mod audit;
 pub mod bit_rates;
 pub mod calibrate;
+mod caveats;
 mod check;
 pub mod clock;
 mod closeups;

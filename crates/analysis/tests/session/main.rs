@@ -589,3 +589,30 @@ fn presses_named_by_hand_are_rows_with_that_rule() {
     let wanted = rms(&a.scored.rmse_mm) + a.penalised.penalty_mm.powi(2);
     assert!((rms(&a.penalised.rmse_mm) - wanted).abs() < 1e-6);
 }
+
+#[test]
+fn a_background_that_makes_clusters_of_its_own_is_called_out() {
+    let (mut input, source) = session();
+    // About 40 background events in a press window: 0.1 of them in a neighbourhood of 10 px.
+    let warned = |input: &SessionInput| -> Vec<String> {
+        let warnings = analyze(input, &source).unwrap().warnings;
+        let about = |w: &String| w.contains("noise joins the clusters");
+        warnings.into_iter().filter(about).collect()
+    };
+    assert_eq!(warned(&input), Vec::<String>::new());
+    input.settings.eps_px = 50.0;
+    input.settings.min_samples = 3;
+    let found = warned(&input);
+    assert_eq!(found.len(), 2, "{found:?}");
+    let suggested: u32 = found[0]
+        .split("min_samples of ")
+        .nth(1)
+        .unwrap()
+        .split(' ')
+        .next()
+        .unwrap()
+        .parse()
+        .unwrap();
+    input.settings.min_samples = suggested;
+    assert_eq!(warned(&input), Vec::<String>::new());
+}

@@ -1,0 +1,156 @@
+//! What a reader must know about the numbers together: settings that do not fit the data, results that disagree.
+
+use skinrig_model::{AnalysisSettings, CameraId, Estimator, SENSOR_WIDTH};
+
+use crate::metrics::quantile;
+use crate::result::{Analysis, Estimate, PressResult, Reduction, ReductionRow};
+
+/// A thinned row that locates at least this share of what all events locate can be compared with them.
+const COMPARABLE: f64 = 0.95;
+
+/// The caveats of a finished analysis.
+pub fn caveats(analysis: &Analysis) -> Vec<String> {
+    let dense = CameraId::ALL
+        .into_iter()
+        .filter_map(|camera| dense_background(&analysis.settings, &analysis.presses, camera));
+    let compared = analysis.calibration.iter().flat_map(|c| &c.compared);
+    let left_out = compared.filter(|m| m.chosen).map(|m| &m.rmse_mm);
+    let disagree = left_out.filter_map(|l| calibration_disagrees(&analysis.scored.rmse_mm, l));
+    let fewer = analysis.reduction.iter().filter_map(fewer_events_do_better);
+    dense.chain(disagree).chain(fewer).collect()
+}
+
+/// Says so when the background alone makes core events: when the events that it is expected to put into a
+/// neighbourhood, and two standard deviations more (Poisson), reach the core threshold of DBSCAN.
+fn dense_background(
+    settings: &AnalysisSettings,
+    presses: &[PressResult],
+    camera: CameraId,
+) -> Option<String> {
+    if settings.estimator != Estimator::Dbscan || settings.bin_px != 1 {
+        return None;
+    }
+    let views = presses.iter().filter_map(|p| p.views[camera.index()]);
+    let mut events: Vec<f64> = views
+        .filter(|v| v.idle_s > 0.0 && v.rate_per_s > 0.0)
+        .map(|v| v.idle_rate_per_s * f64::from(v.events) / v.rate_per_s)
+        .collect();
+    let (first, last) = settings.crop_v[camera.index()];
+    let pixels = f64::from(SENSOR_WIDTH) * (f64::from(last) - f64::from(first) + 1.0);
+    let disc = std::f64::consts::PI * settings.eps_px * settings.eps_px;
+    let neighbours = quantile(&mut events, 0.5)? * disc / pixels;
+    let spread = neighbours.sqrt();
+    (neighbours + 2.0 * spread >= f64::from(settings.min_samples)).then(|| {
+        format!(
+            "{camera}: in a press window the background alone puts {neighbours:.1} events within eps ({} px) of an \
+             event, and {} make a cluster (min_samples): noise joins the clusters; a min_samples of {} keeps it out",
+            settings.eps_px,
+            settings.min_samples,
+            (neighbours + 4.0 * spread).ceil() + 1.0
+        )
+    })
+}
+
+/// Says so when the scored presses and calibrating places that the fit has not seen have errors that differ by more than
+/// both intervals.
+fn calibration_disagrees(scored: &Estimate, left_out: &Estimate) -> Option<String> {
+    let apart = scored.low? > left_out.high? || scored.high? < left_out.low?;
+    apart.then(|| {
+        format!(
+            "the RMSE of the scored presses, {}, and that of calibrating places which the fit has not seen, {}, \
+             disagree: a few presses dominate one of them, or the rig changed in between",
+            in_words(scored),
+            in_words(left_out)
+        )
+    })
+}
+
+/// Says so when fewer events locate better than all of them.
+fn fewer_events_do_better(reduction: &Reduction) -> Option<String> {
+    reduction.curves.iter().find_map(|curve| {
+        let (all, fewer) = curve.rows.split_first()?;
+        let located = COMPARABLE * all.located_rate.value?;
+        let better = |row: &&ReductionRow| {
+            let below = row.rmse_mm.high.zip(all.rmse_mm.low);
+            below.is_some_and(|(high, low)| high < low)
+                && row.located_rate.value.is_some_and(|share| share >= located)
+        };
+        let row = fewer.iter().find(better)?;
+        Some(format!(
+            "a random 1/{} of the events locates better than all of them: RMSE {} against {}; the clustering settings \
+             do not fit these event rates",
+            row.factor,
+            in_words(&row.rmse_mm),
+            in_words(&all.rmse_mm)
+        ))
+    })
+}
+
+fn in_words(rmse: &Estimate) -> String {
+    match (rmse.value, rmse.low, rmse.high) {
+        (Some(value), Some(low), Some(high)) => format!("{value:.2} mm [{low:.2}, {high:.2}]"),
+        (Some(value), ..) => format!("{value:.2} mm"),
+        _ => "none".to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::result::{ReductionCurve, Thinning};
+
+    fn estimate(value: f64, half_width: f64) -> Estimate {
+        Estimate {
+            value: Some(value),
+            low: Some(value - half_width),
+            high: Some(value + half_width),
+            n: 100,
+        }
+    }
+
+    #[test]
+    fn intervals_that_touch_do_not_disagree() {
+        let say = |scored, left_out| calibration_disagrees(&scored, &left_out);
+        assert_eq!(say(estimate(2.0, 0.5), estimate(1.25, 0.25)), None);
+        let found = say(estimate(2.0, 0.5), estimate(1.0, 0.25)).unwrap();
+        assert!(
+            found.contains("2.00 mm [1.50, 2.50]") && found.contains("1.00 mm [0.75, 1.25]"),
+            "{found}"
+        );
+        assert!(say(estimate(1.0, 0.25), estimate(2.0, 0.5)).is_some());
+    }
+
+    #[test]
+    fn fewer_events_are_called_better_only_when_they_locate_as_many() {
+        let row = |factor, rmse, located| ReductionRow {
+            factor,
+            events_per_view: 100.0,
+            rmse_mm: estimate(rmse, 0.1),
+            rmse_of_seeds_mm: None,
+            pass_rate: estimate(1.0, 0.0),
+            within_rate: estimate(1.0, 0.0),
+            located_rate: estimate(located, 0.0),
+            press_bytes_per_s: 1.0,
+            idle_bytes_per_s: None,
+        };
+        let say = |rows| {
+            let curves = vec![ReductionCurve {
+                thinning: Thinning::Exact,
+                rows,
+            }];
+            fewer_events_do_better(&Reduction {
+                eps_px: 10.0,
+                min_samples: 10,
+                seeds: 1,
+                presses: 100,
+                pass_threshold_mm: None,
+                within_mm: 5.0,
+                curves,
+            })
+        };
+        let all = row(1, 2.0, 1.0);
+        assert_eq!(say(vec![all, row(2, 1.9, 1.0), row(4, 0.5, 0.9)]), None);
+        let found = say(vec![all, row(2, 1.9, 1.0), row(4, 0.5, 0.96)]).unwrap();
+        assert!(found.starts_with("a random 1/4 of the events"), "{found}");
+    }
+}
