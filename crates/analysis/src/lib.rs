@@ -23,6 +23,7 @@ pub mod coverage;
 pub mod dbscan;
 mod error;
 pub mod estimators;
+mod exact;
 pub mod grid;
 mod hash;
 mod held;

@@ -1,11 +1,13 @@
 //! How well the skin localises: errors over the scored presses, with bootstrap intervals.
 //!
 //! Intervals are percentile intervals of a bootstrap that resamples *locations* with all their repetitions:
-//! presses at one place share its systematic error and are not independent.
+//! presses at one place share its systematic error and are not independent. Shares of 0 and 1, which no resample
+//! changes, get exact binomial intervals over the locations.
 
 use rayon::prelude::*;
 use skinrig_model::{Point2, SkinOutline};
 
+use crate::exact;
 use crate::result::{Estimate, Metrics, Penalised};
 use crate::seeded;
 use crate::sets::{ScoreSet, Scored};
@@ -18,6 +20,8 @@ const COUNT: usize = 10;
 /// (value, n) of each metric: rmse, x, y, bias x, bias y, median, p95, repeat std, located rate, within
 /// rate.
 type Values = [(Option<f64>, u32); COUNT];
+/// Where the shares are among them.
+const SHARES: [usize; 2] = [8, 9];
 
 /// Which presses give an estimate that counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -55,13 +59,17 @@ pub fn metrics(
     let intervals = bootstrap(&places, resamples, seed);
     let estimate = |k: usize| {
         let (value, n) = values[k];
-        let (low, high) = value
-            .and(intervals[k])
-            .map_or((None, None), |(l, h)| (Some(l), Some(h)));
+        let ends = value.zip(intervals[k]).map(|(value, ends)| {
+            if SHARES.contains(&k) {
+                exact::share(value, places.len(), ends)
+            } else {
+                ends
+            }
+        });
         Estimate {
             value,
-            low,
-            high,
+            low: ends.map(|e| e.0),
+            high: ends.map(|e| e.1),
             n,
         }
     };

@@ -214,6 +214,14 @@ pub fn location_rule(outcome: &LocationOutcome, settings: &AnalysisSettings) -> 
     }
 }
 
+/// True for a press that was done as planned, whether or not the cameras saw it: valid, or excluded by a rule on the
+/// data. What the journal or a hand leaves out is no question to the skin.
+#[must_use]
+pub fn is_done_as_planned(press: &PressResult) -> bool {
+    press.verdict == PressVerdict::Valid.name()
+        || press.rule.as_deref().is_some_and(is_rule_on_data)
+}
+
 /// True for the rules of [`from_data`] and [`location_rule`] that exclude a press for what the cameras saw of it;
 /// false for what the journal or a hand left out.
 #[must_use]

@@ -10,6 +10,7 @@ use skinrig_analysis::analyze;
 use skinrig_analysis::kept::{Kept, KeptEvent, KeptPress, KeptView};
 use skinrig_analysis::latency::bins::{Grid, Sight};
 use skinrig_analysis::latency::cusum::{Cusum, background_rate_per_s};
+use skinrig_analysis::latency::interval::{Outcome, Plan};
 use skinrig_analysis::latency::smooth::{Edges, Kernel};
 use skinrig_analysis::latency::study;
 use skinrig_analysis::latency::sweep::{Hits, choose, sweep, thresholds};
@@ -620,6 +621,63 @@ fn what_is_before_the_contact_or_never_comes_is_counted_apart() {
     assert_eq!(contact.median_ms.n, 22);
     assert_eq!(contact.from_contact_ms, 0.0);
     assert!((contact.p5_ms.value.unwrap() - 20.0).abs() < 2.1);
+}
+
+#[test]
+fn what_was_left_out_by_hand_is_no_trial_and_what_the_skin_missed_is() {
+    let (mut analysis, kept) = planted(|_| Some(2e4));
+    for (n, rule) in [
+        (3, "by hand"),
+        (4, "the operator's hand in view"),
+        (5, "no cluster (camera 1)"),
+    ] {
+        let press = &mut analysis.presses[kept.presses[n].row];
+        press.verdict = "excluded".to_owned();
+        press.rule = Some(rule.to_owned());
+    }
+    let found = studied(&analysis, &kept);
+    assert_eq!((found.trials, found.unusable), (23, 2));
+    let tried = |n: usize| {
+        let press = kept.presses[n].press;
+        found.onsets.iter().any(|o| o.0 == press)
+    };
+    assert_eq!([3, 4, 5].map(tried), [false, false, true]);
+}
+
+#[test]
+fn no_false_alarm_and_no_miss_is_not_certainty() {
+    let plan = Plan {
+        window_ms: 100.0,
+        earliest_ms: 0.0,
+        resamples: 100,
+        seed: 1,
+    };
+    // Two presses at each of six locations.
+    let one = |i: u32| Outcome {
+        location: i / 2,
+        onset_ms: Some(20.0),
+        alarms: 0,
+        background_s: 0.5,
+    };
+    let all: Vec<Outcome> = (0..12).map(one).collect();
+    let near = |found: Option<f64>, wanted: f64| (found.unwrap() - wanted).abs() < 1e-12;
+    let found = plan.estimate(&all);
+    let (detected, alarms) = (found.detected_rate, found.false_alarms_per_s);
+    assert!(near(detected.low, 0.025f64.powf(1.0 / 6.0)) && detected.high == Some(1.0));
+    assert!(alarms.low == Some(0.0) && near(alarms.high, -0.025f64.ln() / 6.0));
+    assert_eq!(
+        (found.width_ms.value, found.width_ms.high),
+        (Some(0.0), Some(0.0))
+    );
+    let none: Vec<Outcome> = all
+        .iter()
+        .map(|o| Outcome {
+            onset_ms: None,
+            ..*o
+        })
+        .collect();
+    let detected = plan.estimate(&none).detected_rate;
+    assert!(detected.low == Some(0.0) && near(detected.high, 1.0 - 0.025f64.powf(1.0 / 6.0)));
 }
 
 #[test]

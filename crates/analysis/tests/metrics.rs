@@ -97,6 +97,20 @@ fn too_few_presses_give_no_number_instead_of_a_false_one() {
 }
 
 #[test]
+fn what_always_or_never_happened_has_the_exact_interval_over_locations() {
+    // Two presses at each of four places, all located, none within 5 mm.
+    let rows: Vec<_> = (0..8)
+        .map(|i| row(i / 2, Some((6.0, 0.0)), "valid"))
+        .collect();
+    let m = measure(&rows, Exclusions::Applied);
+    let end = 0.025f64.powf(1.0 / 4.0);
+    assert!(near(m.located_rate.low, end) && m.located_rate.high == Some(1.0));
+    assert!(m.within_rate.low == Some(0.0) && near(m.within_rate.high, 1.0 - end));
+    // A mean of 0 is no share.
+    assert_eq!((m.bias_y_mm.low, m.bias_y_mm.high), (Some(0.0), Some(0.0)));
+}
+
+#[test]
 fn depths_are_not_repetitions_of_each_other() {
     let mut deep = row(0, Some((5.0, 0.0)), "valid");
     deep.depth_mm = 4.0;

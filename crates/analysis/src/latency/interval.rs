@@ -1,8 +1,10 @@
-//! Estimates of a detector at one threshold, with bootstrap intervals over locations.
+//! Estimates of a detector at one threshold, with bootstrap intervals over locations (exact ones where nothing, or
+//! everything, was detected).
 
 use rayon::prelude::*;
 
 use super::sweep::Hits;
+use crate::exact;
 use crate::metrics::quantile;
 use crate::result::Estimate;
 use crate::seeded;
@@ -14,6 +16,8 @@ const COUNT: usize = 7;
 /// (value, n) of each: detected share, width, median, false alarms per second, 5th percentile, median and 95th percentile
 /// after contact.
 type Figures = [(Option<f64>, u32); COUNT];
+const DETECTED: usize = 0;
+const FALSE_ALARMS: usize = 3;
 
 /// One trial at one threshold.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -31,13 +35,14 @@ pub struct Outcome {
 /// What is estimated.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Estimates {
-    /// Share of trials with an onset that counts; n: trials.
+    /// Share of trials with an onset that counts; n: trials. Of a share of 0 or 1 the interval is the exact binomial
+    /// one over the locations.
     pub detected_rate: Estimate,
     /// Width of the onsets that count, ms; n: those.
     pub width_ms: Estimate,
     /// Median of all onsets, ms; n: those.
     pub median_ms: Estimate,
-    /// False alarms per second; n: backgrounds.
+    /// False alarms per second; n: backgrounds. Without any the interval is the exact Poisson one over all background.
     pub false_alarms_per_s: Estimate,
     /// 5th, 50th and 95th percentile of the onsets not before the contact, ms; n: those.
     pub from_contact_ms: [Estimate; 3],
@@ -79,19 +84,25 @@ impl Plan {
         let estimate = |k: usize| {
             let (value, n) = figures[k];
             let mut values: Vec<f64> = samples.iter().filter_map(|s| s[k].0).collect();
-            let mut end = |q| value.and_then(|_| quantile(&mut values, q));
+            let mut end = |q| quantile(&mut values, q);
+            let bootstrap = end(TAIL).zip(end(1.0 - TAIL));
+            let ends = value.zip(bootstrap).map(|(value, ends)| match k {
+                DETECTED => exact::share(value, places.len(), ends),
+                FALSE_ALARMS => exact::rate_per_s(value, background_s(outcomes), ends),
+                _ => ends,
+            });
             Estimate {
                 value,
-                low: end(TAIL),
-                high: end(1.0 - TAIL),
+                low: ends.map(|e| e.0),
+                high: ends.map(|e| e.1),
                 n,
             }
         };
         Estimates {
-            detected_rate: estimate(0),
+            detected_rate: estimate(DETECTED),
             width_ms: estimate(1),
             median_ms: estimate(2),
-            false_alarms_per_s: estimate(3),
+            false_alarms_per_s: estimate(FALSE_ALARMS),
             from_contact_ms: [estimate(4), estimate(5), estimate(6)],
         }
     }
@@ -104,7 +115,7 @@ impl Plan {
         late.retain(|t| *t >= self.earliest_ms);
         let hits = Hits::of(onsets, self.window_ms);
         let alarms: u64 = all().map(|o| u64::from(o.alarms)).sum();
-        let background_s: f64 = all().map(|o| o.background_s).sum();
+        let background_s = background_s(all());
         let share = (trials > 0).then(|| f64::from(hits.count) / f64::from(trials));
         let n = late.len() as u32;
         let mut after = |q| (quantile(&mut late, q), n);
@@ -121,4 +132,8 @@ impl Plan {
             after(0.95),
         ]
     }
+}
+
+fn background_s<'a>(outcomes: impl IntoIterator<Item = &'a Outcome>) -> f64 {
+    outcomes.into_iter().map(|o| o.background_s).sum()
 }

@@ -20,7 +20,7 @@ pub mod thin;
 pub mod trial;
 
 use rayon::prelude::*;
-use skinrig_model::{Background, PressRole, PressVerdict};
+use skinrig_model::{Background, PressRole};
 
 use self::bins::Sight;
 use self::interval::{Estimates, Outcome, Plan};
@@ -33,6 +33,7 @@ use crate::result::{
     Analysis, ClockFit, ClockMethod, ContactLatency, Latency, ReducedLatency, ThresholdRow,
 };
 use crate::seeded;
+use crate::verdict;
 
 /// Thinning factor of the reduced study (paper).
 const REDUCED_FACTOR: u32 = 1024;
@@ -134,13 +135,9 @@ fn usable<'a>(
     presses: &[&'a KeptPress],
 ) -> Vec<Usable<'a>> {
     let neighbours = Neighbours::of(&analysis.presses);
-    let broken = [
-        PressVerdict::Invalid(String::new()),
-        PressVerdict::Missed(String::new()),
-    ];
     let one = |kept: &&'a KeptPress| {
         let press = &analysis.presses[kept.row];
-        if broken.iter().any(|v| v.name() == press.verdict) {
+        if !verdict::is_done_as_planned(press) {
             return None;
         }
         let sights = [0, 1].map(|k| Sight::new(&kept.views[k], &clocks[k]));

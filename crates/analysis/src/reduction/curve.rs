@@ -1,9 +1,10 @@
-//! The rows of a reduction curve: means over seeds, intervals over locations.
+//! The rows of a reduction curve: means over seeds, intervals over locations (exact ones for shares of 0 and 1).
 
 use rayon::prelude::*;
 use skinrig_model::AnalysisSettings;
 
 use super::trials::{Outcome, Trial};
+use crate::exact;
 use crate::metrics::quantile;
 use crate::result::{Estimate, ReductionRow};
 use crate::seeded;
@@ -33,6 +34,8 @@ struct Sums {
 
 /// RMSE, pass rate, within rate and located rate: means over seeds.
 type Values = [Option<f64>; 4];
+/// Where the RMSE is among them; the others are shares.
+const RMSE: usize = 0;
 
 impl Sums {
     fn new(seeds: usize) -> Self {
@@ -171,15 +174,16 @@ impl Course<'_> {
         };
         std::array::from_fn(|k| {
             let mut sampled: Vec<f64> = samples.iter().filter_map(|s| s[k]).collect();
-            let ends = values[k].map(|_| {
-                let mut end = |q: f64| quantile(&mut sampled, q);
-                (end(TAIL), end(1.0 - TAIL))
+            let mut end = |q: f64| quantile(&mut sampled, q);
+            let bootstrap = end(TAIL).zip(end(1.0 - TAIL));
+            let ends = values[k].zip(bootstrap).map(|(value, ends)| match k {
+                RMSE => ends,
+                _ => exact::share(value, places.len(), ends),
             });
-            let (low, high) = ends.unwrap_or((None, None));
             Estimate {
                 value: values[k],
-                low,
-                high,
+                low: ends.map(|e| e.0),
+                high: ends.map(|e| e.1),
                 n: total.presses as u32,
             }
         })

@@ -14,7 +14,7 @@ mod curve;
 mod thinning;
 mod trials;
 
-use skinrig_model::{PressRole, PressVerdict};
+use skinrig_model::PressRole;
 
 use crate::kept::Kept;
 use crate::metrics::quantile;
@@ -80,10 +80,8 @@ pub fn study(analysis: &Analysis, kept: &Kept) -> Option<Reduction> {
 fn attempts<'a>(analysis: &Analysis, kept: &'a Kept) -> Vec<Attempt<'a>> {
     let presses = kept.presses.iter().filter_map(|k| {
         let row = analysis.presses.get(k.row)?;
-        let done = row.verdict == PressVerdict::Valid.name()
-            || row.rule.as_deref().is_some_and(verdict::is_rule_on_data);
         let attempt = Attempt::new(row, k)?;
-        (row.role == PressRole::Score && done).then_some(attempt)
+        (row.role == PressRole::Score && verdict::is_done_as_planned(row)).then_some(attempt)
     });
     presses.collect()
 }

@@ -50,13 +50,15 @@ pub struct Latency {
     /// Index of the threshold chosen in `sweep`; `None` when nothing was detected at any. A threshold whose median onset
     /// is more than the window before the contact detects the background and is never chosen.
     pub chosen: Option<u32>,
-    /// Share of trials detected within the window of the median onset, at the chosen threshold.
+    /// Share of trials detected within the window of the median onset, at the chosen threshold. Of all or none the
+    /// interval is exact, see [`Estimate`].
     pub detected_rate: Estimate,
     /// Width of the 5-95 % interval of the onsets that count, ms.
     pub width_ms: Estimate,
     /// Median onset after the contact (measured or scheduled), ms.
     pub median_ms: Estimate,
-    /// False alarms per second of background, with a cool-down of one width.
+    /// False alarms per second of background, with a cool-down of one width. Of none the interval is exact, see
+    /// [`Estimate`].
     pub false_alarms_per_s: Estimate,
     /// Onsets against the hardware-timestamped contact; `None` when contact times come from a schedule or a camera's
     /// clock was aligned by the very events whose latency is asked for.

@@ -138,7 +138,10 @@ pub enum ClockMethod {
     EventRates,
 }
 
-/// A number with its 95 % bootstrap interval and the n behind it.
+/// A number with its 95 % interval and the n behind it. Intervals come from a bootstrap, which sees no spread in what
+/// never or always happened: those of a share of 0 or 1 are exact binomial ones with the number of locations for n
+/// (0: up to 1 - 0.025^(1 / n); 1: from 0.025^(1 / n)), that of 0 counts in T seconds is the exact Poisson one (up to
+/// -ln(0.025) / T).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Estimate {
     /// The value; `None` when n is too small for it.
@@ -160,7 +163,8 @@ pub struct DepthResult {
     pub rmse_mm: Estimate,
 }
 
-/// Localisation metrics, mm. Intervals come from a bootstrap that resamples locations.
+/// Localisation metrics, mm. Intervals come from a bootstrap that resamples locations; shares of 0 and 1 as in
+/// [`Estimate`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Metrics {
     /// Root mean square Euclidean error.

@@ -43,7 +43,8 @@ pub struct ReductionCurve {
 }
 
 /// The study at one factor. Values are means over seeds; intervals come from a bootstrap over locations of the
-/// seed means, so that they hold the spread between presses and not only between seeds.
+/// seed means, so that they hold the spread between presses and not only between seeds; shares of 0 and 1 as in
+/// [`Estimate`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ReductionRow {
     /// k.

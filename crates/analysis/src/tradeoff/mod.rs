@@ -75,9 +75,9 @@ pub struct Row {
     pub rmse_mm: Estimate,
     /// The same with every failed press at the penalty.
     pub penalised_rmse_mm: Estimate,
-    /// Share of the attempted presses that count.
+    /// Share of the attempted presses that count; of all or none the interval is exact, see [`Estimate`].
     pub located_rate: Estimate,
-    /// Share within `within_mm`.
+    /// Share within `within_mm`; likewise.
     pub within_rate: Estimate,
     /// Events per press, both cameras.
     pub events_per_press: f64,
