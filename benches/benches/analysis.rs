@@ -2,18 +2,20 @@
 #![expect(clippy::print_stdout, reason = "a bench prints its table")]
 
 use skinrig_analysis::analyze;
-use skinrig_analysis::calibrate::calibrate;
+use skinrig_analysis::calibrate::{calibrate, choose};
 use skinrig_analysis::clock::{PressSpan, fit_rates};
 use skinrig_analysis::dbscan::Dbscan;
 use skinrig_analysis::grid::PixelGrid;
+use skinrig_analysis::kept::Keep;
 use skinrig_analysis::metrics::{Exclusions, metrics};
 use skinrig_analysis::rates::RateHistogram;
 use skinrig_analysis::sets::{CalibrationSet, ScoreSet};
 use skinrig_analysis::triangulate::locate;
+use skinrig_analysis::{analyze_and_keep, reduction};
 use skinrig_bench::files::{Files, Memory};
 use skinrig_bench::memory::{peak_mb, reset_peak};
 use skinrig_bench::{Table, recording};
-use skinrig_model::{CalibrationModel, SkinOutline, StereoGeometry};
+use skinrig_model::{CalibrationModel, PressRole, SkinOutline, StereoGeometry};
 
 /// Events of a dense press: those of one period in a real-rate recording.
 const PRESS_EVENTS: usize = 20_000;
@@ -24,6 +26,8 @@ fn main() {
     clustering();
     sizes();
     whole();
+    calibrations();
+    reductions();
 }
 
 fn clustering() {
@@ -118,7 +122,7 @@ fn whole() {
     let mut table = Table::new(
         "analysis of one repetition (289 presses, two cameras, no trigger marks)",
         "Mev",
-        "two cores: two passes, clock fit from event rates, DBSCAN, calibration, 2000 bootstrap \
+        "two cores: one reading, clock fit from event rates, DBSCAN, calibration, 2000 bootstrap \
          samples. Baseline: counting the same events per pixel, nothing else",
     );
     table.row("events in memory", events, || {
@@ -175,4 +179,112 @@ fn whole() {
         }
     });
     println!("{}", table.run(3));
+}
+
+/// Presses of the published calibration.
+const CALIBRATED: usize = 250;
+/// Seeds of the multi-start that have to agree.
+const SEEDS: u64 = 10;
+
+/// The calibration of 250 presses: every seed of the multi-start has to end in the same optimum.
+fn calibrations() {
+    let mut input = recording::input();
+    input.settings.study_presses = 0;
+    input.settings.calibration = CalibrationModel::None;
+    let grid = input
+        .planned
+        .iter_mut()
+        .filter(|p| p.role != PressRole::Sync);
+    for (i, planned) in grid.enumerate() {
+        planned.role = if i < CALIBRATED {
+            PressRole::Calibrate
+        } else {
+            PressRole::Score
+        };
+    }
+    let source = Memory(recording::events(&input));
+    let done = analyze(&input, &source).expect("a good recording");
+    let set = CalibrationSet::from_presses(&done.presses);
+    assert_eq!(set.sights().len(), CALIBRATED);
+    let start = StereoGeometry::paper_like([45.0, -35.0, 45.0, 46.0, 0.0, 0.0, 0.0, 0.0]);
+    let rmse_mm = |seed| {
+        let found = calibrate(&set, &start, CalibrationModel::Full, seed);
+        found.expect("enough presses").1.rmse_after_mm
+    };
+    let first = rmse_mm(1);
+    for seed in 2..=SEEDS {
+        let other = rmse_mm(seed);
+        assert!(
+            (other - first).abs() <= 1e-9,
+            "{other} mm with seed {seed}, {first} mm with 1"
+        );
+    }
+    let mut settings = input.settings.clone();
+    settings.calibration = CalibrationModel::Auto;
+    let method = format!(
+        "wall time, both cores; {SEEDS} seeds gave the same RMSE to 1e-9 mm. Baseline: intersecting the rays of all \
+         presses once"
+    );
+    let mut table = Table::new("calibration of 250 presses", "call", &method);
+    table.row("8 parameters, 10 starts", 1.0, || {
+        std::hint::black_box(calibrate(&set, &start, CalibrationModel::Full, 1));
+    });
+    table.row("all models, cross-validated, one chosen", 1.0, || {
+        std::hint::black_box(choose(&set, &start, &settings));
+    });
+    table.baseline("triangulation", 1.0, || {
+        for sight in set.sights() {
+            let columns = sight.columns.map(Some);
+            std::hint::black_box(locate(&start, &SkinOutline::PAPER, columns));
+        }
+    });
+    println!("{}", table.run(5));
+}
+
+/// The study of data reduction on all presses, in windows that hold about 18,000 events of each camera.
+fn reductions() {
+    let mut input = recording::input();
+    let settings = &mut input.settings;
+    settings.calibration = CalibrationModel::None;
+    settings.window_before_ms = 100.0;
+    settings.window_after_ms = 1500.0;
+    // The studies that the analysis itself does are kept small.
+    (settings.reduction.seeds, settings.reduction.max_power) = (1, 1);
+    for planned in &mut input.planned {
+        if planned.role == PressRole::Calibrate {
+            planned.role = PressRole::Score;
+        }
+    }
+    let source = Memory(recording::events(&input));
+    let (mut done, kept) =
+        analyze_and_keep(&input, &source, Keep::Scored).expect("a good recording");
+    drop(source);
+    (
+        done.settings.reduction.seeds,
+        done.settings.reduction.max_power,
+    ) = (10, 10);
+    let views = kept.presses.iter().flat_map(|p| &p.views);
+    let events: usize = views.map(|v| v.press_events().len()).sum();
+    let method = format!(
+        "wall time, events in memory, both cores; factors 1, 2 .. 1024, 10 seeds, both kinds of thinning, intervals; \
+         {} presses of {} events per camera on average. Baseline: clustering each press once in each camera, without \
+         thinning",
+        kept.presses.len(),
+        events / (2 * kept.presses.len()),
+    );
+    let (mut dbscan, mut grid) = (Dbscan::new(10.0, 10), PixelGrid::new((185, 360)));
+    let mut table = Table::new("data reduction of one repetition", "study", &method);
+    table.row("the whole study", 1.0, || {
+        std::hint::black_box(reduction::study(&done, &kept));
+    });
+    table.baseline("each press once, one core", 1.0, || {
+        for view in kept.presses.iter().flat_map(|p| &p.views) {
+            grid.clear();
+            for event in view.press_events() {
+                grid.add(event.x(), event.y());
+            }
+            std::hint::black_box(dbscan.run(&grid).len());
+        }
+    });
+    println!("{}", table.run(2));
 }

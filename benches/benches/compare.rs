@@ -81,7 +81,8 @@ fn clustering(folder: &Path) {
         for (what, task) in [
             ("scikit-learn DBSCAN, pixels with weights", "sklearn_pixels"),
             ("dbscan (C++), events", "cpp_events"),
-            ("numpy, sums over discs of pixels", "pixel_grid"),
+            ("numpy, sums over discs by sums along rows", "pixel_grid"),
+            ("scipy, sums over discs by FFT", "pixel_grid_fft"),
         ] {
             table.told(what, kev, || seconds(python, task));
         }
@@ -165,12 +166,17 @@ fn repetition(folder: &Path) {
         table.baseline_told("the public code's choices: clustering alone", mev, || {
             seconds(published, "clustering")
         });
-        table.told("h5py, numpy, scipy; one process", mev, || {
-            seconds(assembled, "one_process")
-        });
-        table.told("h5py, numpy, scipy; a process per camera", mev, || {
-            seconds(assembled, "two_processes")
-        });
+        for (what, task) in [
+            ("h5py, discs by FFT, scipy; one process", "one_process_fft"),
+            ("the same, a process per camera", "two_processes_fft"),
+            (
+                "h5py, discs by sums along rows, scipy; one process",
+                "one_process",
+            ),
+            ("the same, a process per camera", "two_processes"),
+        ] {
+            table.told(what, mev, || seconds(assembled, task));
+        }
     }
     table.row("this crate", mev, || {
         std::hint::black_box(analyze(&input, &files).map(|a| a.counts).ok());

@@ -1,11 +1,11 @@
-"""Clusters the events of one press in four ways; core and noise must be what the bench found."""
+"""Clusters the events of one press in five ways; core and noise must be what the bench found."""
 
 import json
 
 import numpy as np
 from common import main
 from dbscan import DBSCAN as fast_dbscan
-from grid import core_and_clustered, counts_of
+from grid import core_and_clustered, counts_of, disc_sums, disc_sums_fft
 from sklearn.cluster import DBSCAN
 
 NOISE, BORDER, CORE = range(3)
@@ -63,13 +63,13 @@ def cpp_events(folder):
     return lambda: fast_dbscan(points, eps=s["eps_px"], min_samples=s["min_samples"]), check
 
 
-def pixel_grid(folder):
+def pixel_grid(folder, sums=disc_sums):
     s, pixels, classes = load(folder)
     u, v = pixels.T
 
     def work():
         counts = counts_of(u, v, s["rows"])
-        return core_and_clustered(counts, s["eps_px"], s["min_samples"])
+        return core_and_clustered(counts, s["eps_px"], s["min_samples"], sums)
 
     def check(result):
         core, clustered = (of[v - s["rows"][0], u] for of in result)
@@ -84,5 +84,6 @@ if __name__ == "__main__":
         "sklearn_pixels": sklearn_pixels,
         "cpp_events": cpp_events,
         "pixel_grid": pixel_grid,
+        "pixel_grid_fft": lambda folder: pixel_grid(folder, disc_sums_fft),
     }
-    main(tasks, ["numpy", "scikit-learn", "dbscan"])
+    main(tasks, ["numpy", "scipy", "scikit-learn", "dbscan"])

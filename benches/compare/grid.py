@@ -1,6 +1,9 @@
-"""DBSCAN's core and noise from pixel counts, in numpy: sums over discs from sums along rows."""
+"""DBSCAN's core and noise from pixel counts, in numpy: sums over discs from sums along rows, or by Fourier transform."""
+
+from functools import lru_cache
 
 import numpy as np
+from scipy.fft import irfft2, next_fast_len, rfft2
 
 WIDTH = 640
 
@@ -30,12 +33,31 @@ def disc_sums(counts, halves):
     return out
 
 
-def core_and_clustered(counts, eps, min_samples):
+@lru_cache
+def disc_transform(halves, shape):
+    """The Fourier transform of the disc, made once."""
+    reach = len(halves) - 1
+    disc = np.zeros((2 * reach + 1, 2 * reach + 1))
+    for dy, half in enumerate(halves):
+        disc[[reach - dy, reach + dy], reach - half : reach + half + 1] = 1
+    return rfft2(disc, shape)
+
+
+def disc_sums_fft(counts, halves):
+    """The same by convolution with the disc; sums are whole numbers, so that rounding undoes the transform's error."""
+    reach = len(halves) - 1
+    shape = tuple(next_fast_len(n + 2 * reach, real=True) for n in counts.shape)
+    sums = irfft2(rfft2(counts, shape) * disc_transform(tuple(halves), shape), shape)
+    rows, width = counts.shape
+    return np.rint(sums[reach : reach + rows, reach : reach + width]).astype(np.int32)
+
+
+def core_and_clustered(counts, eps, min_samples, sums=disc_sums):
     """Which pixels are core, and which are core or border."""
     halves = disc_halves(eps)
     occupied = counts > 0
-    core = occupied & (disc_sums(counts, halves) >= min_samples)
-    return core, occupied & (disc_sums(core, halves) > 0)
+    core = occupied & (sums(counts, halves) >= min_samples)
+    return core, occupied & (sums(core, halves) > 0)
 
 
 def counts_of(u, v, rows):

@@ -12,7 +12,7 @@ from concurrent.futures import ProcessPoolExecutor
 import h5py
 import numpy as np
 from common import main
-from grid import WIDTH, core_and_clustered, counts_of
+from grid import WIDTH, core_and_clustered, counts_of, disc_sums, disc_sums_fft
 from scipy.optimize import least_squares
 
 STARTS = 10
@@ -20,7 +20,7 @@ AIM = np.array([10.0, 2.0])
 SPREAD = np.array([8.0, 8.0, 8.0, 8.0, 4.0, 4.0, 0.4, 0.4])
 
 
-def columns(path, windows, rows, eps, min_samples):
+def columns(path, windows, rows, eps, min_samples, sums):
     """Mean column of the events that are not noise, per window, and the CPU seconds that this took."""
     cpu = time.process_time()
     with h5py.File(path) as file:
@@ -33,7 +33,7 @@ def columns(path, windows, rows, eps, min_samples):
         u, v = x[a:b], y[a:b]
         inside = (v >= rows[0]) & (v <= rows[1])
         counts = counts_of(u[inside], v[inside], rows)
-        _, clustered = core_and_clustered(counts, eps, min_samples)
+        _, clustered = core_and_clustered(counts, eps, min_samples, sums)
         per_column = np.where(clustered, counts, 0).sum(axis=0, dtype=np.int64)
         if (n := per_column.sum()) > 0:
             out[i] = (per_column @ u_of) / n
@@ -72,7 +72,7 @@ def rmse(errors):
     return float(np.sqrt((errors**2).sum(axis=0).mean()))
 
 
-def whole(folder, submit=None):
+def whole(folder, submit=None, sums=disc_sums):
     """With a process per camera, or else both cameras in this one."""
     s = json.loads((folder / "repetition.json").read_text())
     truth, calibrates = np.array(s["truth"]).T, np.array(s["calibrates"])
@@ -80,7 +80,7 @@ def whole(folder, submit=None):
     def work():
         jobs = [
             (columns, folder / f"camera{k + 1}.hdf5", s["windows"][k], s["rows"][k],
-             s["eps_px"], s["min_samples"])
+             s["eps_px"], s["min_samples"], sums)
             for k in (0, 1)
         ]
         if submit:
@@ -112,5 +112,10 @@ if __name__ == "__main__":
     with ProcessPoolExecutor(2) as pool:
         # The processes are there before anything is timed.
         list(pool.map(abs, [1, 2]))
-        tasks = {"two_processes": lambda folder: whole(folder, pool.submit), "one_process": whole}
+        tasks = {
+            "two_processes": lambda folder: whole(folder, pool.submit),
+            "two_processes_fft": lambda folder: whole(folder, pool.submit, disc_sums_fft),
+            "one_process": whole,
+            "one_process_fft": lambda folder: whole(folder, sums=disc_sums_fft),
+        }
         main(tasks, ["numpy", "scipy", "h5py"])
