@@ -411,3 +411,47 @@ fn the_reason_that_ended_the_run_is_said_once() {
     assert_eq!(table.matches("the belt tore").count(), 1, "{table}");
     assert!(table.contains("fault at 1803.2 s"), "{table}");
 }
+
+/// A lower error with fewer events is explained where the intervals are apart, and only there.
+#[test]
+fn less_error_with_fewer_events_is_explained() {
+    let caption = |rmse: f64, spread: f64| {
+        let mut analysis = support::analysis(4, 3);
+        let study = analysis.reduction.as_mut().unwrap();
+        let row = &mut study.curves[0].rows[1];
+        row.rmse_mm = support::studies::estimate(rmse, spread, 16);
+        html(&input(&analysis))
+            .unwrap()
+            .contains("A is lowest at k = 2 (")
+    };
+    assert!(caption(0.5, 0.01));
+    assert!(!caption(0.5, 50.0));
+    assert!(!caption(500.0, 0.01));
+}
+
+/// The probed area is that of the locations with a scored press that was done, as its number is.
+#[test]
+fn the_probed_area_is_drawn_for_scored_locations_alone() {
+    use skinrig_model::PressRole;
+    let mut analysis = support::analysis(4, 3);
+    let cells = |analysis: &skinrig_analysis::result::Analysis| {
+        let page = html(&input(analysis)).unwrap();
+        let (_, mask) = page.split_once("<mask id=\"skin-map-probed\"").unwrap();
+        let (mask, _) = mask.split_once("</mask>").unwrap();
+        mask.matches('M').count()
+    };
+    assert_eq!(cells(&analysis), 16);
+    for press in analysis.presses.iter_mut().filter(|p| p.location < 5) {
+        if press.role == PressRole::Score {
+            press.role = PressRole::Calibrate;
+        }
+    }
+    let left: std::collections::BTreeSet<u32> = analysis
+        .presses
+        .iter()
+        .filter(|p| p.role == PressRole::Score)
+        .map(|p| p.location)
+        .collect();
+    assert_eq!(cells(&analysis), left.len());
+    assert!(left.len() < 16);
+}
