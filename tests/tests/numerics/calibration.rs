@@ -1,10 +1,12 @@
-//! Calibrating presses that cannot tell the parameters: too few, all at one place, all on one line.
+//! Calibrating presses that cannot tell the parameters: too few, repeated at too few places, on a line through a camera.
 
 use skinrig_analysis::analyze;
+use skinrig_analysis::calibrate::{Chosen, choose};
 use skinrig_analysis::result::CalibrationResult;
-use skinrig_model::{CalibrationModel, Point2, PressRole};
+use skinrig_analysis::sets::CalibrationSet;
+use skinrig_model::{AnalysisSettings, CalibrationModel, Point2, PressRole, StereoGeometry};
 
-use crate::support::session;
+use crate::support::{PLANTED, session};
 use crate::wild::holds_only_numbers;
 
 /// The planted session with `calibrate` deciding which calibrating presses stay; the full model is asked for.
@@ -49,13 +51,140 @@ fn presses_that_cannot_tell_the_parameters_are_reported_and_not_guessed_from() {
     }
 }
 
+/// What is chosen from exact views of `places`, each a location of its own in the plan; the full model is asked for.
+fn chosen(places: &[Point2]) -> Chosen {
+    let (input, source) = session();
+    let mut presses = analyze(&input, &source).unwrap().presses;
+    presses.retain(|p| p.role == PressRole::Calibrate);
+    presses.truncate(places.len());
+    assert_eq!(presses.len(), places.len());
+    let planted = StereoGeometry::paper_like(PLANTED);
+    for (press, at) in presses.iter_mut().zip(places) {
+        press.truth = Some(*at);
+        for (view, camera) in press.views.iter_mut().zip(planted.cameras) {
+            view.as_mut().unwrap().centroid_u = Some(camera.column_of_point(*at).unwrap());
+        }
+    }
+    let settings = AnalysisSettings {
+        calibration: CalibrationModel::Full,
+        bootstrap_resamples: 20,
+        ..input.settings
+    };
+    choose(
+        &CalibrationSet::from_presses(&presses),
+        &StereoGeometry::PAPER,
+        &settings,
+    )
+}
+
+/// `n` places at equal distances, the ends included.
+fn along(from: [f64; 2], to: [f64; 2], n: u32) -> Vec<Point2> {
+    let at = |t: f64, axis: usize| from[axis] + (to[axis] - from[axis]) * t;
+    (0..n)
+        .map(|i| f64::from(i) / f64::from(n - 1))
+        .map(|t| Point2::new(at(t, 0), at(t, 1)))
+        .collect()
+}
+
+const TOO_FEW_FOR_FULL: &str =
+    "the calibrating presses touch too few places for the calibration `full`";
+
+/// A row of the planted session: what is too little is the number of places.
 #[test]
-fn presses_on_one_line_or_repeated_at_two_places_are_reported() {
-    // Five places on the line x = -14.
-    let (on_a_line, said) = calibrated(|at, _| at.x_mm < -13.0);
-    let found = format!("{on_a_line:?} {said}");
-    assert!(
-        said.contains("calibrat") || on_a_line.is_none_or(|c| c.model != CalibrationModel::Full),
-        "{found}"
+fn five_places_on_one_line_give_the_positions() {
+    let (found, said) = calibrated(|at, _| at.x_mm < -13.0);
+    let found = found.unwrap();
+    assert_eq!(
+        (found.model, found.rank, found.n),
+        (CalibrationModel::Positions, 4, 5)
     );
+    assert_eq!(said, format!("{TOO_FEW_FOR_FULL}: `positions` is used"));
+}
+
+/// Angles of eight places leave nothing open even on one line: the places are known, and a camera beside their line
+/// sees each under another angle.
+#[test]
+fn eight_places_on_a_line_beside_the_cameras_determine_eight_parameters() {
+    for (from, to) in [([-5.0, -20.0], [-5.0, 20.0]), ([-14.0, -5.0], [26.0, -5.0])] {
+        let found = chosen(&along(from, to, 8));
+        assert_eq!(found.warnings, [""; 0]);
+        let result = found.calibration.unwrap();
+        assert_eq!((result.model, result.rank), (CalibrationModel::Full, 8));
+        for (value, planted) in result.values.iter().zip(PLANTED) {
+            assert!((value - planted).abs() < 1e-6, "{:?}", result.values);
+        }
+    }
+}
+
+/// A camera that looks along the line sees all of its places in one column.
+#[test]
+fn a_line_through_a_camera_leaves_its_parameters_open() {
+    let camera = [PLANTED[2], PLANTED[3]];
+    let places = along([-14.0, -14.0], camera, 26);
+    let found = chosen(&places[..20]);
+    let result = found.calibration.unwrap();
+    // That column tells one angle and one offset of four parameters.
+    assert_eq!((result.model, result.rank), (CalibrationModel::Full, 6));
+    assert_eq!(
+        found.warnings,
+        [
+            "the calibrating presses determine 6 of the 8 parameters of the calibration `full`: the values of camera 2 x \
+             (mm), camera 2 y (mm), camera 2 skew (deg), camera 2 distortion W (1) are one choice of many that fit \
+             equally well; calibrate at more places, spread over the skin"
+        ]
+    );
+}
+
+/// Repeated presses tell no more parameters than one at each place, however many there are.
+#[test]
+fn repeated_presses_count_as_one_place() {
+    let corners = [[-14.0, -20.0], [30.0, 24.0], [-14.0, 24.0], [30.0, -20.0]];
+    let corners = corners.map(|[x, y]| Point2::new(x, y));
+
+    let two = chosen(&corners[..2].repeat(10));
+    assert_eq!(two.calibration, None);
+    assert_eq!(two.geometry, StereoGeometry::PAPER);
+    assert_eq!(
+        two.warnings,
+        [
+            "2 calibrating places are too few for any calibration: the nominal camera geometry is used"
+        ]
+    );
+
+    let four = chosen(&corners.repeat(5));
+    let result = four.calibration.unwrap();
+    assert_eq!(
+        (result.model, result.rank, result.n),
+        (CalibrationModel::Positions, 4, 20)
+    );
+    assert_eq!(
+        four.warnings,
+        [format!("{TOO_FEW_FOR_FULL}: `positions` is used")]
+    );
+}
+
+/// The same by way of the plan: both repetitions of two places calibrate, eight residuals for eight parameters.
+#[test]
+fn two_places_pressed_twice_calibrate_nothing() {
+    let (mut input, source) = session();
+    input.settings.calibration = CalibrationModel::Full;
+    input.settings.bootstrap_resamples = 20;
+    input.settings.study_presses = 0;
+    for planned in &mut input.planned {
+        if planned.role != PressRole::Sync {
+            let first = planned.location < 2;
+            planned.role = if first {
+                PressRole::Calibrate
+            } else {
+                PressRole::Score
+            };
+        }
+    }
+    let a = analyze(&input, &source).unwrap();
+    let usable = CalibrationSet::from_presses(&a.presses);
+    assert_eq!(usable.sights().len(), 4);
+    assert_eq!(a.calibration, None);
+    let said =
+        "2 calibrating places are too few for any calibration: the nominal camera geometry is used";
+    assert!(a.warnings.iter().any(|w| w == said), "{:?}", a.warnings);
 }

@@ -1,7 +1,8 @@
-//! Every case in which the public code was seen to go wrong, and the test that holds the right answer.
+//! Which named test each collected case of the public code going wrong is mapped to.
 //!
-//! The names of the cases are those of the collection that was made by running the public code; their inputs and
-//! right answers stand in the tests named here, or in the fixtures that those read.
+//! The names of the cases are those of the collection that was made by running the public code. The checks here see
+//! that a test of the name is in the file, and that the fixtures of geometry and clusters hold the listed cases; what
+//! those tests assert is theirs alone.
 
 /// (group, case, file under the workspace's root, test).
 const CASES: &[(&str, &str, &str, &str)] = &[
@@ -206,7 +207,7 @@ const WINDOWS: &str =
     "windows_include_their_start_and_exclude_their_end_in_any_order_within_the_slack";
 
 #[test]
-fn every_case_has_a_test_that_exists() {
+fn every_case_names_a_test_that_exists() {
     for (group, case, file, test) in CASES {
         let path = format!("{}/../{file}", env!("CARGO_MANIFEST_DIR"));
         let text = std::fs::read_to_string(&path).unwrap();
