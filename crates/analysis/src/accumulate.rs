@@ -1,6 +1,7 @@
 //! One pass over a camera's events: rates, the pixel counts of each press, and a few close-ups.
 //!
-//! Memory holds one pixel grid per window that is open at a time. Events may be out of order by up to
+//! Memory holds one pixel grid per window that is open at a time; for an estimator that needs the events themselves also
+//! those of the open windows, up to [`MOST_KEPT`]. Events may be out of order by up to
 //! [`SLACK_US`]; later ones are counted as late and reported, never silently dropped.
 
 use skinrig_model::{
@@ -22,6 +23,9 @@ use crate::segment::Window;
 
 /// How far an event may lie before the newest one seen and still find its window open, µs.
 pub const SLACK_US: u64 = 10_000;
+
+/// Most events of the open windows of a camera that are kept for an estimator: 512 MiB.
+const MOST_KEPT: usize = 1 << 26;
 
 /// Events that are handled together, so that they stay in the processor's nearest caches.
 const SLICE: usize = 1024;
@@ -81,6 +85,7 @@ pub struct Accumulator<'a> {
     dbscan: Dbscan,
     /// An estimator other than clusters of single pixels, and the windows keep their events for it.
     estimator: Option<PressEstimator>,
+    most_kept: usize,
     zooms: Vec<(ZoomPlan, Vec<u32>, Vec<u32>)>,
     zoom_next: usize,
     keeper: Keeper,
@@ -187,6 +192,7 @@ impl<'a> Accumulator<'a> {
             dbscan: Dbscan::new(settings.eps_px, settings.min_samples),
             estimator: (settings.estimator != Estimator::Dbscan || settings.bin_px > 1)
                 .then(|| PressEstimator::new(settings, settings.crop_v[camera.index()])),
+            most_kept: MOST_KEPT,
             zooms,
             zoom_next: 0,
             keeper: Keeper::new(kept),
@@ -295,14 +301,25 @@ impl<'a> Accumulator<'a> {
     }
 
     fn count_in_windows(&mut self, events: &[CdEvent]) {
+        let mut kept: usize = self.open.iter().map(|o| o.events.len()).sum();
         for open in &mut self.open {
             let w = &open.window;
             let start = first_from(events, w.start_us);
             let idle = first_from(events, w.idle_start_us)..start;
             open.idle_events += idle.len() as u64;
             let events = &events[start..first_from(events, w.end_us).max(start)];
+            let too_many = |most| AnalysisError::TooManyEvents {
+                camera: self.camera,
+                row: w.row,
+                most,
+            };
             let mut fits = open.grid.add_all(events);
             if self.estimator.is_some() {
+                kept += events.len();
+                if kept > self.most_kept {
+                    self.error = Some(too_many(self.most_kept));
+                    return;
+                }
                 for event in events {
                     let packed = KeptEvent::pack(event, w.start_us);
                     fits &= packed.is_some();
@@ -310,10 +327,7 @@ impl<'a> Accumulator<'a> {
                 }
             }
             if !fits {
-                self.error = Some(AnalysisError::TooManyEvents {
-                    camera: self.camera,
-                    row: w.row,
-                });
+                self.error = Some(too_many(u32::MAX as usize));
                 return;
             }
             let on = events.iter().filter(|e| e.polarity == Polarity::On);
@@ -556,6 +570,42 @@ mod tests {
         let counts: Vec<(usize, u32)> = views.iter().map(|(row, v)| (*row, v.events)).collect();
         assert_eq!(counts, [(0, 40), (1, 60)]);
         assert_eq!(views[0].1.idle_s, 0.0);
+    }
+
+    #[test]
+    fn an_estimator_keeps_so_many_events_of_all_open_windows_and_no_more() {
+        let windows = [
+            window(0, 1_000, 1_000, 5_000),
+            window(1, 3_000, 3_000, 9_000),
+            window(2, 20_000, 20_000, 24_000),
+        ];
+        let events: Vec<CdEvent> = (0..400)
+            .map(|i| event(100 * i, 250, Polarity::On))
+            .collect();
+        let done = |estimator, most_kept| {
+            let settings = AnalysisSettings {
+                estimator,
+                ..AnalysisSettings::default()
+            };
+            let wanted = Wanted {
+                windows: &windows,
+                ..Wanted::default()
+            };
+            let mut all = Accumulator::new(CameraId::Two, &settings, wanted);
+            all.most_kept = most_kept;
+            events.chunks(2).for_each(|slice| all.take(slice));
+            all.finish().map(|done| done.views.len())
+        };
+        // 40 and 60 while both are open; the 40 of the last come when those are gone.
+        assert_eq!(done(Estimator::ColumnMedian, 100), Ok(3));
+        let too_many = AnalysisError::TooManyEvents {
+            camera: CameraId::Two,
+            row: 1,
+            most: 99,
+        };
+        assert_eq!(done(Estimator::ColumnMedian, 99), Err(too_many));
+        // Clusters of pixels need counts only.
+        assert_eq!(done(Estimator::Dbscan, 0), Ok(3));
     }
 
     #[test]

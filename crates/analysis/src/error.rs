@@ -85,15 +85,17 @@ pub enum AnalysisError {
         /// Camera time, µs.
         t_us: u64,
     },
-    /// More events in one window than a counter holds.
+    /// More events in the windows of presses than a counter holds, or than an estimator that needs them all may keep.
     #[error(
-        "expected at most 4294967295 events in the window of press {row}, found more ({camera})"
+        "expected at most {most} events in the window of press {row} and those that overlap it, found more ({camera}); shorten the press window or set `thinning`, both below `analysis` in the protocol"
     )]
     TooManyEvents {
         /// Which camera.
         camera: CameraId,
         /// Row of the press in the plan.
         row: usize,
+        /// The most that there may be.
+        most: usize,
     },
     /// No press can be located in any way.
     #[error(
