@@ -210,6 +210,7 @@ fn the_published_way_judges_the_first_repetition_and_counts_nothing_as_missing()
     let (a, kept) = analyze_and_keep(&input, &source, Keep::All).unwrap();
     let r = reference_code(&input, &a, &kept);
     assert_eq!((r.presses, r.with_centroids, r.inside), (25, 25, 25));
+    assert!(r.calibrated);
     let first = a.presses.iter().filter(|p| p.role == PressRole::Calibrate);
     let errors: Vec<(f64, f64)> = first.map(|p| p.error_mm().unwrap()).collect();
     let mean = |of: &dyn Fn(&(f64, f64)) -> f64| errors.iter().map(of).sum::<f64>() / 25.0;

@@ -7,6 +7,8 @@ use serde::{Deserialize, Serialize};
 pub struct ReferenceCode {
     /// Presses used: all of the first repetition, whatever their role.
     pub presses: u32,
+    /// False when they determine no plausible geometry: the nominal one judges, and the numbers say nothing about the skin.
+    pub calibrated: bool,
     /// How many have two centroids.
     pub with_centroids: u32,
     /// How many of those have their estimate in the enclosing square.

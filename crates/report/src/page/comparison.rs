@@ -249,8 +249,14 @@ pub(super) fn reference(a: &Analysis) -> Option<Grid> {
     ]);
     grid.note(
         "In-sample: the presses that calibrated are the ones judged, and those outside the enclosing square are left out. \
-         It favours what was fitted. Held-out: repetitions that did not calibrate.",
+         It favours what was fitted. Held-out: presses that did not calibrate.",
     );
+    if !r.calibrated {
+        grid.note(
+            "These presses determine no plausible calibration under the public code's choices: the nominal camera geometry \
+             judges, and the in-sample numbers say nothing about the skin.",
+        );
+    }
     Some(grid)
 }
 

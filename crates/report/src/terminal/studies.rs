@@ -206,5 +206,26 @@ fn reference(r: &ReferenceCode) -> String {
         r.inside,
         r.presses
     );
-    wrap("reference ", &text)
+    let mut out = wrap("reference ", &text);
+    if !r.calibrated {
+        out += &wrap(
+            "          ",
+            "nominal camera geometry: these presses determine no plausible calibration under the public code's choices",
+        );
+    }
+    let shown = r
+        .reduction
+        .iter()
+        .filter(|row| FACTORS.contains(&row.factor));
+    let rates = shown.map(|row| {
+        let percent = |share: f64| number(Some(100.0 * share), 1);
+        let (published, honest) = (percent(row.pass_rate), percent(row.honest_pass_rate));
+        format!("1/{} {published} ({honest})", row.factor)
+    });
+    let rates = rates.collect::<Vec<_>>().join(", ");
+    if !rates.is_empty() {
+        let text = format!("pass rate in %, its way (missing presses failing): {rates}");
+        out += &wrap("          ", &text);
+    }
+    out
 }
