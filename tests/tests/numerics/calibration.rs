@@ -98,7 +98,9 @@ fn five_places_on_one_line_give_the_positions() {
         (found.model, found.rank, found.n),
         (CalibrationModel::Positions, 4, 5)
     );
-    assert_eq!(said, format!("{TOO_FEW_FOR_FULL}: `positions` is used"));
+    // Scored places far from the line may be worse, which is said too.
+    let wanted = format!("{TOO_FEW_FOR_FULL}: `positions` is used");
+    assert!(said.starts_with(&wanted), "{said}");
 }
 
 /// Angles of eight places leave nothing open even on one line: the places are known, and a camera beside their line
