@@ -44,7 +44,8 @@ const REDUCED_TARGET: f64 = 0.85;
 /// Streams of random numbers from here on thin events; the bootstrap counts from 0.
 const THINNING: u64 = 1 << 40;
 
-/// When the cameras know of a touch: over the scored presses among `kept` that were done as planned.
+/// When the cameras know of a touch: over the scored presses among `kept` that were done as planned, whether or not the
+/// cameras saw them; what the journal or the settings leave out by hand is no trial.
 /// `None` without any scored press or without a clock for both cameras.
 #[must_use]
 pub fn study(analysis: &Analysis, kept: &Kept) -> Option<Latency> {

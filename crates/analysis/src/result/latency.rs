@@ -29,7 +29,7 @@ pub struct Latency {
     pub settings: LatencySettings,
     /// Trials: presses that both cameras saw, with background. One without any event is a trial without a detection.
     pub trials: u32,
-    /// Presses in the study without a usable trial or background.
+    /// Presses that are no trial: without a usable press or background, not done as planned, or left out by hand.
     pub unusable: u32,
     /// Trials shorter than 0.85 s to either side, because a neighbouring press or the end of what was kept cut them.
     pub shortened: u32,
