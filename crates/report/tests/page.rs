@@ -429,10 +429,9 @@ fn less_error_with_fewer_events_is_explained() {
     assert!(!caption(500.0, 0.01));
 }
 
-/// The probed area is that of the locations with a scored press that was done, as its number is.
+/// The probed area is drawn about the places that its number stands for.
 #[test]
-fn the_probed_area_is_drawn_for_scored_locations_alone() {
-    use skinrig_model::PressRole;
+fn the_probed_area_is_drawn_as_it_is_counted() {
     let mut analysis = support::analysis(4, 3);
     let cells = |analysis: &skinrig_analysis::result::Analysis| {
         let page = html(&input(analysis)).unwrap();
@@ -441,17 +440,8 @@ fn the_probed_area_is_drawn_for_scored_locations_alone() {
         mask.matches('M').count()
     };
     assert_eq!(cells(&analysis), 16);
-    for press in analysis.presses.iter_mut().filter(|p| p.location < 5) {
-        if press.role == PressRole::Score {
-            press.role = PressRole::Calibrate;
-        }
+    if let Some(coverage) = &mut analysis.coverage {
+        coverage.places.truncate(11);
     }
-    let left: std::collections::BTreeSet<u32> = analysis
-        .presses
-        .iter()
-        .filter(|p| p.role == PressRole::Score)
-        .map(|p| p.location)
-        .collect();
-    assert_eq!(cells(&analysis), left.len());
-    assert!(left.len() < 16);
+    assert_eq!(cells(&analysis), 11);
 }

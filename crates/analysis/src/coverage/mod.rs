@@ -53,6 +53,7 @@ pub fn coverage(analysis: &Analysis) -> Option<Coverage> {
         probed_mm2,
         cell_mm,
         locations,
+        places,
         views,
         overlap,
         taxels_skin: taxels(Some(skin_mm2), &rmse_mm),

@@ -19,6 +19,8 @@ pub struct Coverage {
     pub cell_mm: Option<f64>,
     /// Locations probed: with a scored press that was attempted.
     pub locations: u32,
+    /// Where they are, each place once.
+    pub places: Vec<Point2>,
     /// The field of view of each camera within the outline, mm: convex polygons that touch but do not overlap, one as
     /// long as a field of view spans less than 180°.
     pub views: [Vec<Vec<Point2>>; 2],

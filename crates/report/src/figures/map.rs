@@ -1,7 +1,7 @@
 //! Owns the maps of the skin: localisation errors and spread between repetitions, per location.
 
 use skinrig_analysis::result::PressResult;
-use skinrig_model::PressRole;
+use skinrig_model::{Point2, PressRole};
 
 use super::skin::{Layout, colour_bar};
 use super::{Canvas, Figure, nice_above};
@@ -90,7 +90,7 @@ pub fn skin_map(input: &ReportInput<'_>) -> Figure {
          their presses. Lines run from each measured position (truth) to its estimate, which ends in a dot \
          ({} presses at {} locations). Open squares: scored presses that do not count ({}; those never done are drawn \
          only at places without a disc). Thin grey line: press path of the first repetition. Tinted: fields of view of camera 1 and camera 2; dotted: their \
-         overlap, where a press can be located. Grey edge: the probed area, one square cell about each scored location.",
+         overlap, where a press can be located. Grey edge: the probed area, one square cell about each location.",
         counted.len(),
         locations.len(),
         others.len()
@@ -137,8 +137,8 @@ pub fn skin_map(input: &ReportInput<'_>) -> Figure {
         None => {}
     }
     svg.close();
-    if let Some(cell) = coverage.and_then(|c| c.cell_mm) {
-        cells(svg, &layout, input, cell);
+    if let Some((coverage, cell_mm)) = coverage.and_then(|c| Some((c, c.cell_mm?))) {
+        cells(svg, &layout, &coverage.places, cell_mm);
     }
     svg.path("skin-edge", &layout.skin());
     let first = input
@@ -212,17 +212,13 @@ pub fn skin_map(input: &ReportInput<'_>) -> Figure {
 }
 
 /// The edge of the area that the probed locations stand for, within the outline.
-fn cells(svg: &mut Svg, layout: &Layout, input: &ReportInput<'_>, cell_mm: f64) {
+fn cells(svg: &mut Svg, layout: &Layout, places: &[Point2], cell_mm: f64) {
     let side = cell_mm * layout.axes.x.per_unit();
-    let mut seen = std::collections::BTreeSet::new();
     let mut data = String::new();
-    let scored = input.analysis.presses.iter();
-    for p in scored.filter(|p| p.role == PressRole::Score && p.timing.is_some()) {
-        if seen.insert(p.location) {
-            let (x, y) = layout.px(p.planned);
-            let (x, y) = (Px(x - side / 2.0), Px(y - side / 2.0));
-            data += &format!("M{x} {y}h{0}v{0}h-{0}Z", Px(side));
-        }
+    for place in places {
+        let (x, y) = layout.px(*place);
+        let (x, y) = (Px(x - side / 2.0), Px(y - side / 2.0));
+        data += &format!("M{x} {y}h{0}v{0}h-{0}Z", Px(side));
     }
     svg.open(
         "g",

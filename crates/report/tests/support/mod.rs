@@ -80,6 +80,10 @@ pub fn analysis(side: u32, repetitions: u32) -> Analysis {
         excluded: count("excluded"),
         sync: 3,
     };
+    let of_first = presses
+        .iter()
+        .filter(|p| p.role != PressRole::Sync && p.repetition == 0);
+    let places: Vec<Point2> = of_first.map(|p| p.planned).collect();
     let scored = metrics(&presses, true);
     let scored_without_exclusions = metrics(&presses, false);
     let length_s = presses.len() as f64 * 2.9 + 6.0;
@@ -158,7 +162,7 @@ pub fn analysis(side: u32, repetitions: u32) -> Analysis {
             rmse_mm: scored_without_exclusions.rmse_mm,
         },
         threshold: Some(studies::threshold()),
-        coverage: Some(studies::coverage(pitch, side * side)),
+        coverage: Some(studies::coverage(pitch, &places)),
         cmre: Some(studies::cmre()),
         bit_rates: Some(studies::bit_rates()),
         reduction: Some(studies::reduction()),

@@ -204,7 +204,8 @@ pub fn threshold() -> ThresholdChoice {
 }
 
 /// The published skin and the areas of its fields of view as drawn by hand.
-pub fn coverage(cell_mm: f64, locations: u32) -> Coverage {
+pub fn coverage(cell_mm: f64, places: &[Point2]) -> Coverage {
+    let locations = places.len() as u32;
     let polygon =
         |points: &[(f64, f64)]| vec![points.iter().map(|p| Point2::new(p.0, p.1)).collect()];
     Coverage {
@@ -213,6 +214,7 @@ pub fn coverage(cell_mm: f64, locations: u32) -> Coverage {
         probed_mm2: Some(f64::from(locations) * cell_mm * cell_mm),
         cell_mm: Some(cell_mm),
         locations,
+        places: places.to_vec(),
         views: [
             polygon(&[
                 (44.0, -32.0),
