@@ -107,10 +107,9 @@ fn notes(grid: &mut Grid, l: &Latency) {
     ));
     if l.false_alarms_per_s.value == Some(0.0) && l.background_s > 0.0 {
         grid.note(format!(
-            "No false alarm in {} s: the rate is below {} per second with 95 % confidence (3 / time); an interval over \
+            "No false alarm in {} s: the interval is the exact Poisson one (up to 3.69 / time); a bootstrap over \
              locations cannot tell.",
             number(Some(l.background_s), 1),
-            number(Some(3.0 / l.background_s), 3),
         ));
     }
     grid.note(format!(
