@@ -59,6 +59,15 @@ const fn cost_name(cost: CostKind) -> &'static str {
     }
 }
 
+/// Where a session comes from, for people.
+fn rig_in_words(name: &str) -> String {
+    if name.contains("simulated") {
+        format!("Rig: {name}, SIMULATED. CPU times are this machine's.")
+    } else {
+        format!("Rig: {name}. CPU times are this machine's.")
+    }
+}
+
 /// `skinrig tradeoff`.
 ///
 /// # Errors
@@ -69,7 +78,13 @@ pub fn tradeoff(args: &TradeoffArgs, json: bool) -> Outcome {
         overrides: &args.overrides,
         reference_code: false,
     };
-    let Opened { input, events, .. } = open(&args.session, choices)?;
+    let Opened {
+        input,
+        events,
+        header,
+        ..
+    } = open(&args.session, choices)?;
+    let rig = rig_in_words(&header.rig_name);
     let plan = Plan {
         full: args.full,
         repeats: args.repeats,
@@ -77,7 +92,7 @@ pub fn tradeoff(args: &TradeoffArgs, json: bool) -> Outcome {
     };
     let result = measure(&input, &events, plan, &mut thread_cpu_s).map_err(Failure::input)?;
     let answers = answers(&result, args);
-    let mut document = serde_json::json!({ "format": "skinrig-tradeoff", "format_version": 1, "tradeoff": result });
+    let mut document = serde_json::json!({ "format": "skinrig-tradeoff", "format_version": 1, "rig": rig, "tradeoff": result });
     let found = answers.iter().map(|a| {
         serde_json::json!({
             "question": a.question,
@@ -99,14 +114,14 @@ pub fn tradeoff(args: &TradeoffArgs, json: bool) -> Outcome {
     let text = serde_json::to_string_pretty(&document).map_err(Failure::internal)?;
     write(
         &html_path,
-        page(&result, &name.unwrap_or_default()).as_bytes(),
+        page(&result, &name.unwrap_or_default(), &rig).as_bytes(),
     )?;
     write(&json_path, text.as_bytes())?;
     if json {
         document["files"] = serde_json::json!({ "page": html_path, "results": json_path });
         crate::print_json(&document);
     } else {
-        let table = terminal_table(&result, std::io::stdout().is_terminal());
+        let table = terminal_table(&result, &rig, std::io::stdout().is_terminal());
         crate::terminal::out(format_args!("{table}"));
         for answer in &answers {
             outln!("\n{}:", answer.question);

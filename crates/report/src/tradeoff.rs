@@ -93,14 +93,15 @@ fn ordered(result: &Tradeoff) -> Vec<&Row> {
     first.into_iter().chain(on).chain(others).collect()
 }
 
-/// The table for a terminal: at most 100 columns, ends with a newline.
+/// The table for a terminal: at most 100 columns, ends with a newline. `rig` says in words where the session comes from.
 #[must_use]
-pub fn terminal_table(result: &Tradeoff, color: bool) -> String {
+pub fn terminal_table(result: &Tradeoff, rig: &str, color: bool) -> String {
     let (used, of) = result.scored;
     let mut out = format!(
-        "{} choices on {used} of {of} scored presses, each calibrated (model {}) on {} of {} others.\n\
+        "{}\n{} choices on {used} of {of} scored presses, each calibrated (model {}) on {} of {} others.\n\
          A choice competes when it locates at least {} % of the presses; others are in brackets.\n\
          Front: c CPU time, b bytes, d delay. CPU: median of {} runs over {} presses, both cameras.\n\n",
+        crate::terminal::plain(rig),
         result.rows.len(),
         model(result),
         result.calibrating.0,
@@ -186,9 +187,10 @@ pub fn protocol_lines(row: &Row) -> String {
     out
 }
 
-/// The page: figure and table of all rows; needs no network and no other file.
+/// The page: figure and table of all rows; needs no network and no other file. `rig` says in words where the session
+/// comes from.
 #[must_use]
-pub fn page(result: &Tradeoff, session: &str) -> String {
+pub fn page(result: &Tradeoff, session: &str, rig: &str) -> String {
     let mut page = Svg::new();
     page.open("html", &[("lang", &"en")]);
     page.open("head", &[]);
@@ -218,9 +220,10 @@ pub fn page(result: &Tradeoff, session: &str) -> String {
     page.holding("p", &[("class", &"brand")], "skinrig tradeoff");
     page.holding("h1", &[], "Speed against accuracy");
     page.holding("p", &[("class", &"sub")], &format!("session {session}"));
+    page.holding("p", &[("class", &"sub")], rig);
     page.close().close().close();
     page.open("main", &[]);
-    let figure = figure::fronts(result);
+    let figure = figure::fronts(result, rig);
     page.open(
         "figure",
         &[

@@ -14,7 +14,7 @@ fn keys(violations: &[Violation]) -> Vec<(Segment, &str)> {
 #[test]
 fn absent_settings_are_the_documented_defaults() {
     assert_eq!(
-        demo(&[]).analysis,
+        parse(&shipped("circles.yaml"), &[]).unwrap().analysis,
         skinrig_model::AnalysisSettings::default()
     );
     let changed = demo(&[

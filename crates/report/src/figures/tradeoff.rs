@@ -3,14 +3,14 @@
 use skinrig_analysis::tradeoff::{Cost, Row, Tradeoff};
 use skinrig_model::Estimator;
 
-use super::{Figure, nice_above};
-use crate::axes::{Scale, tick_label, ticks};
+use super::Figure;
+use crate::axes::{Scale, tick_label};
 use crate::svg::{Px, Svg};
 use crate::tradeoff::{label, short};
 
-const SIZE: (f64, f64) = (1240.0, 520.0);
+const SIZE: (f64, f64) = (1240.0, 600.0);
 const TOP: f64 = 64.0;
-const BOTTOM: f64 = 452.0;
+const BOTTOM: f64 = 532.0;
 const WIDTH: f64 = 352.0;
 
 /// What a cost is called.
@@ -39,30 +39,26 @@ fn value(cost: Cost, row: &Row) -> f64 {
 
 /// The three panels. Points are choices, one mark per estimator; hollow ones locate too few presses to compete.
 #[must_use]
-pub fn fronts(result: &Tradeoff) -> Figure {
+pub fn fronts(result: &Tradeoff, rig: &str) -> Figure {
     let shown = result.rows.iter().filter_map(|r| r.rmse_mm.value);
-    let front = |r: &&Row| !r.fronts.is_empty();
-    let wanted = result
-        .rows
+    let shown: Vec<f64> = shown.filter(|e| *e > 0.0).collect();
+    let (low, high) = shown
         .iter()
-        .take(1)
-        .chain(result.rows.iter().filter(front));
-    let ends = wanted.filter_map(|r| r.rmse_mm.high.or(r.rmse_mm.value));
-    let top = nice_above(1.6 * ends.fold(0.0, f64::max));
-    let above = shown.filter(|e| *e > top).count();
+        .fold((f64::INFINITY, 0.0f64), |(l, h), e| (l.min(*e), h.max(*e)));
+    // Room below for the names of the choices on a front.
+    let exponents = if low <= high {
+        ((low / 2.6).log10(), (high * 1.15).log10())
+    } else {
+        (0.0, 1.0)
+    };
     let title = "Error against cost";
     let caption = format!(
-        "RMSE of {} ways to locate the same {} scored presses, against CPU time, data sent and delay (logarithmic). \
+        "RMSE of {} ways to locate the same {} scored presses, against CPU time, data sent and delay, all logarithmic. \
          Lines: the fronts, what no other choice beats in both; bars: 95 % intervals over locations. Hollow: fewer than \
-         {} % of the presses located, out of competition. The ring is the session's own choice.{}",
+         {} % of the presses located, out of competition. The ring is the session's own choice. {rig}",
         result.rows.len(),
         result.scored.0,
         crate::format::number(Some(100.0 * result.least_located), 1),
-        if above > 0 {
-            format!(" {above} choices lie above the figure.")
-        } else {
-            String::new()
-        }
     );
     let mut svg = Svg::new();
     let view = format!("0 0 {} {}", Px(SIZE.0), Px(SIZE.1));
@@ -80,7 +76,7 @@ pub fn fronts(result: &Tradeoff) -> Figure {
     svg.holding("title", &[("id", &"tradeoff-title")], title);
     svg.holding("desc", &[("id", &"tradeoff-desc")], &caption);
     legend(&mut svg);
-    let y = Scale::new((0.0, top), (BOTTOM, TOP));
+    let y = Scale::new(exponents, (BOTTOM, TOP));
     for (i, cost) in Cost::ALL.into_iter().enumerate() {
         let left = 62.0 + i as f64 * (WIDTH + 42.0);
         panel(&mut svg, result, cost, left, y, i == 0);
@@ -166,7 +162,7 @@ fn panel(svg: &mut Svg, result: &Tradeoff, cost: Cost, left: f64, y: Scale, firs
     axes(svg, x, y, cost, first);
     let place = |r: &Row| {
         let (c, e) = (value(cost, r), r.rmse_mm.value?);
-        (c > 0.0 && e <= y.data.1).then(|| (x.at(c.log10()), y.at(e)))
+        (c > 0.0 && e > 0.0).then(|| (x.at(c.log10()), y.at(e.log10())))
     };
     let mut front: Vec<&Row> = result
         .rows
@@ -193,7 +189,8 @@ fn panel(svg: &mut Svg, result: &Tradeoff, cost: Cost, left: f64, y: Scale, firs
     for row in &front {
         let Some((px, py)) = place(row) else { continue };
         if let (Some(l), Some(h)) = (row.rmse_mm.low, row.rmse_mm.high) {
-            svg.line("axis", (px, y.at(l)), (px, y.at(h.min(y.data.1))));
+            let at = |e: f64| y.at(e.max(f64::MIN_POSITIVE).log10().clamp(y.data.0, y.data.1));
+            svg.line("axis", (px, at(l)), (px, at(h)));
         }
         mark(
             svg,
@@ -275,30 +272,13 @@ fn told(row: &Row) -> String {
 
 fn axes(svg: &mut Svg, x: Scale, y: Scale, cost: Cost, first: bool) {
     let (left, right) = x.px;
-    let all = ticks(y.data.0, y.data.1, 7);
-    let step = if all.len() > 1 { all[1] - all[0] } else { 1.0 };
-    for t in &all {
-        svg.line("grid", (left, y.at(*t)), (right, y.at(*t)));
-        svg.text(
-            (left - 7.0, y.at(*t) + 4.0),
-            "tick",
-            "end",
-            &tick_label(*t, step),
-        );
+    for (at, text) in decades(y.data) {
+        svg.line("grid", (left, y.at(at)), (right, y.at(at)));
+        svg.text((left - 7.0, y.at(at) + 4.0), "tick", "end", &text);
     }
-    // 1, 2 and 5 of each power of ten; the powers alone over more than three of them.
-    let wide = x.data.1 - x.data.0 > 3.0;
-    for power in x.data.0.floor() as i32..=x.data.1.ceil() as i32 {
-        for factor in [1.0, 2.0, 5.0] {
-            let t = factor * 10f64.powi(power);
-            let at = t.log10();
-            if at < x.data.0 || at > x.data.1 || (wide && factor != 1.0) {
-                continue;
-            }
-            svg.line("grid", (x.at(at), TOP), (x.at(at), BOTTOM));
-            let text = tick_label(t, t.min(1.0));
-            svg.text((x.at(at), BOTTOM + 16.0), "tick", "middle", &text);
-        }
+    for (at, text) in decades(x.data) {
+        svg.line("grid", (x.at(at), TOP), (x.at(at), BOTTOM));
+        svg.text((x.at(at), BOTTOM + 16.0), "tick", "middle", &text);
     }
     svg.line("axis", (left, BOTTOM), (right, BOTTOM));
     svg.line("axis", (left, TOP), (left, BOTTOM));
@@ -323,4 +303,16 @@ fn axes(svg: &mut Svg, x: Scale, y: Scale, cost: Cost, first: bool) {
             "RMSE (mm)",
         );
     }
+}
+
+/// Ticks of a logarithmic axis over these exponents of ten: 1, 2 and 5 of each power, the powers alone over more than
+/// three of them.
+fn decades(exponents: (f64, f64)) -> Vec<(f64, String)> {
+    let wide = exponents.1 - exponents.0 > 3.0;
+    let powers = exponents.0.floor() as i32..=exponents.1.ceil() as i32;
+    let all = powers.flat_map(|p| [1.0, 2.0, 5.0].map(|factor| (factor, factor * 10f64.powi(p))));
+    all.filter(|(factor, _)| !wide || *factor == 1.0)
+        .map(|(_, t)| (t.log10(), tick_label(t, t.min(1.0))))
+        .filter(|(at, _)| (exponents.0..=exponents.1).contains(at))
+        .collect()
 }

@@ -79,7 +79,7 @@ pub(crate) fn clock_method(method: ClockMethod) -> &'static str {
 }
 
 /// User text without control characters: a terminal would obey them.
-fn plain(text: &str) -> String {
+pub(crate) fn plain(text: &str) -> String {
     text.chars()
         .map(|c| {
             if c.is_control() {
