@@ -61,7 +61,7 @@ pub enum CalibrationModel {
     Auto,
 }
 
-/// How a column becomes an angle before distortion. See [`crate::camera::LensModel`].
+/// How a column becomes an angle before distortion. See [`crate::LensModel`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum LensKind {
