@@ -15,6 +15,16 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("skinrig-formats", &["skinrig-model"]),
     ("skinrig-protocol", &["skinrig-model"]),
     ("skinrig-device", &["skinrig-model"]),
+    ("skinrig-drd-abi", &[]),
+    (
+        "skinrig-omega3",
+        &["skinrig-device", "skinrig-model", "skinrig-drd-abi"],
+    ),
+    (
+        "skinrig-evk1",
+        &["skinrig-device", "skinrig-model", "skinrig-formats"],
+    ),
+    ("skinrig-trigger-box", &["skinrig-device", "skinrig-model"]),
     (
         "skinrig-sim",
         &["skinrig-device", "skinrig-model", "skinrig-formats"],
@@ -33,6 +43,9 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "skinrig-formats",
             "skinrig-protocol",
             "skinrig-device",
+            "skinrig-omega3",
+            "skinrig-evk1",
+            "skinrig-trigger-box",
             "skinrig-sim",
             "skinrig-controller",
             "skinrig-recorder",
@@ -52,10 +65,19 @@ const RESTRICTED: &[(&str, &[&str])] = &[
     ("clap", &["skinrig"]),
     ("indicatif", &["skinrig"]),
     ("chrono", &["skinrig", "skinrig-recorder"]),
+    ("rusb", &["skinrig-evk1"]),
+    ("libloading", &["skinrig-omega3"]),
+    ("serialport", &["skinrig-trigger-box"]),
 ];
 
-/// Members that only test or measure.
-const HARNESSES: &[&str] = &["skinrig-tests", "skinrig-bench"];
+/// Members that only test, measure or stand in for hardware.
+const HARNESSES: &[&str] = &[
+    "skinrig-tests",
+    "skinrig-bench",
+    "skinrig-emulated-libdrd",
+    "skinrig-emulated-camera",
+    "skinrig-usbshim",
+];
 
 /// Licences that go with MIT OR Apache-2.0 for a program that people download.
 const LICENCES: &[&str] = &[

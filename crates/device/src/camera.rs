@@ -34,9 +34,32 @@ pub struct Roi {
     pub height: u16,
 }
 
+/// Whose time base a camera follows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum SyncMode {
+    /// Its own.
+    #[default]
+    Standalone,
+    /// Its own, given to others on the sync line. Started after its slaves.
+    Master,
+    /// The one on the sync line. Started before the master.
+    Slave,
+}
+
+/// A gate that passes events only while the sensor's total rate is above a threshold.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct NoiseFilter {
+    /// Events per second of the whole sensor.
+    pub min_rate_ev_s: u32,
+}
+
 /// What can be set on a camera before it starts. Everything unset keeps the device's default.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct CameraSettings {
+    /// Whose time base it follows.
+    pub sync: SyncMode,
+    /// The sensor's own noise filter; off when absent.
+    pub noise_filter: Option<NoiseFilter>,
     /// Bias values by name, in the device's own unit.
     pub biases: BTreeMap<String, i64>,
     /// Pixels that stay on; all when absent.

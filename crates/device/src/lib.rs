@@ -12,8 +12,8 @@ pub mod indenter;
 pub mod rig;
 pub mod trigger;
 
-pub use camera::{CameraCapabilities, CameraSettings, EventCamera, Roi};
-pub use clock::Clock;
+pub use camera::{CameraCapabilities, CameraSettings, EventCamera, NoiseFilter, Roi, SyncMode};
+pub use clock::{Clock, RealClock};
 pub use error::DeviceError;
 pub use indenter::{Indenter, IndenterCapabilities, MotionLimits, RobotSample};
 pub use rig::Rig;

@@ -1,6 +1,6 @@
 //! The box that pulses the cameras' trigger inputs.
 
-use skinrig_model::{DeviceIdentity, HostDuration, Mark, SentMark};
+use skinrig_model::{BoxReport, DeviceIdentity, HostDuration, Mark, SentMark};
 
 use crate::DeviceError;
 
@@ -25,4 +25,11 @@ pub trait TriggerBox: Send {
     /// [`DeviceError::State`] while a train is under way; [`DeviceError::Refused`] for a press id that does
     /// not fit a train; [`DeviceError::Lost`].
     fn send(&mut self, mark: Mark) -> Result<SentMark, DeviceError>;
+
+    /// Appends what the box reported since the last call, in the order in which it came: exchanges of time with the
+    /// host, trains that it sent, edges at its input, resets. A box without a clock of its own reports nothing.
+    ///
+    /// # Errors
+    /// [`DeviceError::Lost`]; reports already appended stay valid.
+    fn poll(&mut self, reports: &mut Vec<BoxReport>) -> Result<(), DeviceError>;
 }

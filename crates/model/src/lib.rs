@@ -18,6 +18,7 @@ pub mod settings;
 pub mod skin;
 pub mod stream;
 pub mod time;
+pub mod trigger_box;
 
 pub use camera::{CameraModel, SENSOR_HEIGHT, SENSOR_WIDTH, StereoGeometry};
 pub use event::{CdEvent, Polarity, TriggerEdge};
@@ -39,3 +40,4 @@ pub use settings::{
 pub use skin::SkinOutline;
 pub use stream::{ChunkFacts, RawChunk, StreamFormat};
 pub use time::{HostDuration, HostTime};
+pub use trigger_box::{BoxReport, BoxTime};

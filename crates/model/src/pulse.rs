@@ -26,6 +26,9 @@ pub const PULSE_PERIOD_US: u64 = 400;
 pub const PAYLOAD_BITS: u32 = 20;
 /// Pulses of a train: start, data, parity.
 pub const PULSES_PER_TRAIN: u64 = PAYLOAD_BITS as u64 + 2;
+/// The kind code of a *sync* train, which names no press: its 17 bits are the box's running number of sync trains,
+/// modulo 2^17. The box sends them by itself, so that clocks are tied together between presses too.
+pub const SYNC_CODE: u32 = 6;
 /// The largest press id that a mark can carry.
 pub const MAX_MARKED_PRESS: u32 = (1 << 17) - 1;
 /// How far a measured width or period may be off and still be read, µs.

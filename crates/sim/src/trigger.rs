@@ -2,7 +2,8 @@
 
 use skinrig_device::{DeviceError, TriggerBox, TriggerCapabilities};
 use skinrig_model::{
-    CameraId, DeviceIdentity, DeviceRole, HostDuration, HostTime, Mark, PulseTrain, SentMark,
+    BoxReport, CameraId, DeviceIdentity, DeviceRole, HostDuration, HostTime, Mark, PulseTrain,
+    SentMark,
 };
 
 use crate::config::{SimConfig, TriggerBoxConfig};
@@ -126,5 +127,9 @@ impl TriggerBox for SimTriggerBox {
             t: HostTime(now.0 + low + (high - low) / 2),
             uncertainty_ns: half,
         })
+    }
+
+    fn poll(&mut self, _reports: &mut Vec<BoxReport>) -> Result<(), DeviceError> {
+        Ok(())
     }
 }

@@ -403,6 +403,10 @@ impl TriggerBox for MockTriggerBox {
             uncertainty_ns: 1000,
         })
     }
+
+    fn poll(&mut self, _reports: &mut Vec<BoxReport>) -> Result<(), DeviceError> {
+        Ok(())
+    }
 }
 
 pub fn rig(world: &Shared) -> Rig {

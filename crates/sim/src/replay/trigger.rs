@@ -2,7 +2,7 @@
 
 use skinrig_device::{DeviceError, TriggerBox, TriggerCapabilities};
 use skinrig_model::{
-    DeviceIdentity, DeviceRole, HostDuration, HostTime, Mark, PulseTrain, SentMark,
+    BoxReport, DeviceIdentity, DeviceRole, HostDuration, HostTime, Mark, PulseTrain, SentMark,
 };
 
 use super::tape::Tape;
@@ -71,5 +71,9 @@ impl TriggerBox for ReplayedTriggerBox {
                 found: show(mark),
             }),
         }
+    }
+
+    fn poll(&mut self, _reports: &mut Vec<BoxReport>) -> Result<(), DeviceError> {
+        Ok(())
     }
 }

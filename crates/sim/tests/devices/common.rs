@@ -8,8 +8,9 @@ use skinrig_device::{
     IndenterCapabilities, MotionLimits, Rig, RobotSample, TriggerBox, TriggerCapabilities,
 };
 use skinrig_model::{
-    CameraId, DeviceIdentity, DeviceRole, HostDuration, HostTime, Mark, MarkKind, MotionCommand,
-    Point2, Point3, PoseSample, PressId, RawChunk, RigidTransform, Robot, SentMark, Setting, Skin,
+    BoxReport, CameraId, DeviceIdentity, DeviceRole, HostDuration, HostTime, Mark, MarkKind,
+    MotionCommand, Point2, Point3, PoseSample, PressId, RawChunk, RigidTransform, Robot, SentMark,
+    Setting, Skin,
 };
 use skinrig_sim::replay::{Recording, RecordingError};
 
@@ -278,6 +279,10 @@ impl TriggerBox for Noted<Box<dyn TriggerBox>> {
             .push((DeviceRole::TriggerBox, self.inner.identity()));
         log.marks.push_back(sent);
         Ok(sent)
+    }
+
+    fn poll(&mut self, reports: &mut Vec<BoxReport>) -> Result<(), DeviceError> {
+        self.inner.poll(reports)
     }
 }
 

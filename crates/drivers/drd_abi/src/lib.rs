@@ -1,0 +1,1 @@
+//! The C interface of libdrd as declarations: signatures, constants, error codes; no vendor code.

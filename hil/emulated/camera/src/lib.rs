@@ -1,0 +1,1 @@
+//! An emulated EVK1 on an emulated USB bus.
