@@ -1,6 +1,6 @@
 //! Arming: open, configure, read back, start, and know where the robot is.
 
-use skinrig_device::CameraCapabilities;
+use skinrig_device::{CameraCapabilities, SyncMode};
 use skinrig_model::{CameraId, DeviceRole, Record};
 use skinrig_protocol::plan::Step;
 
@@ -38,7 +38,7 @@ impl Core<'_> {
             self.configure_camera(camera, header.stream_formats[camera.index()])?;
         }
         self.check_trigger_box()?;
-        for camera in CameraId::ALL {
+        for camera in self.start_order() {
             self.cameras[camera.index()].start()?;
         }
         self.indenter.arm()?;
@@ -50,6 +50,13 @@ impl Core<'_> {
             Action::Refuse => Err(internal("arming", self.machine.state())),
             _ => Ok(()),
         }
+    }
+
+    /// Cameras that follow another's time base wait for it, so they start first.
+    fn start_order(&self) -> [CameraId; 2] {
+        let mut order = CameraId::ALL;
+        order.sort_by_key(|c| self.camera_settings[c.index()].sync != SyncMode::Slave);
+        order
     }
 
     fn configure_camera(

@@ -2,6 +2,7 @@
 
 use crate::mock::*;
 use skinrig_controller::{RunReport, execute};
+use skinrig_device::SyncMode;
 use skinrig_model::*;
 use skinrig_protocol::plan::{Plan, Step};
 
@@ -529,4 +530,25 @@ fn from_an_unknown_start_it_goes_up_first() {
     let (target, speed, _) = w.commands[0];
     assert!((target[0] - 20.0).abs() < 1e-9 && (target[1] - 30.0).abs() < 1e-9);
     assert!((target[2] - 5.0).abs() < 1e-9 && speed <= 20.0);
+}
+
+#[test]
+fn a_camera_that_follows_another_starts_first() {
+    let started = |modes: [SyncMode; 2]| {
+        let plan = plan();
+        let world = World::shared(faults(), START);
+        let control = lock(&world).control.clone();
+        let mut rig = rig(&world);
+        for (settings, sync) in rig.camera_settings.iter_mut().zip(modes) {
+            settings.sync = sync;
+        }
+        let report = execute(&plan, header(&plan), rig, &control, &mut Sink::default());
+        assert_eq!(report.end, RunEnd::Completed);
+        let w = lock(&world);
+        w.started.clone()
+    };
+    let (one, two) = (CameraId::One, CameraId::Two);
+    assert_eq!(started([SyncMode::Master, SyncMode::Slave]), [two, one]);
+    assert_eq!(started([SyncMode::Slave, SyncMode::Master]), [one, two]);
+    assert_eq!(started([SyncMode::Standalone; 2]), [one, two]);
 }

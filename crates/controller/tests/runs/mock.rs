@@ -69,6 +69,8 @@ pub struct World {
     pub commands: Vec<([f64; 3], f64, i64)>,
     pub limits: Option<MotionLimits>,
     pub streaming: [bool; 2],
+    /// Cameras in the order in which they were started.
+    pub started: Vec<CameraId>,
     pub seq: [u64; 2],
     pub line_until: i64,
     pub clearance_mm: f64,
@@ -110,6 +112,7 @@ impl World {
             commands: vec![],
             limits: None,
             streaming: [false; 2],
+            started: vec![],
             seq: [0; 2],
             line_until: 0,
             clearance_mm: 5.0,
@@ -351,7 +354,9 @@ impl EventCamera for MockCamera {
     }
     fn start(&mut self) -> Result<(), DeviceError> {
         call(&self.0, self.role())?;
-        lock(&self.0).streaming[self.1.index()] = true;
+        let mut w = lock(&self.0);
+        w.streaming[self.1.index()] = true;
+        w.started.push(self.1);
         Ok(())
     }
     fn poll(&mut self, chunks: &mut Vec<RawChunk>) -> Result<(), DeviceError> {
