@@ -103,7 +103,7 @@ fn resource(node: &mut Node, from: usize, to: usize) {
                 resource(&mut e.value, from, to);
             }
         }
-        Kind::Null | Kind::Scalar { .. } => {}
+        Kind::Null | Kind::Refused | Kind::Scalar { .. } => {}
     }
 }
 

@@ -15,6 +15,7 @@ pub(crate) fn read_table(
 ) -> Option<Field> {
     let entries = match &node.kind {
         Kind::Map(entries) => entries,
+        Kind::Refused => return None,
         // `key:` with nothing after it is a mapping without keys; its required keys will be missed.
         Kind::Null if !path.is_empty() => {
             out.error(node.span, path, "the value is missing")
@@ -158,6 +159,7 @@ pub(crate) fn read(
 ) -> Option<Field> {
     let value = match (shape, &node.kind) {
         (Shape::Map(table), _) => return read_table(node, table, path, out),
+        (_, Kind::Refused) => return None,
         (_, Kind::Null) => {
             out.error(node.span, path, "the value is missing")
                 .expected(expectation(shape))

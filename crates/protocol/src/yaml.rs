@@ -27,6 +27,8 @@ pub(crate) struct Node {
 pub(crate) enum Kind {
     /// Nothing after the colon, or `null` or `~`.
     Null,
+    /// Something that protocols do not use, already told; nothing more is to be said about it.
+    Refused,
     /// Text as written; `plain` when it was not quoted.
     Scalar { text: String, plain: bool },
     /// A list.
@@ -48,6 +50,7 @@ impl Node {
     pub fn describe(&self) -> String {
         match &self.kind {
             Kind::Null => "nothing".to_owned(),
+            Kind::Refused => "an alias".to_owned(),
             Kind::Scalar { text, .. } => quote(text),
             Kind::List(items) => format!("a list of {}", items.len()),
             Kind::Map(entries) => match entries.first() {
@@ -243,7 +246,7 @@ impl<'a> Reader<'a, '_> {
                     .help("write the value out in place of the alias");
                 Node {
                     span,
-                    kind: Kind::Null,
+                    kind: Kind::Refused,
                 }
             }
             _ => Node {

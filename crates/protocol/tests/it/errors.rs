@@ -487,3 +487,15 @@ fn a_tab_is_pointed_at_where_it_stands() {
         "{error}"
     );
 }
+
+#[test]
+fn an_alias_is_told_once() {
+    let text = shipped("demo.yaml");
+    let from = "operator:";
+    let line = text.lines().find(|l| l.starts_with(from));
+    let line = line.unwrap_or_else(|| panic!("the demo has no line `{from}`"));
+    let text = text.replacen(line, "operator: *someone", 1);
+    let error = parse(&text, &[]).unwrap_err();
+    let said: Vec<&str> = error.list().iter().map(|d| d.message.as_str()).collect();
+    assert_eq!(said, ["aliases are not used here"]);
+}
