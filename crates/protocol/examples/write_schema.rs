@@ -1,13 +1,18 @@
-//! Writes the JSON Schemas that ship beside the protocols: `cargo run -p skinrig-protocol --example write_schema`.
+//! Writes the JSON Schemas that ship beside the files: `cargo run -p skinrig-protocol --example write_schema`.
+
+use skinrig_protocol::{rig_schema_json, schedule_schema_json, schema_json};
 
 fn main() -> std::io::Result<()> {
-    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../protocols");
-    std::fs::write(
-        folder.join("skinrig.schema.json"),
-        skinrig_protocol::schema_json(),
-    )?;
-    std::fs::write(
-        folder.join("skinrig-schedule.schema.json"),
-        skinrig_protocol::schedule_schema_json(),
-    )
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    for (path, schema) in [
+        ("protocols/skinrig.schema.json", schema_json()),
+        (
+            "protocols/skinrig-schedule.schema.json",
+            schedule_schema_json(),
+        ),
+        ("hil/rigs/skinrig-rig.schema.json", rig_schema_json()),
+    ] {
+        std::fs::write(root.join(path), schema)?;
+    }
+    Ok(())
 }

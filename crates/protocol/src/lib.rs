@@ -6,8 +6,9 @@
 //! 3. [`check()`] holds every segment of the plan against workspace, skin outline, keep-outs and limits.
 //! 4. [`Plan::summary`] and [`path_svg`] show it to people.
 //!
-//! [`Schedule`] describes a recording that was made without skinrig, for imports. The keys of both languages stand in
-//! one table each, which also yields their JSON Schemas ([`schema_json`], [`schedule_schema_json`]).
+//! [`Schedule`] describes a recording that was made without skinrig, for imports; [`RigFile`] a bench. The keys of each
+//! language stand in a table, which also yields its JSON Schema ([`schema_json`], [`schedule_schema_json`],
+//! [`rig_schema_json`]).
 
 pub mod area;
 mod build;
@@ -22,11 +23,13 @@ pub mod protocol;
 pub mod quantity;
 mod read;
 mod reference_code;
+pub mod rig;
 pub mod schedule;
 mod schema;
 mod shape;
 mod source;
 pub mod summary;
+pub mod surface;
 mod svg;
 pub mod timing;
 mod yaml;
@@ -37,8 +40,10 @@ pub use diagnostic::{Diagnostic, Diagnostics};
 pub use plan::{Plan, PressStep, RunLimits, Step};
 pub use protocol::{CameraRequest, Loader, Motion, Pace, Protocol, Prototype, Scene, Sync};
 pub use reference_code::REFERENCE_CODE;
+pub use rig::{RigFile, RigKind};
 pub use schedule::{PressPhases, Schedule};
-pub use schema::{schedule_schema_json, schema_json};
+pub use schema::{rig_schema_json, schedule_schema_json, schema_json};
 pub use source::Location;
 pub use summary::PlanSummary;
+pub use surface::{Surface, TouchSearch};
 pub use svg::path_svg;

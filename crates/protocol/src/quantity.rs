@@ -23,6 +23,18 @@ pub enum Dimension {
     Frequency,
     /// Pixels.
     Pixels,
+    /// Kilograms.
+    Mass,
+    /// Millimetres per second squared.
+    Acceleration,
+    /// Millimetres per second cubed.
+    Jerk,
+    /// Events per second.
+    EventRate,
+    /// Bytes.
+    Data,
+    /// Bytes per second.
+    DataRate,
 }
 
 impl Dimension {
@@ -54,11 +66,23 @@ impl Dimension {
             ],
             Self::Frequency => &[("Hz", 1.0), ("kHz", 1e3), ("MHz", 1e6)],
             Self::Pixels => &[("px", 1.0)],
+            Self::Mass => &[("kg", 1.0), ("g", 1e-3)],
+            Self::Acceleration => &[("mm/s2", 1.0), ("m/s2", 1e3)],
+            Self::Jerk => &[("mm/s3", 1.0), ("m/s3", 1e3)],
+            Self::EventRate => &[("ev/s", 1.0), ("kev/s", 1e3), ("Mev/s", 1e6)],
+            Self::Data => &[
+                ("B", 1.0),
+                ("kB", 1e3),
+                ("MB", 1e6),
+                ("GB", 1e9),
+                ("TB", 1e12),
+            ],
+            Self::DataRate => &[("B/s", 1.0), ("kB/s", 1e3), ("MB/s", 1e6), ("GB/s", 1e9)],
         }
     }
 
     /// All dimensions.
-    const ALL: [Self; 7] = [
+    const ALL: [Self; 13] = [
         Self::Length,
         Self::Time,
         Self::Speed,
@@ -66,6 +90,12 @@ impl Dimension {
         Self::Angle,
         Self::Frequency,
         Self::Pixels,
+        Self::Mass,
+        Self::Acceleration,
+        Self::Jerk,
+        Self::EventRate,
+        Self::Data,
+        Self::DataRate,
     ];
 
     /// `a length`, `a time`, ...
@@ -79,6 +109,12 @@ impl Dimension {
             Self::Angle => "an angle",
             Self::Frequency => "a frequency",
             Self::Pixels => "a number of pixels",
+            Self::Mass => "a mass",
+            Self::Acceleration => "an acceleration",
+            Self::Jerk => "a jerk",
+            Self::EventRate => "an event rate",
+            Self::Data => "an amount of data",
+            Self::DataRate => "a data rate",
         }
     }
 
@@ -99,6 +135,12 @@ impl Dimension {
             Self::Angle => "30 deg",
             Self::Frequency => "1 kHz",
             Self::Pixels => "10 px",
+            Self::Mass => "140 g",
+            Self::Acceleration => "100 mm/s2",
+            Self::Jerk => "1000 mm/s3",
+            Self::EventRate => "50 kev/s",
+            Self::Data => "2 GB",
+            Self::DataRate => "20 MB/s",
         }
     }
 }
@@ -106,7 +148,7 @@ impl Dimension {
 /// A value and what it measures.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Quantity {
-    /// In the unit of the dimension: mm, s, mm/s, N, deg, Hz or px. Finite.
+    /// In the unit of the dimension, which its variant names. Finite.
     pub value: f64,
     /// What it measures.
     pub dimension: Dimension,

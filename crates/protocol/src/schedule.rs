@@ -3,11 +3,11 @@
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 use skinrig_model::{
-    AnalysisSettings, CameraModel, HostDuration, HostTime, LensModel, PlannedPress, Point2,
-    PressId, PressRole, PressTiming, RigGeometry, StereoGeometry,
+    AnalysisSettings, HostDuration, HostTime, PlannedPress, Point2, PressId, PressRole,
+    PressTiming, RigGeometry, StereoGeometry,
 };
 
-use crate::build::{calibration_possible, open, outline, roles, seconds};
+use crate::build::{calibration_possible, nominal_camera, open, outline, roles, seconds};
 use crate::diagnostic::{Collector, Diagnostics};
 use crate::keys::schedule::SCHEDULE;
 use crate::protocol::Prototype;
@@ -414,19 +414,7 @@ fn scheduled_roles(f: &Field, repetitions: u32, out: &mut Collector) -> Option<S
 
 fn rig(f: &Field, out: &mut Collector) -> Option<RigGeometry> {
     let outline = outline(f.get("outline")?, out)?;
-    let camera = |key| {
-        let c = f.get(key)?;
-        let place = |key| c.get(key)?.pair().map(|[x, y]| Point2::new(x, y));
-        Some(CameraModel {
-            position: place("position")?,
-            aim: place("aim").unwrap_or(outline.centre),
-            skew_deg: c.quantity("skew")?,
-            lens: LensModel::Exponential {
-                half_fov_deg: c.quantity("half_field_of_view")?,
-                w: c.number("distortion")?,
-            },
-        })
-    };
+    let camera = |key| nominal_camera(f.get(key)?, outline.centre);
     Some(RigGeometry {
         outline,
         nominal: StereoGeometry {

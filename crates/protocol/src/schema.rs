@@ -1,4 +1,4 @@
-//! JSON Schema (draft 2020-12) of protocols and schedules, from the same tables that read them.
+//! JSON Schema (draft 2020-12) of protocols, schedules and rig files, from the same tables that read them.
 
 use std::collections::BTreeMap;
 
@@ -18,6 +18,12 @@ pub fn schema_json() -> String {
 #[must_use]
 pub fn schedule_schema_json() -> String {
     render(&crate::keys::schedule::SCHEDULE, "skinrig schedule")
+}
+
+/// The JSON Schema of a rig file for `--rig`.
+#[must_use]
+pub fn rig_schema_json() -> String {
+    render(&crate::rig::keys::RIG, "skinrig rig")
 }
 
 fn render(table: &'static Table, title: &str) -> String {

@@ -18,7 +18,7 @@ use crate::shape::{Field, Table};
 use crate::source::{Sources, Span};
 use crate::timing;
 use crate::yaml;
-pub(crate) use parts::{calibration_possible, outline, roles};
+pub(crate) use parts::{biases, calibration_possible, nominal_camera, outline, roi, roles};
 use parts::{camera, depths, marks, read_limits, read_motion, read_sync, scene, surroundings};
 pub(crate) use settings::analysis;
 
@@ -64,21 +64,20 @@ pub(crate) fn open(
     let Some(mut root) = yaml::parse(&mut out, source) else {
         return Err(out.finish());
     };
-    if let Some(other) = other_language(&root, table) {
-        out.error(other, "", format!("this is not a {}", table.name))
+    if let Some((place, other)) = other_language(&root, table) {
+        out.error(place, "", format!("this is not a {}", table.name))
             .expected(format!("a {}", table.name))
-            .found(if table.name == "schedule" {
-                "a protocol"
-            } else {
-                "a schedule, which only `skinrig import` reads"
-            });
+            .found(other);
         return Err(out.finish());
     }
     if matches!(root.kind, yaml::Kind::Null) && out.is_clean() {
         out.error(root.span, "", "the file is empty")
             .expected(format!("a {}", table.name))
             .found("nothing")
-            .help("begin with `skinrig: 1`, or copy one of the shipped files");
+            .help(format!(
+                "begin with `{}: 1`, or copy one of the shipped files",
+                version_key(table)
+            ));
         return Err(out.finish());
     }
     crate::overrides::apply(&mut root, table, overrides, &mut out);
@@ -86,20 +85,37 @@ pub(crate) fn open(
     Ok((out, field))
 }
 
-/// The version key of the other language, where the file has that and not its own.
-fn other_language(root: &yaml::Node, table: &Table) -> Option<Span> {
-    let (own, other) = if table.name == "schedule" {
-        ("skinrig_schedule", "skinrig")
-    } else {
-        ("skinrig", "skinrig_schedule")
-    };
+/// Our languages: name of the table, key of the version, and what a file of it is in another one's place.
+const LANGUAGES: [(&str, &str, &str); 3] = [
+    ("protocol", "skinrig", "a protocol"),
+    (
+        "schedule",
+        "skinrig_schedule",
+        "a schedule, which only `skinrig import` reads",
+    ),
+    ("rig", "skinrig_rig", "a rig file, which belongs to `--rig`"),
+];
+
+/// The key by which a file of `table` says which language it is in.
+fn version_key(table: &Table) -> &'static str {
+    LANGUAGES
+        .iter()
+        .find(|(name, ..)| *name == table.name)
+        .map_or("skinrig", |(_, key, _)| key)
+}
+
+/// The version key of another language, where the file has that and not its own, and what the file then is.
+fn other_language(root: &yaml::Node, table: &Table) -> Option<(Span, &'static str)> {
     let yaml::Kind::Map(entries) = &root.kind else {
         return None;
     };
-    if entries.iter().any(|e| e.key == own) {
+    let given = |key: &str| entries.iter().find(|e| e.key == key);
+    if given(version_key(table)).is_some() {
         return None;
     }
-    entries.iter().find(|e| e.key == other).map(|e| e.key_span)
+    LANGUAGES
+        .iter()
+        .find_map(|(_, key, what)| given(key).map(|e| (e.key_span, *what)))
 }
 
 /// Reads a protocol; see [`Protocol::parse`].

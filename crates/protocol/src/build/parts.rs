@@ -1,8 +1,10 @@
 //! The parts of a protocol, each from its own keys: scene, frame, depths, motion, limits, sync, roles, marks, cameras.
 
+use std::collections::BTreeMap;
+
 use skinrig_model::{
-    AnalysisSettings, CalibrationModel, MarkKind, Point2, Point3, PressRole, SceneNeed, SimLevel,
-    SkinOutline,
+    AnalysisSettings, CalibrationModel, CameraModel, LensModel, MarkKind, Point2, Point3,
+    PressRole, SceneNeed, SimLevel, SkinOutline,
 };
 
 use super::seconds;
@@ -418,26 +420,46 @@ pub(super) fn marks(f: &Field, out: &mut Collector) -> Option<Vec<MarkKind>> {
 }
 
 pub(super) fn camera(f: &Field, out: &mut Collector) -> CameraRequest {
-    let biases = f.get("biases").map_or(&[][..], Field::entries);
-    let roi = f.get("roi").and_then(|r| {
-        let n = |key| r.count(key).and_then(|n| u16::try_from(n).ok());
-        let roi = [n("x")?, n("y")?, n("width")?, n("height")?];
-        let [x, y, width, height] = roi;
-        if x + width > skinrig_model::SENSOR_WIDTH || y + height > skinrig_model::SENSOR_HEIGHT {
-            out.error(r.span, r.path.as_str(), "larger than the sensor")
-                .expected("x + width of at most 640 and y + height of at most 480")
-                .found(format!("{} and {}", x + width, y + height));
-        }
-        Some(roi)
-    });
     CameraRequest {
-        biases: biases
-            .iter()
-            .filter_map(|(name, v)| match v.value {
-                Value::Whole(n) => Some((name.clone(), n)),
-                _ => None,
-            })
-            .collect(),
-        roi,
+        biases: f.get("biases").map(biases).unwrap_or_default(),
+        roi: f.get("roi").and_then(|r| roi(r, out)),
     }
+}
+
+/// Bias values by name.
+pub(crate) fn biases(f: &Field) -> BTreeMap<String, i64> {
+    f.entries()
+        .iter()
+        .filter_map(|(name, v)| match v.value {
+            Value::Whole(n) => Some((name.clone(), n)),
+            _ => None,
+        })
+        .collect()
+}
+
+/// A rectangle of pixels: first column, first row, columns, rows.
+pub(crate) fn roi(r: &Field, out: &mut Collector) -> Option<[u16; 4]> {
+    let n = |key| r.count(key).and_then(|n| u16::try_from(n).ok());
+    let roi = [n("x")?, n("y")?, n("width")?, n("height")?];
+    let [x, y, width, height] = roi;
+    if x + width > skinrig_model::SENSOR_WIDTH || y + height > skinrig_model::SENSOR_HEIGHT {
+        out.error(r.span, r.path.as_str(), "larger than the sensor")
+            .expected("x + width of at most 640 and y + height of at most 480")
+            .found(format!("{} and {}", x + width, y + height));
+    }
+    Some(roi)
+}
+
+/// A camera as drawn or measured; aims at `aim` where it does not say.
+pub(crate) fn nominal_camera(f: &Field, aim: Point2) -> Option<CameraModel> {
+    let place = |key| f.get(key)?.pair().map(|[x, y]| Point2::new(x, y));
+    Some(CameraModel {
+        position: place("position")?,
+        aim: place("aim").unwrap_or(aim),
+        skew_deg: f.quantity("skew")?,
+        lens: LensModel::Exponential {
+            half_fov_deg: f.quantity("half_field_of_view")?,
+            w: f.number("distortion")?,
+        },
+    })
 }

@@ -9,7 +9,7 @@ pub(crate) mod schedule;
 pub(crate) use analysis::ANALYSIS;
 pub(crate) use frame::{OUTLINE, OUTLINES};
 pub(crate) use path::UNITS;
-pub(crate) use run::EVALUATION;
+pub(crate) use run::{EVALUATION, ROI};
 
 use crate::quantity::Dimension::{Length, Speed, Time};
 use crate::shape::{Key, Need, Range, Shape, Table, Word};

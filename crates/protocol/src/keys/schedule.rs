@@ -207,7 +207,7 @@ static RIG: Table = Table {
     exactly_one: &[],
 };
 
-static CAMERA: Table = Table {
+pub(crate) static CAMERA: Table = Table {
     name: "nominal_camera",
     doc: "A camera as drawn or measured.",
     keys: &[

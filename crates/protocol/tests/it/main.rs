@@ -4,5 +4,7 @@
 mod common;
 mod errors;
 mod laws;
+mod rig;
 mod schedules;
 mod shipped;
+mod validate;

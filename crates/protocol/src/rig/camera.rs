@@ -1,0 +1,136 @@
+//! Cameras and trigger box of a bench, each from its own keys.
+
+use skinrig_model::HostDuration;
+
+use super::build::Places;
+use super::{BoxSetup, CameraSetup, SyncRole};
+use crate::build::{biases, nominal_camera, roi};
+use crate::diagnostic::Collector;
+use crate::shape::Field;
+use skinrig_model::Point2;
+
+/// The EVK1's trigger input that its sync line uses when it is a slave.
+const AUXILIARY: u8 = 7;
+
+/// Camera 1 and camera 2, with what must hold between them.
+pub(super) fn cameras(
+    f: &Field,
+    places: &Places<'_>,
+    out: &mut Collector,
+) -> Option<[CameraSetup; 2]> {
+    let mut camera = |key| f.get(key).and_then(|c| camera(c, places, out));
+    let [Some(one), Some(two)] = [camera("camera1"), camera("camera2")] else {
+        return None;
+    };
+    let second = f.get("camera2")?;
+    if one.serial == two.serial {
+        let span = second.get("serial").map_or(second.span, |s| s.span);
+        out.error(span, "cameras.camera2.serial", "both cameras are the same")
+            .expected("two different serial numbers")
+            .found(format!("`{}` twice", one.serial));
+    }
+    let pair = (one.sync, two.sync);
+    let fits = matches!(
+        pair,
+        (SyncRole::Standalone, SyncRole::Standalone)
+            | (SyncRole::Master, SyncRole::Slave)
+            | (SyncRole::Slave, SyncRole::Master)
+    );
+    if !fits {
+        let span = second.get("sync").map_or(second.span, |s| s.span);
+        out.error(span, "cameras.camera2.sync", "the sync modes do not fit")
+            .expected("both `standalone`, or one `master` and one `slave`")
+            .found(format!("{:?} and {:?}", pair.0, pair.1).to_lowercase());
+    }
+    Some([one, two])
+}
+
+fn camera(f: &Field, places: &Places<'_>, out: &mut Collector) -> Option<CameraSetup> {
+    let bias_file = f.get("bias_file").map(|b| places.path(b, out));
+    let roi = f.get("roi").map(|r| roi(r, out));
+    let sync = match f.word("sync")? {
+        "master" => SyncRole::Master,
+        "slave" => SyncRole::Slave,
+        _ => SyncRole::Standalone,
+    };
+    let model = f.word("model")?;
+    let channel = f.get("trigger_channel")?;
+    let trigger_channel = f
+        .count("trigger_channel")
+        .and_then(|c| u8::try_from(c).ok())?;
+    if model == "evk1" && ![0, 6, AUXILIARY].contains(&trigger_channel) {
+        out.error(
+            channel.span,
+            channel.path.as_str(),
+            "the EVK1 has no such trigger input",
+        )
+        .expected("0 (main), 6 (loop-back of its own output) or 7 (auxiliary)")
+        .found(trigger_channel.to_string());
+    }
+    if model == "evk1" && sync == SyncRole::Slave && trigger_channel == AUXILIARY {
+        out.error(
+            channel.span,
+            channel.path.as_str(),
+            "a slave's auxiliary input carries the sync clock",
+        )
+        .expected("0, the main trigger input")
+        .found(trigger_channel.to_string());
+    }
+    let nominal = f.get("geometry")?;
+    if nominal.get("aim").is_none() {
+        out.error(
+            nominal.span,
+            nominal.path.as_str(),
+            "where the camera aims is missing",
+        )
+        .expected("`aim`: a rig file knows no outline whose centre could stand for it")
+        .found("no such key")
+        .help("add `aim: [10 mm, 2 mm]`, the point that the camera's axis goes through");
+        return None;
+    }
+    let geometry = nominal_camera(nominal, Point2::new(0.0, 0.0))?;
+    Some(CameraSetup {
+        model,
+        serial: f.text("serial")?,
+        fpga: f.text("fpga"),
+        biases: f.get("biases").map(biases).unwrap_or_default(),
+        bias_file: bias_file.map_or(Some(None), |b| b.map(Some))?,
+        roi: roi.map_or(Some(None), |r| r.map(Some))?,
+        noise_filter_ev_s: f.quantity("noise_filter").map(|r| r.round() as u32),
+        sync,
+        trigger_channel,
+        geometry,
+    })
+}
+
+pub(super) fn trigger_box(f: &Field, places: &Places<'_>, out: &mut Collector) -> Option<BoxSetup> {
+    let port = f.get("port").map(|p| places.text(p, out));
+    let serial = f.text("serial");
+    if f.get("port").is_none() && serial.is_none() {
+        out.error(f.span, f.path.as_str(), "which trigger box is not said")
+            .expected("`port`, `serial` or both")
+            .found("neither")
+            .help("`skinrig devices` lists serial ports with the serial numbers of their adapters");
+    }
+    let wiring = f.get("wiring")?;
+    let output = |key| wiring.word(key);
+    let outputs = [output("output1")?, output("output2")?, output("output3")?];
+    let lines = |camera| outputs.iter().filter(|o| **o == camera).count();
+    if let Some(camera) = ["camera1", "camera2"].into_iter().find(|c| lines(*c) != 1) {
+        out.error(
+            wiring.span,
+            wiring.path.as_str(),
+            "a camera's trigger line is not clear",
+        )
+        .expected(format!("exactly one output that goes to `{camera}`"))
+        .found(lines(camera).to_string());
+    }
+    Some(BoxSetup {
+        port: port.map_or(Some(None), |p| p.map(Some))?,
+        serial,
+        firmware: f.text("firmware"),
+        outputs,
+        input: wiring.word("input")?,
+        sync_period: HostDuration::from_secs_f64(f.quantity("sync_period")?),
+    })
+}

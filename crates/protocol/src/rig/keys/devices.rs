@@ -1,0 +1,274 @@
+//! Keys of the robot, the cameras and the trigger box.
+
+use super::{ANGLE, FORCE, MASS, time};
+use crate::keys::schedule::CAMERA as NOMINAL_CAMERA;
+use crate::keys::{ROI, count, default, optional, required};
+use crate::quantity::Dimension::{Acceleration, EventRate, Jerk, Time};
+use crate::shape::{Range, Shape, Table, Word};
+
+pub(super) static ROBOT: Table = Table {
+    name: "robot",
+    doc: "An omega.3 behind the vendor's library.",
+    keys: &[
+        default("model", Shape::Choice(ROBOTS), "omega3", "Which robot."),
+        required(
+            "serial",
+            Shape::Text,
+            "Its serial number, as `skinrig devices` shows it.",
+        ),
+        optional(
+            "firmware",
+            Shape::Text,
+            "Expected firmware version; another one fails the preflight.",
+        ),
+        optional(
+            "library",
+            Shape::Text,
+            "Path of the vendor's libdrd, relative to this file; `${NAME}` stands for an environment variable. Absent: the usual places.",
+        ),
+        optional(
+            "library_version",
+            Shape::Text,
+            "Expected version of the library; another one fails the preflight.",
+        ),
+        default(
+            "device_angle",
+            ANGLE,
+            "0 deg",
+            "How the base is mounted: 0 deg upright, 90 deg lying flat. Wrong values push the arm off.",
+        ),
+        optional(
+            "effector_mass",
+            MASS,
+            "Mass that gravity compensation carries; absent: what the device says of itself.",
+        ),
+        default(
+            "watchdog",
+            Shape::Quantity(&[Time], Range::between(0.000_125, 0.031_875)),
+            "10 ms",
+            "The controller drops forces when no command came for so long; counted in steps of 125 us.",
+        ),
+        optional(
+            "velocity_threshold",
+            count(1, u32::MAX as i64),
+            "Expected velocity threshold in the device's own unit. Never written; another one fails the preflight.",
+        ),
+        default(
+            "auto_init",
+            Shape::Flag,
+            "false",
+            "Whether skinrig may let the arm initialise itself. The arm then moves on its own: needs `sample_is_off`.",
+        ),
+        default(
+            "sample_is_off",
+            Shape::Flag,
+            "false",
+            "Your word that sample, hands and tools are out of the arm's whole reach.",
+        ),
+        default(
+            "motor_ratio",
+            Shape::Number(Range::above_zero(1.0)),
+            "0.1",
+            "Share of the motors' torque that regulation may use: caps the force.",
+        ),
+        optional(
+            "motor_ratio_calibration",
+            Shape::List {
+                of: &Shape::Map(&MOTOR_RATIO),
+                min: 1,
+                max: 100,
+            },
+            "Largest forces measured on a scale, by ratio, in ascending order.",
+        ),
+        default(
+            "integral_gain",
+            Shape::Number(Range::from_zero(10.0)),
+            "0",
+            "Integral gain of the regulation; 0: forces do not build up while the tip rests on something.",
+        ),
+        default(
+            "acceleration",
+            Shape::Quantity(&[Acceleration], Range::above_zero(10_000.0)),
+            "100 mm/s2",
+            "Largest acceleration of moves.",
+        ),
+        default(
+            "jerk",
+            Shape::Quantity(&[Jerk], Range::above_zero(1e6)),
+            "1000 mm/s3",
+            "Largest jerk of moves.",
+        ),
+        default(
+            "supervisor",
+            Shape::Flag,
+            "true",
+            "Whether a second process brakes the arm when this one dies.",
+        ),
+    ],
+    exactly_one: &[],
+};
+
+const ROBOTS: &[Word] = &[("omega3", "Force Dimension omega.3")];
+
+static MOTOR_RATIO: Table = Table {
+    name: "motor_ratio",
+    doc: "A ratio and the largest force at the tip that was measured with it.",
+    keys: &[
+        required("ratio", Shape::Number(Range::above_zero(1.0)), "The ratio."),
+        required(
+            "force",
+            FORCE,
+            "The largest force over all poses that were tried.",
+        ),
+    ],
+    exactly_one: &[],
+};
+
+pub(super) static CAMERAS: Table = Table {
+    name: "rig_cameras",
+    doc: "The two event cameras.",
+    keys: &[
+        required("camera1", Shape::Map(&CAMERA), "Camera 1."),
+        required("camera2", Shape::Map(&CAMERA), "Camera 2."),
+    ],
+    exactly_one: &[],
+};
+
+static CAMERA: Table = Table {
+    name: "rig_camera",
+    doc: "One event camera. What is absent keeps the device's default; a protocol may override biases and region.",
+    keys: &[
+        default("model", Shape::Choice(MODELS), "evk1", "Which camera."),
+        required(
+            "serial",
+            Shape::Text,
+            "Its serial number, as `skinrig devices` shows it.",
+        ),
+        optional(
+            "fpga",
+            Shape::Text,
+            "Expected FPGA version; another one fails the preflight.",
+        ),
+        optional(
+            "biases",
+            Shape::Named(&Shape::Whole {
+                min: i32::MIN as i64,
+                max: i32::MAX as i64,
+            }),
+            "Bias values by name, in the device's own unit (EVK1: mV). They win over those of `bias_file`.",
+        ),
+        optional(
+            "bias_file",
+            Shape::Text,
+            "A `.bias` file, relative to this one; `${NAME}` stands for an environment variable.",
+        ),
+        optional(
+            "roi",
+            Shape::Map(&ROI),
+            "Pixels that stay on; all when absent.",
+        ),
+        optional(
+            "noise_filter",
+            Shape::Quantity(&[EventRate], Range::between(10_000.0, 10_000_000.0)),
+            "The sensor's activity gate: nothing passes while its total rate is below this. Off when absent.",
+        ),
+        default(
+            "sync",
+            Shape::Choice(SYNC_MODES),
+            "standalone",
+            "Whose time base the camera follows.",
+        ),
+        default(
+            "trigger_channel",
+            count(0, 31),
+            "0",
+            "The trigger input that the box is wired to (EVK1: 0 main, 7 auxiliary, 6 loop-back of its own output).",
+        ),
+        required(
+            "geometry",
+            Shape::Map(&NOMINAL_CAMERA),
+            "Where the camera stands, as drawn or measured: where calibration starts.",
+        ),
+    ],
+    exactly_one: &[],
+};
+
+const MODELS: &[Word] = &[
+    ("evk1", "Prophesee EVK1, VGA, Gen3.1"),
+    (
+        "evk4",
+        "Prophesee EVK4 and others, in builds that support them",
+    ),
+];
+
+const SYNC_MODES: &[Word] = &[
+    ("standalone", "its own"),
+    ("master", "its own, and gives it to the other camera"),
+    ("slave", "the other camera's"),
+];
+
+pub(super) static TRIGGER_BOX: Table = Table {
+    name: "trigger_box",
+    doc: "The trigger box. `port`, `serial` or both say which; with both they must agree.",
+    keys: &[
+        optional(
+            "port",
+            Shape::Text,
+            "Serial port; `${NAME}` stands for an environment variable.",
+        ),
+        optional(
+            "serial",
+            Shape::Text,
+            "Serial number of its USB adapter, as `skinrig devices` shows it.",
+        ),
+        optional(
+            "firmware",
+            Shape::Text,
+            "Expected firmware version; absent: what this build of skinrig was written for.",
+        ),
+        default(
+            "wiring",
+            Shape::Map(&WIRING),
+            "{}",
+            "What each line of the box goes to.",
+        ),
+        default(
+            "sync_period",
+            time(10.0),
+            "100 ms",
+            "From one coded sync train to the next.",
+        ),
+    ],
+    exactly_one: &[],
+};
+
+static WIRING: Table = Table {
+    name: "wiring",
+    doc: "What each line of the box goes to. All outputs rise in the same cycle.",
+    keys: &[
+        default("output1", Shape::Choice(LINES), "camera1", "First output."),
+        default("output2", Shape::Choice(LINES), "camera2", "Second output."),
+        default("output3", Shape::Choice(LINES), "none", "Third output."),
+        default(
+            "input",
+            Shape::Choice(INPUTS),
+            "none",
+            "The time-stamped input.",
+        ),
+    ],
+    exactly_one: &[],
+};
+
+const LINES: &[Word] = &[
+    ("camera1", "trigger input of camera 1"),
+    ("camera2", "trigger input of camera 2"),
+    ("other", "something else, an oscilloscope for example"),
+    ("none", "nothing"),
+];
+
+const INPUTS: &[Word] = &[
+    ("contact", "closes when the tip touches"),
+    ("optical", "a light gate that the tip interrupts"),
+    ("other", "something else"),
+    ("none", "nothing; edges are not recorded"),
+];

@@ -1,0 +1,343 @@
+//! Every key of a rig file: name, meaning, form, range, default.
+
+mod devices;
+
+use crate::keys::{count, default, optional, required};
+use crate::quantity::Dimension::{Angle, Data, DataRate, Force, Length, Mass, Speed, Time};
+use crate::shape::{Key, Range, Shape, Table, Word};
+use devices::{CAMERAS, ROBOT, TRIGGER_BOX};
+
+/// The version of the rig file's language that this crate reads.
+pub(crate) const VERSION: i64 = 1;
+
+static COORDINATE: Shape = Shape::Quantity(&[Length], Range::between(-1000.0, 1000.0));
+const PLACE: Shape = Shape::Tuple(&COORDINATE, &["x", "y", "z"]);
+const POSITIVE_LENGTH: Shape = Shape::Quantity(&[Length], Range::above_zero(1000.0));
+const FORCE: Shape = Shape::Quantity(&[Force], Range::above_zero(12.0));
+const SPEED: Shape = Shape::Quantity(&[Speed], Range::above_zero(1000.0));
+const ANGLE: Shape = Shape::Quantity(&[Angle], Range::between(-180.0, 180.0));
+const MASS: Shape = Shape::Quantity(&[Mass], Range::above_zero(2.0));
+
+const fn time(max_s: f64) -> Shape {
+    Shape::Quantity(&[Time], Range::above_zero(max_s))
+}
+
+/// The whole file.
+pub(crate) static RIG: Table = Table {
+    name: "rig",
+    doc: "A skinrig rig file: which device plays which role, where the skin lies, and what must never happen on this bench.",
+    keys: &[
+        required(
+            "skinrig_rig",
+            count(VERSION, VERSION),
+            "Version of the rig file's language: 1.",
+        ),
+        required(
+            "name",
+            Shape::Text,
+            "Name of the bench. Stored with every session.",
+        ),
+        required(
+            "kind",
+            Shape::Choice(KINDS),
+            "Whether hardware stands behind the drivers. Stored with every session.",
+        ),
+        optional(
+            "description",
+            Shape::Text,
+            "Anything worth keeping about the bench.",
+        ),
+        required(
+            "frame",
+            Shape::Map(&FRAME),
+            "Where the skin lies in the robot's frame: given, or fitted to touched points.",
+        ),
+        required("tip", Shape::Map(&TIP), "What the robot presses with."),
+        required(
+            "limits",
+            Shape::Map(&LIMITS),
+            "What this bench bears, whatever a protocol asks for.",
+        ),
+        required("robot", Shape::Map(&ROBOT), "The robot that presses."),
+        required("cameras", Shape::Map(&CAMERAS), "The two event cameras."),
+        optional(
+            "trigger_box",
+            Shape::Map(&TRIGGER_BOX),
+            "The box that pulses the cameras' trigger inputs; absent: none is connected.",
+        ),
+        default(
+            "preflight",
+            Shape::Map(&PREFLIGHT),
+            "{}",
+            "What must hold before anything is armed.",
+        ),
+        optional(
+            "press",
+            Shape::Map(&PRESS),
+            "How the surface is found, when the protocol does not say; absent: the frame is trusted.",
+        ),
+    ],
+    exactly_one: &[],
+};
+
+const KINDS: &[Word] = &[
+    ("bench", "hardware"),
+    (
+        "emulated",
+        "production drivers over stand-ins for the hardware; everything recorded says so",
+    ),
+];
+
+static FRAME: Table = Table {
+    name: "rig_frame",
+    doc: "Where the skin lies in the robot's frame. Skin: z out of the surface, z = 0 at the surface. Robot: z up.",
+    keys: &[
+        optional(
+            "given",
+            Shape::Map(&GIVEN),
+            "The skin's place as measured by other means.",
+        ),
+        optional(
+            "touch_off",
+            Shape::Map(&TOUCH_OFF),
+            "Points that were touched with the tip: `skinrig jog` prints this block.",
+        ),
+    ],
+    exactly_one: &[&["given", "touch_off"]],
+};
+
+static GIVEN: Table = Table {
+    name: "given_frame",
+    doc: "Robot = Rz(yaw) Ry(pitch) Rx(roll) skin + origin.",
+    keys: &[
+        required("origin", PLACE, "The skin's origin in the robot's frame."),
+        default(
+            "yaw",
+            ANGLE,
+            "0 deg",
+            "Turn about the robot's z, applied last.",
+        ),
+        default("pitch", ANGLE, "0 deg", "Turn about y."),
+        default("roll", ANGLE, "0 deg", "Turn about x, applied first."),
+        required(
+            "date",
+            Shape::Text,
+            "When it was measured: year-month-day, for example `2026-11-20`.",
+        ),
+    ],
+    exactly_one: &[],
+};
+
+static TOUCH_OFF: Table = Table {
+    name: "touch_off",
+    doc: "Points whose skin coordinates are known and whose robot coordinates were measured by touching them.",
+    keys: &[
+        required(
+            "date",
+            Shape::Text,
+            "When they were touched: year-month-day, for example `2026-11-20`.",
+        ),
+        required(
+            "points",
+            Shape::List {
+                of: &Shape::Map(&TOUCHED),
+                min: 3,
+                max: 1000,
+            },
+            "At least three points that do not lie on one line; four or more show slips better.",
+        ),
+        default(
+            "max_residual",
+            Shape::Quantity(&[Length], Range::above_zero(10.0)),
+            "0.3 mm",
+            "Largest distance of a point from the rigid fit.",
+        ),
+    ],
+    exactly_one: &[],
+};
+
+static TOUCHED: Table = Table {
+    name: "touched_point",
+    doc: "One touched point.",
+    keys: &[
+        optional("name", Shape::Text, "For messages."),
+        required("skin", PLACE, "Where it is on the skin."),
+        required("robot", PLACE, "Where the robot's tip was when it touched."),
+    ],
+    exactly_one: &[],
+};
+
+static TIP: Table = Table {
+    name: "tip",
+    doc: "The indenter's tip.",
+    keys: &[
+        required(
+            "shape",
+            Shape::Choice(TIPS),
+            "Shape of the end that touches.",
+        ),
+        optional("side", POSITIVE_LENGTH, "Side of a cube."),
+        optional(
+            "diameter",
+            POSITIVE_LENGTH,
+            "Diameter of a sphere or a cylinder.",
+        ),
+        optional(
+            "mass",
+            MASS,
+            "Mass of the tip and its holder. Kept with the session; the robot is told `robot.effector_mass`.",
+        ),
+    ],
+    exactly_one: &[&["side", "diameter"]],
+};
+
+const TIPS: &[Word] = &[
+    ("cube", "a flat square end"),
+    ("sphere", "a ball"),
+    ("cylinder", "a flat round end"),
+];
+
+static LIMITS: Table = Table {
+    name: "rig_limits",
+    doc: "What this bench bears. The tighter of these and of the protocol's holds.",
+    keys: &[
+        required(
+            "workspace",
+            Shape::Map(&WORKSPACE),
+            "The box that the tip never leaves, robot frame. The robot's true workspace shrinks away from its axes.",
+        ),
+        required("max_speed", SPEED, "Fastest motion."),
+        required(
+            "max_force",
+            FORCE,
+            "A measured force above this ends the run.",
+        ),
+        default(
+            "max_lead",
+            Shape::Quantity(&[Length], Range::above_zero(5.0)),
+            "1 mm",
+            "How far the robot's target may run ahead of where it is: bounds the force that builds up in contact.",
+        ),
+        required(
+            "max_depth",
+            Shape::Quantity(&[Length], Range::above_zero(50.0)),
+            "Deepest indentation below the surface of the frame.",
+        ),
+    ],
+    exactly_one: &[],
+};
+
+static WORKSPACE: Table = Table {
+    name: "robot_workspace",
+    doc: "A box in the robot's frame.",
+    keys: &[
+        required("min", PLACE, "Lowest x, y and z."),
+        required("max", PLACE, "Highest x, y and z."),
+    ],
+    exactly_one: &[],
+};
+
+static PREFLIGHT: Table = Table {
+    name: "preflight",
+    doc: "What must hold before anything is armed. A check that fails ends the run before the robot is powered.",
+    keys: &[
+        default(
+            "touch_off_max_age",
+            time(31_536_000.0),
+            "168 h",
+            "A frame measured longer ago than this fails.",
+        ),
+        default(
+            "data_rate",
+            Shape::Quantity(&[DataRate], Range::above_zero(1e9)),
+            "20 MB/s",
+            "Expected bytes of both cameras together: with the plan's length it gives the disk space that a session needs.",
+        ),
+        default(
+            "min_free_disk",
+            Shape::Quantity(&[Data], Range::from_zero(1e15)),
+            "2 GB",
+            "Free space that must be left after the session.",
+        ),
+        default(
+            "loopback_within",
+            time(60.0),
+            "2 s",
+            "A mark sent by the box must be seen by both cameras, under its own name, within this time.",
+        ),
+        default(
+            "clocks_within",
+            time(60.0),
+            "2 s",
+            "Both cameras' clocks must be seen to advance within this time.",
+        ),
+        default(
+            "retouch",
+            Shape::Flag,
+            "false",
+            "Touch the first point of the touch-off again before the run. Needs a bench; the skin must bear it.",
+        ),
+        default(
+            "retouch_tolerance",
+            Shape::Quantity(&[Length], Range::above_zero(10.0)),
+            "0.3 mm",
+            "How far the touched height may be from the frame's.",
+        ),
+    ],
+    exactly_one: &[],
+};
+
+/// How the surface is found; a protocol has the same keys.
+pub(crate) static PRESS: Table = Table {
+    name: "press",
+    doc: "How a press finds the surface.",
+    keys: PRESS_KEYS,
+    exactly_one: &[],
+};
+
+const PRESS_KEYS: &[Key] = &[
+    default(
+        "surface",
+        Shape::Choice(SURFACES),
+        "known",
+        "Where the surface is.",
+    ),
+    default(
+        "threshold",
+        FORCE,
+        "0.3 N",
+        "With `touch`: a force this far above the one in free air is a contact. Friction hides less than about 0.1 N.",
+    ),
+    default(
+        "samples",
+        count(1, 1000),
+        "5",
+        "With `touch`: so many samples in a row must be above the threshold.",
+    ),
+    default(
+        "speed",
+        Shape::Quantity(&[Speed], Range::above_zero(10.0)),
+        "2 mm/s",
+        "With `touch`: speed of the search.",
+    ),
+    default(
+        "band",
+        Shape::Quantity(&[Length], Range::above_zero(10.0)),
+        "0.5 mm",
+        "With `touch`: how far above or below the frame's surface a touch is believed; the search starts and ends there.",
+    ),
+    default(
+        "tare",
+        time(10.0),
+        "300 ms",
+        "With `touch`: how long the force in free air is averaged at clearance height.",
+    ),
+];
+
+const SURFACES: &[Word] = &[
+    ("known", "at z = 0 of the frame"),
+    (
+        "touch",
+        "where the force rises; depths count from there, the floor limit stays where it is",
+    ),
+];

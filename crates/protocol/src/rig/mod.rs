@@ -1,0 +1,269 @@
+//! A rig file: which device plays which role on a bench, where the skin lies, and what the bench bears.
+
+mod build;
+mod camera;
+mod date;
+mod fit;
+mod frame;
+pub(crate) mod keys;
+mod robot;
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use serde::Serialize;
+use skinrig_model::{CameraModel, HostDuration, Point3, RigidTransform, Robot, Skin};
+
+pub use date::Date;
+
+use crate::diagnostic::Diagnostics;
+use crate::surface::Surface;
+
+/// The value of an environment variable.
+pub type Environment<'a> = &'a dyn Fn(&str) -> Option<String>;
+
+/// A rig file that was read and checked.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RigFile {
+    /// The file's name as given to [`RigFile::parse`].
+    pub file_name: String,
+    /// The text as the user wrote it, byte for byte.
+    pub text: String,
+    /// Lower-case hex SHA-256 of the text.
+    pub sha256: String,
+    /// Name of the bench.
+    pub name: String,
+    /// Whether hardware stands behind the drivers.
+    pub kind: RigKind,
+    /// Anything worth keeping.
+    pub description: Option<String>,
+    /// Where the skin lies.
+    pub frame: Frame,
+    /// What the robot presses with.
+    pub tip: Tip,
+    /// What the bench bears.
+    pub limits: BenchLimits,
+    /// The robot.
+    pub robot: RobotSetup,
+    /// Camera 1 and camera 2.
+    pub cameras: [CameraSetup; 2],
+    /// The trigger box, when there is one.
+    pub trigger_box: Option<BoxSetup>,
+    /// What must hold before anything is armed.
+    pub preflight: PreflightLimits,
+    /// How presses find the surface, when the protocol does not say.
+    pub surface: Option<Surface>,
+}
+
+/// Whether hardware stands behind the drivers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum RigKind {
+    /// Hardware.
+    Bench,
+    /// Stand-ins for hardware.
+    Emulated,
+}
+
+impl RigKind {
+    /// `bench` or `emulated`.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Bench => "bench",
+            Self::Emulated => "emulated",
+        }
+    }
+}
+
+/// Where the skin lies in the robot's frame, and how that is known.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Frame {
+    /// The transform.
+    pub robot_from_skin: RigidTransform<Robot, Skin>,
+    /// When it was measured.
+    pub date: Date,
+    /// The touched points that it was fitted to; `None` when it was given.
+    pub touch_off: Option<TouchOff>,
+}
+
+/// Touched points and how well they fit.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct TouchOff {
+    /// At least three.
+    pub points: Vec<TouchedPoint>,
+    /// Root mean square of the points' distances from the fit, mm.
+    pub rms_mm: f64,
+    /// Largest of them, mm.
+    pub worst_mm: f64,
+    /// Largest that is allowed, mm.
+    pub max_residual_mm: f64,
+}
+
+/// A touched point.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct TouchedPoint {
+    /// For messages.
+    pub name: String,
+    /// Where it is on the skin.
+    pub skin: Point3<Skin>,
+    /// Where the tip was.
+    pub robot: Point3<Robot>,
+    /// Distance of the tip from where the fit puts the point, mm.
+    pub residual_mm: f64,
+}
+
+/// The indenter's tip.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Tip {
+    /// `cube`, `sphere` or `cylinder`.
+    pub shape: &'static str,
+    /// Side of a cube, diameter of the others, mm.
+    pub size_mm: f64,
+    /// With its holder, kg.
+    pub mass_kg: Option<f64>,
+}
+
+/// What a bench bears.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct BenchLimits {
+    /// Lowest allowed coordinates, robot frame, mm.
+    pub workspace_min_mm: [f64; 3],
+    /// Highest allowed coordinates, robot frame, mm.
+    pub workspace_max_mm: [f64; 3],
+    /// mm/s.
+    pub max_speed_mm_s: f64,
+    /// N.
+    pub max_force_n: f64,
+    /// How far the target may run ahead of the tip, mm.
+    pub max_lead_mm: f64,
+    /// Below the frame's surface, mm, positive.
+    pub max_depth_mm: f64,
+}
+
+/// The robot of a bench.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RobotSetup {
+    /// `omega3`.
+    pub model: &'static str,
+    /// Serial number.
+    pub serial: String,
+    /// Expected firmware version.
+    pub firmware: Option<String>,
+    /// The vendor's library; `None`: the usual places.
+    pub library: Option<PathBuf>,
+    /// Its expected version.
+    pub library_version: Option<String>,
+    /// How the base is mounted, degrees.
+    pub device_angle_deg: f64,
+    /// Mass that gravity compensation carries, kg; `None`: the device's own value.
+    pub effector_mass_kg: Option<f64>,
+    /// Watchdog of the controller, steps of 125 µs, 1 to 255.
+    pub watchdog_steps: u8,
+    /// Expected velocity threshold, the device's own unit.
+    pub velocity_threshold: Option<u32>,
+    /// The arm may initialise itself: the file says so, and that the sample is off.
+    pub auto_init: bool,
+    /// The sample is off.
+    pub sample_is_off: bool,
+    /// Share of the motors' torque that regulation may use, 0 to 1.
+    pub motor_ratio: f64,
+    /// Ratios and largest forces measured with them, N, ascending; may be empty.
+    pub motor_ratio_calibration: Vec<(f64, f64)>,
+    /// Integral gain of the regulation.
+    pub integral_gain: f64,
+    /// mm/s².
+    pub acceleration_mm_s2: f64,
+    /// mm/s³.
+    pub jerk_mm_s3: f64,
+    /// Whether a second process brakes the arm when this one dies.
+    pub supervisor: bool,
+}
+
+/// One camera of a bench.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CameraSetup {
+    /// `evk1` or `evk4`.
+    pub model: &'static str,
+    /// Serial number.
+    pub serial: String,
+    /// Expected FPGA version.
+    pub fpga: Option<String>,
+    /// Bias values by name, the device's own unit.
+    pub biases: BTreeMap<String, i64>,
+    /// A `.bias` file whose values hold where `biases` has none.
+    pub bias_file: Option<PathBuf>,
+    /// Pixels that stay on: first column, first row, columns, rows.
+    pub roi: Option<[u16; 4]>,
+    /// Threshold of the sensor's activity gate, events per second.
+    pub noise_filter_ev_s: Option<u32>,
+    /// Whose time base it follows.
+    pub sync: SyncRole,
+    /// The trigger input that the box is wired to.
+    pub trigger_channel: u8,
+    /// Where it stands, as drawn or measured.
+    pub geometry: CameraModel,
+}
+
+/// Whose time base a camera follows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SyncRole {
+    /// Its own.
+    Standalone,
+    /// Its own, given to the other.
+    Master,
+    /// The other's.
+    Slave,
+}
+
+/// The trigger box of a bench. At least one of `port` and `serial` is there.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct BoxSetup {
+    /// Serial port.
+    pub port: Option<String>,
+    /// Serial number of its USB adapter.
+    pub serial: Option<String>,
+    /// Expected firmware version.
+    pub firmware: Option<String>,
+    /// What outputs 1, 2 and 3 go to: `camera1`, `camera2`, `other` or `none`.
+    pub outputs: [&'static str; 3],
+    /// What the input comes from: `contact`, `optical`, `other` or `none`.
+    pub input: &'static str,
+    /// From one sync train to the next.
+    pub sync_period: HostDuration,
+}
+
+/// What must hold before anything is armed.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct PreflightLimits {
+    /// A frame older than this fails.
+    pub touch_off_max_age: HostDuration,
+    /// Expected bytes per second of both cameras together.
+    pub data_rate_b_s: f64,
+    /// Free space that must be left after the session, bytes.
+    pub min_free_disk_b: f64,
+    /// A mark must be seen by both cameras within this time.
+    pub loopback_within: HostDuration,
+    /// Both cameras' clocks must be seen to advance within this time.
+    pub clocks_within: HostDuration,
+    /// Touch the first point again before the run.
+    pub retouch: bool,
+    /// How far its height may be from the frame's, mm.
+    pub retouch_tolerance_mm: f64,
+}
+
+impl RigFile {
+    /// Reads a rig file from the bytes of a file named `name`. Paths in it are relative to its folder; `${NAME}` in
+    /// a path or port is looked up in `environment`.
+    ///
+    /// # Errors
+    /// [`Diagnostics`] with every finding at once.
+    pub fn parse(
+        name: &str,
+        bytes: &[u8],
+        environment: Environment<'_>,
+    ) -> Result<Self, Diagnostics> {
+        build::rig(name, bytes, environment)
+    }
+}

@@ -1,0 +1,55 @@
+//! How presses find the surface of the skin.
+
+use serde::{Deserialize, Serialize};
+use skinrig_model::HostDuration;
+
+use crate::shape::Field;
+
+/// Where a press takes the surface to be.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(tag = "surface", rename_all = "snake_case")]
+pub enum Surface {
+    /// At z = 0 of the skin's frame.
+    #[default]
+    Known,
+    /// Where the force rises.
+    Touch(TouchSearch),
+}
+
+impl Surface {
+    /// True for [`Surface::Known`].
+    #[must_use]
+    pub const fn is_known(&self) -> bool {
+        matches!(self, Self::Known)
+    }
+}
+
+/// How the surface is searched: from clearance height to `band_mm` above the frame's surface at the approach's speed,
+/// then down at `speed_mm_s` until the force is `threshold_n` above the one in free air.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct TouchSearch {
+    /// N above the tare.
+    pub threshold_n: f64,
+    /// So many samples in a row.
+    pub samples: u32,
+    /// mm/s.
+    pub speed_mm_s: f64,
+    /// A touch farther than this from z = 0 is not believed; the search ends there, mm.
+    pub band_mm: f64,
+    /// How long the force in free air is averaged.
+    pub tare: HostDuration,
+}
+
+/// Reads a mapping of the table `press`.
+pub(crate) fn surface(f: &Field) -> Option<Surface> {
+    if f.word("surface")? == "known" {
+        return Some(Surface::Known);
+    }
+    Some(Surface::Touch(TouchSearch {
+        threshold_n: f.quantity("threshold")?,
+        samples: f.count("samples")?,
+        speed_mm_s: f.quantity("speed")?,
+        band_mm: f.quantity("band")?,
+        tare: HostDuration::from_secs_f64(f.quantity("tare")?),
+    }))
+}
