@@ -105,14 +105,15 @@ fn lost_doubled_late_and_foreign_pulses_do_no_harm() {
     };
     edges.extend(edges_of(&[again], &planted, 0.0));
     sent.push(again);
-    // One train loses an edge, one arrives 3 ms late, a foreign pulse and another channel's edges lie between.
-    for edge in &mut edges[44 * 20..44 * 21] {
+    // One train loses the end of its start pulse, one arrives 3 ms late, a foreign pulse and another channel's edges
+    // lie between.
+    for edge in &mut edges[64 * 20..64 * 21] {
         edge.t_us += 3_000;
     }
-    edges.remove(44 * 10 + 7);
-    let at = edges[44 * 40].t_us - 100_000;
+    edges.remove(64 * 10 + 1);
+    let at = edges[64 * 40].t_us - 100_000;
     edges.insert(
-        44 * 40 - 1,
+        64 * 40 - 1,
         TriggerEdge {
             t_us: at,
             channel: 0,
@@ -120,7 +121,7 @@ fn lost_doubled_late_and_foreign_pulses_do_no_harm() {
         },
     );
     edges.insert(
-        44 * 50,
+        64 * 50,
         TriggerEdge {
             t_us: at,
             channel: 6,
@@ -137,7 +138,7 @@ fn lost_doubled_late_and_foreign_pulses_do_no_harm() {
         text.contains("1 of 121 trigger marks were not seen"),
         "{text}"
     );
-    assert!(text.contains("44 edges on trigger channel 0"), "{text}");
+    assert!(text.contains("64 edges on trigger channel 0"), "{text}");
 }
 
 #[test]

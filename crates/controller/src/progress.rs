@@ -2,10 +2,10 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
-use skinrig_model::pulse::{PULSES_PER_TRAIN, decode_marks};
+use skinrig_model::pulse::decode_marks;
 use skinrig_model::{
-    CameraId, HostDuration, HostTime, PlannedPress, Point2, PressVerdict, RawChunk, Record, RunEnd,
-    TriggerEdge,
+    CameraId, HostDuration, HostTime, PlannedPress, Point2, PressVerdict, PulseTrain, RawChunk,
+    Record, RunEnd, TriggerEdge,
 };
 
 /// Event rates are taken over this span of rig time.
@@ -198,18 +198,18 @@ fn remaining(p: &Progress, expected: Option<HostDuration>) -> Option<HostDuratio
     ))
 }
 
-/// Takes the complete trains off the front of a channel's edges and counts them.
+/// Takes the trains that can be read off the front of a channel's edges and counts the marks.
 fn take_marks(edges: &mut Vec<TriggerEdge>) -> u64 {
-    let length = 2 * PULSES_PER_TRAIN as usize;
-    let (mut seen, mut from) = (0, 0);
-    while let Some(train) = edges.get(from..from + length) {
-        if decode_marks(train).marks.is_empty() {
-            from += 1;
-        } else {
-            seen += 1;
-            from += length;
-        }
-    }
-    edges.drain(..from);
-    seen
+    let Some(newest) = edges.last().map(|e| e.t_us) else {
+        return 0;
+    };
+    let seen = decode_marks(edges);
+    let marks = seen.marks.iter().map(|m| m.t_us);
+    let read = marks.chain(seen.syncs.iter().map(|s| s.t_us)).max();
+    // What is older than a train and was not read never will be.
+    let done = read
+        .map_or(0, |t| t + PulseTrain::DURATION_US)
+        .max(newest.saturating_sub(2 * PulseTrain::DURATION_US));
+    edges.retain(|e| e.t_us >= done);
+    seen.marks.len() as u64
 }

@@ -27,7 +27,7 @@ pub use id::{AttemptId, CameraId, PressId};
 pub use lens::{LensAngle, LensModel};
 pub use pose::PoseSample;
 pub use press::{PlannedPress, PressOutcome, PressRole, PressTiming, PressVerdict};
-pub use pulse::{Mark, MarkKind, PulseTrain, SeenMark, SentMark};
+pub use pulse::{Label, Mark, MarkKind, PulseTrain, SeenMark, SeenSync, SentMark};
 pub use record::{
     DeviceIdentity, DeviceRole, InterruptionKind, MotionCommand, Record, RunEnd, RunHeader, Setting,
 };

@@ -1,16 +1,34 @@
-//! Trigger marks: which moment of which press a pulse train on the trigger line stands for.
+//! Trigger trains: pulses on the trigger line that name themselves.
 //!
-//! A mark is sent as a train of pulses that names itself, so that a lost or doubled pulse is seen and
-//! never shifts the count: one *start* pulse, then [`PAYLOAD_BITS`] data pulses, most significant bit
-//! first, then one parity pulse. Pulse `k` of a train rises `k *` [`PULSE_PERIOD_US`] after the start
-//! pulse; its width tells its meaning. The instant of the mark is the rising edge of the start pulse.
-//! All widths are far above the 500 ns minimum of the camera's trigger input.
+//! # On the wire
+//!
+//! A train is 32 pulses ([`PULSES_PER_TRAIN`]). Pulse `k = 0..32` rises `k *` 400 µs ([`PULSE_PERIOD_US`]) after
+//! the train's first rising edge; its width tells its meaning:
+//!
+//! | pulse | width | what |
+//! |---|---|---|
+//! | 0 | 300 µs | start; its rising edge is the instant that the train stands for |
+//! | 1..=3 | 100 µs for 0, 200 µs for 1 | kind, most significant bit first: 1..=5 a mark ([`MarkKind::code`]), 6 a sync train ([`SYNC_CODE`]); 0 and 7 are never sent |
+//! | 4..=20 | likewise | 17 bits, most significant first: the press of a mark, or the running number of a sync train modulo 2^17 |
+//! | 21..=31 | likewise | 11 check bits, most significant first: [`check_bits`] of the 20 data bits |
+//!
+//! Afterwards the line stays low until 34 periods ([`PulseTrain::DURATION_US`], 13.6 ms) have passed since the
+//! first edge. All widths are far above the 500 ns minimum of the camera's trigger input.
+//!
+//! # Why these check bits
+//!
+//! The 31 bits are a word of the even-weight BCH(31, 21) code with generator
+//! `(x + 1)(x^10 + x^9 + x^8 + x^6 + x^5 + x^3 + 1)`, the code of POCSAG paging (ITU-R M.584): any two words
+//! differ in at least 6 bits. Check bits are XORed with [`CHECK_MASK`], because the code is cyclic: without the
+//! mask a train read one pulse late could again be a word; with it every such shift is at least 4 bits away from
+//! all words. [`decode_marks`] says what that buys.
+
+mod decode;
 
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-use crate::event::TriggerEdge;
 use crate::id::PressId;
 use crate::time::HostTime;
 
@@ -22,14 +40,20 @@ pub const ONE_WIDTH_US: u64 = 200;
 pub const ZERO_WIDTH_US: u64 = 100;
 /// Distance of two rising edges of a train, µs.
 pub const PULSE_PERIOD_US: u64 = 400;
-/// Data bits of a train: 3 for the kind, 17 for the press.
-pub const PAYLOAD_BITS: u32 = 20;
-/// Pulses of a train: start, data, parity.
-pub const PULSES_PER_TRAIN: u64 = PAYLOAD_BITS as u64 + 2;
+/// Data bits of a train: 3 for the kind, 17 for the press or the sync count.
+pub const DATA_BITS: u32 = 20;
+/// Check bits of a train.
+pub const CHECK_BITS: u32 = 11;
+/// Pulses of a train: start, data, check.
+pub const PULSES_PER_TRAIN: u64 = 1 + (DATA_BITS + CHECK_BITS) as u64;
+/// XORed into the check bits; chosen by trying all 2^11 masks for the largest distance of shifted trains from the code.
+pub const CHECK_MASK: u32 = 0x7FD;
+/// Generator of the code, x^11 + x^8 + x^7 + x^5 + x^4 + x^3 + x + 1.
+const GENERATOR: u32 = 0x9BB;
 /// The kind code of a *sync* train, which names no press: its 17 bits are the box's running number of sync trains,
 /// modulo 2^17. The box sends them by itself, so that clocks are tied together between presses too.
 pub const SYNC_CODE: u32 = 6;
-/// The largest press id that a mark can carry.
+/// The largest press id that a mark can carry, and the largest count of a sync train.
 pub const MAX_MARKED_PRESS: u32 = (1 << 17) - 1;
 /// How far a measured width or period may be off and still be read, µs.
 pub const TOLERANCE_US: u64 = 40;
@@ -117,42 +141,111 @@ pub struct SentMark {
     pub uncertainty_ns: i64,
 }
 
-/// A mark as a train of pulses.
+/// What a train says.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Label {
+    /// A moment of a press.
+    Mark(Mark),
+    /// Running number of a periodic train, modulo 2^17.
+    Sync(u32),
+}
+
+impl Label {
+    /// The 20 data bits, or `None` when the number does not fit.
+    #[must_use]
+    pub fn data(self) -> Option<u32> {
+        let (code, number) = match self {
+            Self::Mark(mark) => (mark.kind.code(), mark.press.0),
+            Self::Sync(count) => (SYNC_CODE, count),
+        };
+        (number <= MAX_MARKED_PRESS).then_some((code << 17) | number)
+    }
+
+    /// The label with these 20 data bits, or `None` for a kind that is never sent.
+    #[must_use]
+    pub fn from_data(data: u32) -> Option<Self> {
+        let number = data & MAX_MARKED_PRESS;
+        match data >> 17 {
+            SYNC_CODE => Some(Self::Sync(number)),
+            code => MarkKind::from_code(code).map(|kind| {
+                Self::Mark(Mark {
+                    kind,
+                    press: PressId(number),
+                })
+            }),
+        }
+    }
+}
+
+/// The 11 check bits of 20 data bits: the remainder of `data * x^11` by the generator over GF(2), XORed with
+/// [`CHECK_MASK`].
+#[must_use]
+pub const fn check_bits(data: u32) -> u32 {
+    let mut rest = data << CHECK_BITS;
+    let mut bit = DATA_BITS + CHECK_BITS;
+    while bit > CHECK_BITS {
+        bit -= 1;
+        if (rest >> bit) & 1 == 1 {
+            rest ^= GENERATOR << (bit - CHECK_BITS);
+        }
+    }
+    rest ^ CHECK_MASK
+}
+
+/// A label as a train of pulses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PulseTrain {
-    mark: Mark,
+    /// Data and check bits, the first one sent on top.
+    bits: u32,
 }
 
 impl PulseTrain {
     /// The train of `mark`, or `None` when its press id does not fit.
     #[must_use]
-    pub const fn new(mark: Mark) -> Option<Self> {
-        if mark.press.0 > MAX_MARKED_PRESS {
-            None
-        } else {
-            Some(Self { mark })
+    pub fn new(mark: Mark) -> Option<Self> {
+        Self::of(Label::Mark(mark))
+    }
+
+    /// The sync train with this running number, which wraps at 2^17.
+    #[must_use]
+    pub const fn sync(count: u32) -> Self {
+        Self::with_data((SYNC_CODE << 17) | (count & MAX_MARKED_PRESS))
+    }
+
+    /// The train of `label`, or `None` when its number does not fit.
+    #[must_use]
+    pub fn of(label: Label) -> Option<Self> {
+        label.data().map(Self::with_data)
+    }
+
+    const fn with_data(data: u32) -> Self {
+        Self {
+            bits: (data << CHECK_BITS) | check_bits(data),
         }
     }
 
-    /// (offset of the rising edge from the mark's instant, width) of each pulse, µs.
+    /// (offset of the rising edge from the train's instant, width) of each pulse, µs.
     pub fn pulses(self) -> impl Iterator<Item = (u64, u64)> {
-        let payload = (self.mark.kind.code() << 17) | self.mark.press.0;
-        let parity = payload.count_ones() % 2 == 1;
-        let bit_width = |bit: bool| if bit { ONE_WIDTH_US } else { ZERO_WIDTH_US };
         (0..PULSES_PER_TRAIN).map(move |k| {
-            let width = if k == 0 {
-                START_WIDTH_US
-            } else if k == PULSES_PER_TRAIN - 1 {
-                bit_width(parity)
-            } else {
-                bit_width((payload >> (PAYLOAD_BITS as u64 - k)) & 1 == 1)
+            let one = (self.bits >> (PULSES_PER_TRAIN - 1 - k)) & 1 == 1;
+            let width = match (k, one) {
+                (0, _) => START_WIDTH_US,
+                (_, true) => ONE_WIDTH_US,
+                (_, false) => ZERO_WIDTH_US,
             };
             (k * PULSE_PERIOD_US, width)
         })
     }
 
-    /// Duration of any train from its first rising to its last possible falling edge, µs.
-    pub const DURATION_US: u64 = PULSES_PER_TRAIN * PULSE_PERIOD_US;
+    /// (offset from the train's instant in µs, true for rising) of each edge, in order.
+    pub fn edges(self) -> impl Iterator<Item = (u64, bool)> {
+        self.pulses()
+            .flat_map(|(offset, width)| [(offset, true), (offset + width, false)])
+    }
+
+    /// How long a train occupies the line, µs: its pulses and two periods of rest.
+    pub const DURATION_US: u64 = (PULSES_PER_TRAIN + 2) * PULSE_PERIOD_US;
 }
 
 /// A mark found on a camera's trigger input.
@@ -164,120 +257,72 @@ pub struct SeenMark {
     pub t_us: u64,
 }
 
-/// What [`decode_marks`] found on one channel.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct DecodedMarks {
-    /// Complete trains with right parity, in time order.
-    pub marks: Vec<SeenMark>,
-    /// Edges that belong to no complete train: lost, doubled or foreign pulses.
-    pub stray_edges: u64,
+/// A sync train found on a camera's trigger input.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SeenSync {
+    /// Running number, modulo 2^17.
+    pub count: u32,
+    /// Rising edge of its start pulse on the camera's clock, µs.
+    pub t_us: u64,
 }
 
-/// Finds the pulse trains among the edges of one channel, in time order.
-///
-/// Total: any edges give marks or strays. A train counts only when all its pulses are there with right
-/// widths, distances and parity.
-#[must_use]
-pub fn decode_marks(edges: &[TriggerEdge]) -> DecodedMarks {
-    let mut out = DecodedMarks::default();
-    let mut i = 0;
-    while i < edges.len() {
-        match decode_train(&edges[i..]) {
-            Some(seen) => {
-                out.marks.push(seen);
-                i += 2 * PULSES_PER_TRAIN as usize;
-            }
-            None => {
-                out.stray_edges += 1;
-                i += 1;
-            }
-        }
-    }
-    out
-}
-
-fn decode_train(edges: &[TriggerEdge]) -> Option<SeenMark> {
-    let edges = edges.get(..2 * PULSES_PER_TRAIN as usize)?;
-    let t0 = edges[0].t_us;
-    let near = |found: u64, wanted: u64| found.abs_diff(wanted) <= TOLERANCE_US;
-    let mut bits = 0u32;
-    for (k, pulse) in edges.chunks_exact(2).enumerate() {
-        let (rise, fall) = (pulse[0], pulse[1]);
-        let offset = rise.t_us.checked_sub(t0)?;
-        let width = fall.t_us.checked_sub(rise.t_us)?;
-        if !rise.rising || fall.rising || !near(offset, k as u64 * PULSE_PERIOD_US) {
-            return None;
-        }
-        if k == 0 {
-            if !near(width, START_WIDTH_US) {
-                return None;
-            }
-        } else if near(width, ONE_WIDTH_US) {
-            bits = (bits << 1) | 1;
-        } else if near(width, ZERO_WIDTH_US) {
-            bits <<= 1;
-        } else {
-            return None;
-        }
-    }
-    let (payload, parity) = (bits >> 1, bits & 1);
-    if payload.count_ones() % 2 != parity {
-        return None;
-    }
-    let kind = MarkKind::from_code(payload >> 17)?;
-    let press = PressId(payload & MAX_MARKED_PRESS);
-    Some(SeenMark {
-        mark: Mark { kind, press },
-        t_us: t0,
-    })
-}
+pub use decode::{DecodedMarks, decode_marks};
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use proptest::prelude::*;
 
-    fn edges(mark: Mark, t0: u64, jitter: &[i64]) -> Vec<TriggerEdge> {
-        let mut out = Vec::new();
-        for (k, (offset, width)) in PulseTrain::new(mark).unwrap().pulses().enumerate() {
-            let at = (t0 + offset) as i64 + jitter[k % jitter.len()];
-            out.push(TriggerEdge {
-                t_us: at as u64,
-                channel: 0,
-                rising: true,
-            });
-            out.push(TriggerEdge {
-                t_us: at as u64 + width,
-                channel: 0,
-                rising: false,
-            });
-        }
-        out
+    #[test]
+    fn any_two_trains_differ_in_six_bits_at_least() {
+        // The code is linear: the lightest word without the mask is the distance.
+        let lightest = (1u32..1 << DATA_BITS)
+            .map(|data| ((data << CHECK_BITS) | (check_bits(data) ^ CHECK_MASK)).count_ones())
+            .min();
+        assert_eq!(lightest, Some(6));
     }
 
-    proptest! {
-        #[test]
-        fn every_mark_survives_the_wire(code in 1u32..=5, press in 0..=MAX_MARKED_PRESS,
-                                        t0 in 1000u64..1 << 40, jitter in prop::collection::vec(-15i64..15, 22)) {
-            let mark = Mark { kind: MarkKind::from_code(code).unwrap(), press: PressId(press) };
-            let seen = decode_marks(&edges(mark, t0, &jitter));
-            prop_assert_eq!(seen.stray_edges, 0);
-            prop_assert_eq!(seen.marks.len(), 1);
-            prop_assert_eq!(seen.marks[0].mark, mark);
-            prop_assert_eq!(seen.marks[0].t_us, (t0 as i64 + jitter[0]) as u64);
-        }
-
-        #[test]
-        fn a_lost_edge_spoils_its_own_train_only(lost in 0usize..44) {
-            let mark = |p| Mark { kind: MarkKind::Contact, press: PressId(p) };
-            let mut all = edges(mark(7), 1_000, &[0]);
-            all.remove(lost);
-            all.extend(edges(mark(8), 100_000, &[0]));
-            let seen = decode_marks(&all);
-            prop_assert_eq!(seen.marks.len(), 1);
-            prop_assert_eq!(seen.marks[0].mark, mark(8));
-            prop_assert_eq!(seen.stray_edges, 43);
-        }
+    #[test]
+    fn known_trains_look_like_this_on_the_wire() {
+        let widths = |train: PulseTrain| -> String {
+            train
+                .pulses()
+                .map(|(_, width)| match width {
+                    START_WIDTH_US => 'S',
+                    ONE_WIDTH_US => '1',
+                    _ => '0',
+                })
+                .collect()
+        };
+        let mark = |kind, press| {
+            PulseTrain::new(Mark {
+                kind,
+                press: PressId(press),
+            })
+        };
+        // Vectors for anyone who sends trains: S, 3 bits of kind, 17 of the number, 11 of check.
+        assert_eq!(
+            mark(MarkKind::Approach, 0).map(widths).as_deref(),
+            Some("S0010000000000000000000001111001")
+        );
+        assert_eq!(
+            mark(MarkKind::Contact, 7).map(widths).as_deref(),
+            Some("S0100000000000000011110101101111")
+        );
+        assert_eq!(
+            mark(MarkKind::Release, MAX_MARKED_PRESS)
+                .map(widths)
+                .as_deref(),
+            Some("S1011111111111111111100111011000")
+        );
+        assert_eq!(
+            widths(PulseTrain::sync(0)),
+            "S1100000000000000000010110010011"
+        );
+        assert_eq!(
+            widths(PulseTrain::sync(1)),
+            "S1100000000000000000110000101000"
+        );
+        assert_eq!(PulseTrain::sync(1 << 17), PulseTrain::sync(0));
     }
 
     #[test]

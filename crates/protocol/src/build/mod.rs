@@ -7,8 +7,8 @@ mod settings;
 use std::path::Path;
 
 use sha2::{Digest, Sha256};
-use skinrig_model::HostDuration;
-use skinrig_model::pulse::{MAX_MARKED_PRESS, PULSE_PERIOD_US, PULSES_PER_TRAIN};
+use skinrig_model::pulse::MAX_MARKED_PRESS;
+use skinrig_model::{HostDuration, PulseTrain};
 
 use crate::diagnostic::{Collector, Diagnostics};
 use crate::keys::PROTOCOL;
@@ -306,7 +306,7 @@ fn check_timing(protocol: &Protocol, root: &Field, out: &mut Collector) {
             .found(format!("{key} every {:.3} s", late.period_s))
             .help("lengthen it, move faster, or lower `motion.clearance` or `motion.hold`");
     }
-    let train_s = (PULSES_PER_TRAIN * PULSE_PERIOD_US) as f64 * 1e-6;
+    let train_s = PulseTrain::DURATION_US as f64 * 1e-6;
     for press in timing::distinct_presses(&plan) {
         let moments = timing::moments_s(&plan.limits, press);
         let chosen: Vec<_> = press

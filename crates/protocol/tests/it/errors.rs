@@ -180,14 +180,14 @@ fn impossible_values_across_keys() {
 fn marks_must_not_overlap() {
     let error = parse(
         &shipped("demo.yaml"),
-        &["triggers.marks=[at_depth, retract]", "motion.hold=5ms"],
+        &["triggers.marks=[at_depth, retract]", "motion.hold=13ms"],
     )
     .unwrap_err();
     assert!(error.to_string().contains("two marks overlap"), "{error}");
     assert!(
         parse(
             &shipped("demo.yaml"),
-            &["triggers.marks=[at_depth, retract]", "motion.hold=10ms"]
+            &["triggers.marks=[at_depth, retract]", "motion.hold=15ms"]
         )
         .is_ok()
     );

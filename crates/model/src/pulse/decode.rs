@@ -1,0 +1,344 @@
+//! Reading trains from the edges of a line on which edges are lost, doubled and invented.
+
+use super::{
+    CHECK_BITS, DATA_BITS, Label, ONE_WIDTH_US, PULSE_PERIOD_US, PULSES_PER_TRAIN, PulseTrain,
+    START_WIDTH_US, SeenMark, SeenSync, TOLERANCE_US, ZERO_WIDTH_US, check_bits,
+};
+use crate::event::TriggerEdge;
+
+/// Bits of a train that may be unreadable; the 28 others then still contradict any other word in 3 places.
+const MOST_ERASED: u32 = 3;
+
+/// What [`decode_marks`] found on one channel.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct DecodedMarks {
+    /// Trains that named a press, in time order.
+    pub marks: Vec<SeenMark>,
+    /// Periodic trains, in time order.
+    pub syncs: Vec<SeenSync>,
+    /// Edges that belong to no train that could be read: spurious ones, doubled ones, and those of damaged trains.
+    pub stray_edges: u64,
+    /// Edges missing in the trains that were read.
+    pub lost_edges: u64,
+}
+
+/// Finds the trains among the edges of one channel.
+///
+/// Total: any edges give labels or strays. A train is read only when its name is certain, which means all of:
+/// - the start pulse's falling edge, the only one of its width, is there;
+/// - no edge where the pulse before the first one or the pulse after the last one would have one, so that the train is
+///   not read some pulses late or early;
+/// - at most 3 of its 31 bits are unreadable (their falling edge lost, or two of them), and the code has a word that
+///   agrees with all the others;
+/// - no other reading of the same edges passes.
+///
+/// The error that remains needs at least three bits, each with its own falling edge lost and a spurious one within
+/// the tolerance of the other width, in the places that another word demands. On a line that loses 20 % of its edges and
+/// invents 5 %, about one train in ten is read, and no wrong one was seen in 10^7 (see the tests). What reads the rest
+/// is the trigger box's own list of what it sent: `skinrig_analysis::timebase`.
+#[must_use]
+pub fn decode_marks(edges: &[TriggerEdge]) -> DecodedMarks {
+    let mut edges = edges.to_vec();
+    edges.sort_by_key(|e| e.t_us);
+    let mut out = DecodedMarks::default();
+    let mut used = 0;
+    let mut readings = readings(&edges).peekable();
+    while let Some(first) = readings.next() {
+        let mut certain = true;
+        // Everything that overlaps must say the same: a doubled start edge gives the same train twice.
+        while let Some(other) =
+            readings.next_if(|r| r.t_us < first.t_us.saturating_add(PulseTrain::DURATION_US))
+        {
+            certain &=
+                other.label == first.label && other.t_us.abs_diff(first.t_us) <= 2 * TOLERANCE_US;
+        }
+        if !certain {
+            continue;
+        }
+        used += u64::from(first.edges_seen);
+        out.lost_edges += 2 * PULSES_PER_TRAIN - u64::from(first.edges_seen);
+        let t_us = first.t_us;
+        match first.label {
+            Label::Mark(mark) => out.marks.push(SeenMark { mark, t_us }),
+            Label::Sync(count) => out.syncs.push(SeenSync { count, t_us }),
+        }
+    }
+    out.stray_edges = edges.len() as u64 - used;
+    out
+}
+
+/// A train read from one anchor.
+struct Reading {
+    label: Label,
+    t_us: u64,
+    edges_seen: u32,
+}
+
+/// All readings, by the falling edges that may be a start pulse's, in time order.
+fn readings(edges: &[TriggerEdge]) -> impl Iterator<Item = Reading> {
+    edges
+        .iter()
+        .enumerate()
+        .filter(|(_, e)| !e.rising)
+        .filter_map(|(i, e)| {
+            // Nothing that belongs to the train is earlier than one period before its start.
+            let from = e.t_us.checked_sub(START_WIDTH_US)?;
+            let first = edges[..i]
+                .iter()
+                .rposition(|e| e.t_us < from.saturating_sub(PULSE_PERIOD_US + TOLERANCE_US))
+                .map_or(0, |k| k + 1);
+            read_train(&edges[first..], from)
+        })
+}
+
+/// Reads the train that starts about `start_us`.
+fn read_train(edges: &[TriggerEdge], start_us: u64) -> Option<Reading> {
+    let line = Line { edges };
+    if line.has_pulse(start_us.checked_sub(PULSE_PERIOD_US)?) {
+        return None;
+    }
+    let mut seen = 1;
+    // Each rising edge that is there sets the place of the next, so that the clocks' rates need not agree.
+    let mut rise_us = start_us;
+    let mut t_us = None;
+    let (mut bits, mut erased) = (0u32, 0u32);
+    for k in 0..PULSES_PER_TRAIN {
+        if let Some(found) = line.near(rise_us, true) {
+            seen += 1;
+            rise_us = found;
+            t_us.get_or_insert(found.saturating_sub(k * PULSE_PERIOD_US));
+        }
+        if k > 0 {
+            let one = line
+                .near(rise_us.saturating_add(ONE_WIDTH_US), false)
+                .is_some();
+            let zero = line
+                .near(rise_us.saturating_add(ZERO_WIDTH_US), false)
+                .is_some();
+            bits = (bits << 1) | u32::from(one);
+            erased = (erased << 1) | u32::from(one == zero);
+            seen += u32::from(one != zero);
+        }
+        rise_us = rise_us.saturating_add(PULSE_PERIOD_US);
+    }
+    if line.has_pulse(rise_us) {
+        return None;
+    }
+    Some(Reading {
+        label: fill(bits, erased)?,
+        t_us: t_us?,
+        edges_seen: seen,
+    })
+}
+
+/// The label whose word agrees with `bits` in all places that are not `erased`.
+fn fill(bits: u32, erased: u32) -> Option<Label> {
+    if erased.count_ones() > MOST_ERASED {
+        return None;
+    }
+    let known = bits & !erased;
+    // All subsets of the erased places; the code's distance leaves at most one.
+    let mut subset = 0u32;
+    loop {
+        let word = known | subset;
+        let data = word >> CHECK_BITS;
+        if word & ((1 << CHECK_BITS) - 1) == check_bits(data) {
+            return Label::from_data(data & ((1 << DATA_BITS) - 1));
+        }
+        subset = subset.wrapping_sub(erased) & erased;
+        if subset == 0 {
+            return None;
+        }
+    }
+}
+
+/// The edges of one channel in time order.
+struct Line<'a> {
+    edges: &'a [TriggerEdge],
+}
+
+impl Line<'_> {
+    /// The edge of this direction nearest to `at_us`, within the tolerance.
+    fn near(&self, at_us: u64, rising: bool) -> Option<u64> {
+        let from = self
+            .edges
+            .partition_point(|e| e.t_us < at_us.saturating_sub(TOLERANCE_US));
+        self.edges[from..]
+            .iter()
+            .take_while(|e| e.t_us <= at_us.saturating_add(TOLERANCE_US))
+            .filter(|e| e.rising == rising)
+            .map(|e| e.t_us)
+            .min_by_key(|t| t.abs_diff(at_us))
+    }
+
+    /// True when any edge lies where a pulse that rises at `rise_us` would have one.
+    fn has_pulse(&self, rise_us: u64) -> bool {
+        self.near(rise_us, true).is_some()
+            || [ZERO_WIDTH_US, ONE_WIDTH_US, START_WIDTH_US]
+                .into_iter()
+                .any(|width| self.near(rise_us.saturating_add(width), false).is_some())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::id::PressId;
+    use crate::pulse::{MAX_MARKED_PRESS, Mark, MarkKind};
+    use proptest::prelude::*;
+
+    fn edges(label: Label, t0: u64) -> Vec<TriggerEdge> {
+        PulseTrain::of(label)
+            .unwrap()
+            .edges()
+            .map(|(offset, rising)| TriggerEdge {
+                t_us: t0 + offset,
+                channel: 0,
+                rising,
+            })
+            .collect()
+    }
+
+    fn mark(press: u32) -> Label {
+        Label::Mark(Mark {
+            kind: MarkKind::Contact,
+            press: PressId(press),
+        })
+    }
+
+    fn labels(seen: &DecodedMarks) -> Vec<(u64, Label)> {
+        let marks = seen.marks.iter().map(|m| (m.t_us, Label::Mark(m.mark)));
+        let syncs = seen.syncs.iter().map(|s| (s.t_us, Label::Sync(s.count)));
+        let mut all: Vec<_> = marks.chain(syncs).collect();
+        all.sort();
+        all
+    }
+
+    proptest! {
+        #[test]
+        fn every_label_survives_the_wire(code in 1u32..=6, number in 0..=MAX_MARKED_PRESS, t0 in 1000u64..1 << 40,
+                                         ppm in -5_000i64..5_000, jitter in prop::collection::vec(-15i64..15, 64)) {
+            let label = Label::from_data((code << 17) | number).unwrap();
+            let mut all = edges(label, t0);
+            for (edge, off) in all.iter_mut().zip(jitter) {
+                let since = (edge.t_us - t0) as i64;
+                edge.t_us = (t0 as i64 + since + since * ppm / 1_000_000 + off) as u64;
+            }
+            let t_us = all[0].t_us;
+            let seen = decode_marks(&all);
+            prop_assert_eq!(seen.stray_edges, 0);
+            prop_assert_eq!(seen.lost_edges, 0);
+            prop_assert_eq!(labels(&seen), vec![(t_us, label)]);
+        }
+
+        #[test]
+        fn one_lost_or_doubled_edge_spoils_no_label(at in 0usize..64, doubled: bool) {
+            let mut all = edges(mark(7), 10_000);
+            if doubled {
+                let twin = TriggerEdge { t_us: all[at].t_us + 3, ..all[at] };
+                all.insert(at + 1, twin);
+            } else {
+                all.remove(at);
+            }
+            all.extend(edges(Label::Sync(8), 10_000 + PulseTrain::DURATION_US));
+            let seen = decode_marks(&all);
+            let second = (10_000 + PulseTrain::DURATION_US, Label::Sync(8));
+            // Without the falling edge of its start pulse a train has no certain beginning.
+            let wanted = if at == 1 && !doubled { vec![second] } else { vec![(10_000, mark(7)), second] };
+            prop_assert_eq!(labels(&seen), wanted);
+        }
+
+        #[test]
+        fn any_edges_are_taken(all in prop::collection::vec((any::<u64>(), any::<bool>()), 0..200)) {
+            let all: Vec<_> = all.into_iter().map(|(t, rising)| TriggerEdge { t_us: t, channel: 0, rising }).collect();
+            let seen = decode_marks(&all);
+            prop_assert!(seen.stray_edges as usize <= all.len());
+        }
+    }
+
+    /// SplitMix64 (public domain, S. Vigna): enough for a line with faults.
+    struct Random(u64);
+
+    impl Random {
+        fn below(&mut self, n: u64) -> u64 {
+            self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+            let mut z = self.0;
+            z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+            z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+            (z ^ (z >> 31)) % n
+        }
+    }
+
+    /// Sends `trains` trains over a line that loses 20 % of the edges, invents 5 % and delays each by up to 5 µs;
+    /// returns how many were read rightly and how many wrongly.
+    fn noisy_line(trains: u64, seed: u64) -> (u64, u64) {
+        let mut random = Random(seed);
+        let (mut right, mut wrong) = (0, 0);
+        for batch in 0..trains.div_ceil(16) {
+            let mut all = Vec::new();
+            let mut sent = Vec::new();
+            let mut at = 100_000;
+            for k in 0..16 {
+                let label = if k % 2 == 0 {
+                    Label::Sync((batch * 16 + k) as u32 & MAX_MARKED_PRESS)
+                } else {
+                    Label::from_data(
+                        ((1 + random.below(5) as u32) << 17) | random.below(1 << 12) as u32,
+                    )
+                    .unwrap()
+                };
+                sent.push((at, label));
+                for mut edge in edges(label, at) {
+                    let lost = random.below(100) < 20;
+                    edge.t_us += random.below(6);
+                    if !lost {
+                        all.push(edge);
+                    }
+                    if random.below(100) < 5 {
+                        let t_us = at + random.below(PulseTrain::DURATION_US);
+                        all.push(TriggerEdge {
+                            t_us,
+                            rising: random.below(2) == 0,
+                            ..edge
+                        });
+                    }
+                }
+                at += PulseTrain::DURATION_US + random.below(2_000);
+            }
+            for (t_us, label) in labels(&decode_marks(&all)) {
+                let truly = sent
+                    .iter()
+                    .any(|(at, l)| *l == label && at.abs_diff(t_us) <= 2 * TOLERANCE_US);
+                *(if truly { &mut right } else { &mut wrong }) += 1;
+            }
+        }
+        (right, wrong)
+    }
+
+    #[test]
+    fn no_label_is_wrong_on_a_line_that_loses_and_invents_edges() {
+        let (right, wrong) = noisy_line(40_000, 1);
+        assert_eq!(wrong, 0);
+        assert!(right > 1_000, "{right} of 40000 trains read");
+    }
+
+    #[test]
+    #[ignore = "minutes: 10^7 trains"]
+    fn no_label_is_wrong_in_ten_million_trains() {
+        let (right, wrong) = noisy_line(10_000_000, 2);
+        assert_eq!(wrong, 0, "{right} read rightly");
+    }
+
+    /// A train that begins without its first pulses, or ends without its last, is not read as another one.
+    #[test]
+    fn a_train_is_not_read_pulses_late() {
+        for number in (0..MAX_MARKED_PRESS).step_by(37) {
+            let mut all = edges(mark(number), 10_000);
+            all.remove(1);
+            all.remove(0);
+            // The next pulse looks like a start.
+            all[1].t_us = all[0].t_us + START_WIDTH_US;
+            assert_eq!(labels(&decode_marks(&all)), []);
+        }
+    }
+}
