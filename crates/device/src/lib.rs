@@ -9,6 +9,7 @@ pub mod clock;
 pub mod contract;
 pub mod error;
 pub mod indenter;
+pub mod limits;
 pub mod rig;
 pub mod trigger;
 

@@ -5,8 +5,8 @@ use skinrig_model::{DeviceIdentity, DeviceRole, Point3, Robot, Setting};
 
 use crate::config::SimConfig;
 use crate::faults::{Fault, When};
-use crate::limits;
 use crate::world::{Shared, World};
+use skinrig_device::limits;
 
 /// The simulated robot: like an omega.3, with force sensing that a real one only estimates.
 pub struct SimIndenter {

@@ -14,7 +14,6 @@ pub mod config;
 pub mod faults;
 pub mod geometric;
 pub mod indenter;
-pub mod limits;
 pub mod motion;
 pub mod optical;
 pub mod random;

@@ -7,7 +7,7 @@ use skinrig_model::{
 };
 
 use super::tape::Tape;
-use crate::limits;
+use skinrig_device::limits;
 
 /// Plays the part of the robot: takes the recorded commands, gives the recorded poses.
 pub struct ReplayedIndenter {

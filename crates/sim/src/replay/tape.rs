@@ -10,7 +10,7 @@ use skinrig_model::{
 };
 
 use super::recording::{Recording, RecordingError};
-use crate::limits::millimetres;
+use skinrig_device::limits::millimetres;
 
 /// This long after its last pose, and no other to come, a recording has ended. Shorter than any controller waits
 /// for a pose (0.1 s), longer than its ticks.

@@ -1,7 +1,8 @@
-//! What any indenter refuses, simulated or replayed.
+//! What any indenter refuses: limits beyond its capabilities, commands beyond its limits.
 
-use skinrig_device::{DeviceError, IndenterCapabilities, MotionLimits};
 use skinrig_model::{DeviceRole, Point3, Robot, Setting};
+
+use crate::{DeviceError, IndenterCapabilities, MotionLimits};
 
 /// A refusal by the indenter `serial`.
 pub fn refused(serial: &str, expected: String, found: String) -> DeviceError {

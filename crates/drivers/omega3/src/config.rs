@@ -1,0 +1,444 @@
+//! What the driver is told about one robot: plain data, every value with its unit, its default and where that came from.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use crate::axes::Axes;
+
+/// Everything the driver has to be told. The defaults are cautious; nothing in here comes from the device.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OmegaConfig {
+    /// The vendor's library. `None`: environment and usual places, see [`crate::load::places`].
+    pub library: Option<PathBuf>,
+    /// Serial number of the robot of this bench; any other is refused. `None` takes the only free robot.
+    pub serial: Option<u16>,
+    /// Further type numbers to accept besides 33 (omega.3); legacy firmware is said to report 110.
+    pub also_accept_types: Vec<i32>,
+    /// How the robot stands and what hangs on it.
+    pub mount: Mount,
+    /// Where it may go and how hard it may push.
+    pub envelope: Envelope,
+    /// How its set point moves.
+    pub motion: Motion,
+    /// The gains of the vendor's position regulation.
+    pub gains: Gains,
+    /// When the driver stops the robot by itself.
+    pub trips: Trips,
+    /// The device's own watchdog.
+    pub watchdog: Watchdog,
+    /// Whether the robot may initialise itself, which moves the arm through its workspace.
+    pub initialise: Initialise,
+    /// The process that brakes the arm when this one dies.
+    pub supervisor: Option<SupervisorCommand>,
+    /// How long calls and procedures may take.
+    pub patience: Patience,
+}
+
+impl Default for OmegaConfig {
+    fn default() -> Self {
+        Self {
+            library: None,
+            serial: None,
+            also_accept_types: Vec::new(),
+            mount: Mount::default(),
+            envelope: Envelope::default(),
+            motion: Motion::default(),
+            gains: Gains::default(),
+            trips: Trips::default(),
+            watchdog: Watchdog::ArmMilliseconds(10.0),
+            initialise: Initialise::Never,
+            supervisor: None,
+            patience: Patience::default(),
+        }
+    }
+}
+
+/// How the robot stands and what hangs on it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Mount {
+    /// Rotation of the base about its inverted y axis, degrees: 0 upright, 90 with the plate lying flat. A wrong
+    /// value makes gravity compensation push the arm away.
+    pub device_angle_deg: f64,
+    /// Mass at the end of the arm, kg. `None` keeps what the device reports: its default is not published, and too
+    /// large a value lifts the arm.
+    pub effector_mass_kg: Option<f64>,
+    /// Which axes of the device the robot frame's axes are.
+    pub axes: Axes,
+    /// +1 when the library reports the force with which the motors push the tip, -1 when it reports the force with
+    /// which the tip pushes back. Public sources say the former; to be checked against a load cell.
+    pub reported_force_sign: f64,
+}
+
+impl Default for Mount {
+    fn default() -> Self {
+        Self {
+            device_angle_deg: 0.0,
+            effector_mass_kg: None,
+            axes: Axes::IDENTITY,
+            reported_force_sign: 1.0,
+        }
+    }
+}
+
+/// Where the robot may go and how hard it may push, whatever a run asks for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Envelope {
+    /// Smallest coordinates, robot frame, mm.
+    pub min_mm: [f64; 3],
+    /// Largest coordinates, robot frame, mm.
+    pub max_mm: [f64; 3],
+    /// Fastest set point, mm/s.
+    pub max_speed_mm_s: f64,
+    /// Largest force, N; an omega.3 exerts 12.
+    pub max_force_n: f64,
+    /// Tip force per unit of motor ratio, N. Naively the full 12 N; the true factor depends on the pose and is to be
+    /// measured with a scale.
+    pub n_per_ratio: f64,
+    /// Share of the motor ratio that gravity compensation takes; 0 until measured.
+    pub gravity_ratio: f64,
+    /// Smallest motor ratio with which the arm still carries itself; to be measured.
+    pub least_ratio: f64,
+}
+
+impl Default for Envelope {
+    /// The vendor's public examples keep within ±40 mm of (20, 0, 0) mm.
+    fn default() -> Self {
+        Self {
+            min_mm: [-20.0, -40.0, -40.0],
+            max_mm: [60.0, 40.0, 40.0],
+            max_speed_mm_s: 50.0,
+            max_force_n: 12.0,
+            n_per_ratio: 12.0,
+            gravity_ratio: 0.0,
+            least_ratio: 0.05,
+        }
+    }
+}
+
+impl Envelope {
+    /// Motor ratio that caps the tip at `force_n`: `gravity_ratio + force_n / n_per_ratio`.
+    #[must_use]
+    pub fn ratio_of(&self, force_n: f64) -> f64 {
+        self.gravity_ratio + force_n / self.n_per_ratio
+    }
+
+    /// Largest force whose motor ratio is at most 1, N.
+    #[must_use]
+    pub fn strongest_n(&self) -> f64 {
+        self.max_force_n
+            .min((1.0 - self.gravity_ratio) * self.n_per_ratio)
+    }
+}
+
+/// How the set point moves: along straight lines, streamed to the regulation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Motion {
+    /// Largest acceleration, mm/s².
+    pub acceleration_mm_s2: f64,
+    /// Largest change of acceleration, mm/s³.
+    pub jerk_mm_s3: f64,
+    /// Set points and samples per second; the device's loop runs at about 4 kHz, and samples are promised at half
+    /// of this rate because an operating system without real time sometimes comes late.
+    pub cycle_hz: f64,
+    /// Samples per second while the arm is braked; each costs an exchange on USB.
+    pub parked_hz: f64,
+    /// Largest step of the set point, mm.
+    pub max_step_mm: f64,
+    /// Largest distance of the set point ahead of the measured tip, mm. Set point times stiffness is force.
+    pub max_lead_mm: f64,
+    /// The regulation's own filter is given this many times our speed, acceleration and jerk, so that it rounds but
+    /// does not delay. Never the library's defaults, which reach 1 m/s.
+    pub filter_headroom: f64,
+}
+
+impl Default for Motion {
+    fn default() -> Self {
+        Self {
+            acceleration_mm_s2: 200.0,
+            jerk_mm_s3: 4000.0,
+            cycle_hz: 2000.0,
+            parked_hz: 200.0,
+            max_step_mm: 0.1,
+            max_lead_mm: 2.0,
+            filter_headroom: 2.0,
+        }
+    }
+}
+
+/// Gains of the encoder-space regulation. Units and defaults are not published.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Gains {
+    /// Proportional gain; `None` keeps the library's.
+    pub p: Option<f64>,
+    /// Integral gain. With 0 a blocked tip is held by proportional force alone instead of a force that ramps up.
+    pub i: Option<f64>,
+    /// Derivative gain; `None` keeps the library's.
+    pub d: Option<f64>,
+}
+
+impl Default for Gains {
+    fn default() -> Self {
+        Self {
+            p: None,
+            i: Some(0.0),
+            d: None,
+        }
+    }
+}
+
+/// When the driver brakes the arm by itself.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Trips {
+    /// Brakes at this multiple of the run's force limit; at the limit itself the tip stops and may only rise.
+    pub hard_force_factor: f64,
+    /// Largest force with which the arm may hang still when armed, N: more means that it touches something.
+    pub max_tare_n: f64,
+    /// How long the force is averaged while still after arming, to be subtracted from then on.
+    pub tare: Duration,
+    /// Largest credible speed of the tip between two samples, mm/s.
+    pub max_tip_speed_mm_s: f64,
+    /// Largest credible jump between two samples beyond that, mm.
+    pub max_jump_mm: f64,
+    /// Distance from the set point at which the arm is braked, mm; above [`Motion::max_lead_mm`].
+    pub max_deviation_mm: f64,
+    /// Slowest regulation loop, kHz.
+    pub min_control_khz: f64,
+    /// How far outside the run's box the tip may be measured, mm.
+    pub box_margin_mm: f64,
+}
+
+impl Default for Trips {
+    fn default() -> Self {
+        Self {
+            hard_force_factor: 1.5,
+            max_tare_n: 1.5,
+            tare: Duration::from_millis(300),
+            max_tip_speed_mm_s: 1000.0,
+            max_jump_mm: 2.0,
+            max_deviation_mm: 5.0,
+            min_control_khz: 1.0,
+            box_margin_mm: 2.0,
+        }
+    }
+}
+
+/// The device's own watchdog: without a command for this long it switches its motors off and brakes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Watchdog {
+    /// Armed with this time, ms: at most 31.875, in steps of 0.125.
+    ArmMilliseconds(f64),
+    /// Switched off. Only with a supervisor.
+    Off,
+}
+
+/// Whether the robot may initialise itself.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Initialise {
+    /// Never: an uninitialised robot is refused, and the operator told what to do.
+    Never,
+    /// The sample and the tools are off the bench, hands are clear: the arm may move through its whole workspace.
+    SampleIsOff,
+}
+
+/// The command that runs [`crate::supervisor::supervise`] on its standard input.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SupervisorCommand {
+    /// The program, mostly this one.
+    pub program: PathBuf,
+    /// Its arguments.
+    pub arguments: Vec<String>,
+}
+
+/// How long calls and procedures may take.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Patience {
+    /// A request to the thread that owns the library.
+    pub reply: Duration,
+    /// Opening without initialisation.
+    pub open: Duration,
+    /// Initialisation; its duration is not published.
+    pub initialise: Duration,
+    /// From the start of the regulation to its loop at full rate.
+    pub regulation: Duration,
+    /// Pause between attempts to brake.
+    pub brake_retry: Duration,
+    /// Attempts to brake.
+    pub brake_attempts: u32,
+}
+
+impl Default for Patience {
+    fn default() -> Self {
+        Self {
+            reply: Duration::from_secs(2),
+            open: Duration::from_secs(10),
+            initialise: Duration::from_secs(60),
+            regulation: Duration::from_secs(3),
+            brake_retry: Duration::from_millis(100),
+            brake_attempts: 20,
+        }
+    }
+}
+
+impl OmegaConfig {
+    /// Checks every value.
+    ///
+    /// # Errors
+    /// The first value that makes no sense: name, what was expected, what was found.
+    pub fn check(&self) -> Result<(), BadValue> {
+        let positive = |name, value: f64| {
+            let good = value > 0.0 && value.is_finite();
+            bad_unless(good, name, "above 0 and finite", value)
+        };
+        let e = &self.envelope;
+        for axis in 0..3 {
+            let (min, max) = (e.min_mm[axis], e.max_mm[axis]);
+            let good = min < max && min.is_finite() && max.is_finite();
+            bad_unless(good, "envelope.min_mm", "finite and below max_mm", min)?;
+        }
+        let m = &self.motion;
+        let t = &self.trips;
+        for (name, value) in [
+            ("envelope.max_speed_mm_s", e.max_speed_mm_s),
+            ("envelope.max_force_n", e.max_force_n),
+            ("envelope.n_per_ratio", e.n_per_ratio),
+            ("motion.acceleration_mm_s2", m.acceleration_mm_s2),
+            ("motion.jerk_mm_s3", m.jerk_mm_s3),
+            ("motion.max_step_mm", m.max_step_mm),
+            ("motion.max_lead_mm", m.max_lead_mm),
+            ("trips.max_tare_n", t.max_tare_n),
+            ("trips.max_tip_speed_mm_s", t.max_tip_speed_mm_s),
+            ("trips.max_jump_mm", t.max_jump_mm),
+            ("trips.min_control_khz", t.min_control_khz),
+            ("trips.box_margin_mm", t.box_margin_mm),
+        ] {
+            positive(name, value)?;
+        }
+        let within = |name, value: f64, low: f64, high: f64| {
+            let words = format!("{low} to {high}");
+            bad_unless((low..=high).contains(&value), name, &words, value)
+        };
+        within("envelope.max_force_n", e.max_force_n, 0.0, DEVICE_MAX_N)?;
+        within("envelope.gravity_ratio", e.gravity_ratio, 0.0, 0.9)?;
+        within("envelope.least_ratio", e.least_ratio, 0.0, 1.0)?;
+        within("motion.cycle_hz", m.cycle_hz, 1000.0, 4000.0)?;
+        within("motion.parked_hz", m.parked_hz, 20.0, 1000.0)?;
+        within("motion.filter_headroom", m.filter_headroom, 1.0, 10.0)?;
+        within("trips.hard_force_factor", t.hard_force_factor, 1.0, 3.0)?;
+        let angle = self.mount.device_angle_deg;
+        within("mount.device_angle_deg", angle, -180.0, 180.0)?;
+        if let Some(mass) = self.mount.effector_mass_kg {
+            within("mount.effector_mass_kg", mass, 0.0, 1.0)?;
+        }
+        let sign = self.mount.reported_force_sign;
+        bad_unless(
+            sign.abs() == 1.0,
+            "mount.reported_force_sign",
+            "1 or -1",
+            sign,
+        )?;
+        // The step limit holds at full speed, with a cycle twice as long as it should be.
+        let fastest = m.max_step_mm * m.cycle_hz / 2.0;
+        within("envelope.max_speed_mm_s", e.max_speed_mm_s, 0.0, fastest)?;
+        let lead = m.max_lead_mm;
+        let good = t.max_deviation_mm > lead && t.max_deviation_mm.is_finite();
+        bad_unless(
+            good,
+            "trips.max_deviation_mm",
+            &format!("above motion.max_lead_mm = {lead}"),
+            t.max_deviation_mm,
+        )?;
+        for gain in [self.gains.p, self.gains.i, self.gains.d]
+            .into_iter()
+            .flatten()
+        {
+            bad_unless(
+                gain >= 0.0 && gain.is_finite(),
+                "gains",
+                "0 or more and finite",
+                gain,
+            )?;
+        }
+        match self.watchdog {
+            Watchdog::ArmMilliseconds(ms) => {
+                within("watchdog", ms, 0.125, 31.875)?;
+            }
+            Watchdog::Off => bad_unless(
+                self.supervisor.is_some(),
+                "watchdog",
+                "armed, or a supervisor process to stand in for it",
+                f64::NAN,
+            )?,
+        }
+        Ok(())
+    }
+}
+
+/// Force of an omega.3, N (chai3d and the ROS 2 driver, both public, use this figure).
+const DEVICE_MAX_N: f64 = 12.0;
+
+/// A value of the configuration that makes no sense.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("omega.3 configuration: {name}: expected {expected}, found {found}")]
+pub struct BadValue {
+    /// Which value.
+    pub name: &'static str,
+    /// What is possible.
+    pub expected: String,
+    /// What was given.
+    pub found: String,
+}
+
+fn bad_unless(good: bool, name: &'static str, expected: &str, found: f64) -> Result<(), BadValue> {
+    if good {
+        return Ok(());
+    }
+    Err(BadValue {
+        name,
+        expected: expected.to_owned(),
+        found: found.to_string(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_defaults_are_sound_and_nonsense_is_named() {
+        assert_eq!(OmegaConfig::default().check(), Ok(()));
+        type Spoil = fn(&mut OmegaConfig);
+        let spoilt: [(&str, Spoil); 9] = [
+            ("envelope.min_mm", |c| c.envelope.min_mm[2] = f64::NAN),
+            ("envelope.max_force_n", |c| c.envelope.max_force_n = 13.0),
+            ("envelope.max_speed_mm_s", |c| {
+                c.envelope.max_speed_mm_s = 150.0;
+            }),
+            ("motion.cycle_hz", |c| c.motion.cycle_hz = 100.0),
+            ("trips.max_deviation_mm", |c| c.motion.max_lead_mm = 9.0),
+            ("gains", |c| c.gains.p = Some(-1.0)),
+            ("watchdog", |c| c.watchdog = Watchdog::Off),
+            ("watchdog", |c| {
+                c.watchdog = Watchdog::ArmMilliseconds(40.0);
+            }),
+            ("mount.reported_force_sign", |c| {
+                c.mount.reported_force_sign = 0.0;
+            }),
+        ];
+        for (name, spoil) in spoilt {
+            let mut config = OmegaConfig::default();
+            spoil(&mut config);
+            assert_eq!(config.check().unwrap_err().name, name);
+        }
+    }
+
+    #[test]
+    fn the_ratio_caps_the_force() {
+        let envelope = Envelope {
+            n_per_ratio: 10.0,
+            gravity_ratio: 0.1,
+            ..Envelope::default()
+        };
+        assert!((envelope.ratio_of(2.0) - 0.3).abs() < 1e-12);
+        assert!((envelope.ratio_of(envelope.strongest_n()) - 1.0).abs() < 1e-12);
+    }
+}

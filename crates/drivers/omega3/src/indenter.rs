@@ -1,0 +1,155 @@
+//! The omega.3 behind the `Indenter` trait.
+
+use std::sync::Arc;
+
+use skinrig_device::{
+    DeviceError, Indenter, IndenterCapabilities, MotionLimits, RealClock, RobotSample, limits,
+};
+use skinrig_model::{DeviceIdentity, DeviceRole, Point3, Robot, Setting};
+
+use crate::config::OmegaConfig;
+use crate::error::OmegaError;
+use crate::load;
+use crate::owner::Owner;
+use crate::sdk::Sdk;
+use crate::stream::{CAPACITY, Stream};
+
+/// An open omega.3. Dropped, it brakes the arm and closes the device.
+pub struct Omega {
+    owner: Owner,
+    stream: Arc<Stream>,
+    identity: DeviceIdentity,
+    capabilities: IndenterCapabilities,
+    config: Arc<OmegaConfig>,
+    remarks: Vec<String>,
+}
+
+impl Omega {
+    /// Loads the library, opens the robot, checks it, and leaves it braked. Nothing moves, unless the configuration
+    /// allows initialisation and the robot needs it. Samples carry the time of `clock`.
+    ///
+    /// # Errors
+    /// [`OmegaError`], with the next step.
+    pub fn open(config: OmegaConfig, clock: RealClock) -> Result<Self, OmegaError> {
+        config.check()?;
+        let loaded = load::load(config.library.as_deref())?;
+        let words = loaded.to_string();
+        let advice = loaded.advice.clone();
+        let mut omega = Self::with_sdk(
+            Arc::new(loaded.library),
+            config,
+            loaded.asked,
+            &words,
+            clock,
+        )?;
+        omega.remarks.extend(advice);
+        Ok(omega)
+    }
+
+    /// Opens the robot behind any implementation of the calls; `library` is what a supervisor loads, `words` tells
+    /// people about it.
+    fn with_sdk(
+        sdk: Arc<dyn Sdk>,
+        config: OmegaConfig,
+        library: std::path::PathBuf,
+        words: &str,
+        clock: RealClock,
+    ) -> Result<Self, OmegaError> {
+        let config = Arc::new(config);
+        let stream = Arc::new(Stream::default());
+        let (owner, opened) = Owner::start(
+            sdk,
+            Arc::clone(&config),
+            library,
+            clock,
+            Arc::clone(&stream),
+        )?;
+        let e = &config.envelope;
+        Ok(Self {
+            owner,
+            stream,
+            identity: DeviceIdentity {
+                model: format!("Force Dimension {}", opened.model),
+                serial: opened.serial,
+                firmware: format!("{}, {words}", opened.firmware),
+            },
+            capabilities: IndenterCapabilities {
+                workspace_min_mm: e.min_mm,
+                workspace_max_mm: e.max_mm,
+                max_speed_mm_s: e.max_speed_mm_s,
+                max_force_n: e.strongest_n(),
+                pose_rate_hz: config.motion.cycle_hz / 2.0,
+                reports_force: true,
+            },
+            config,
+            remarks: opened.remarks,
+        })
+    }
+
+    /// What the operator should know about this robot and this library.
+    #[must_use]
+    pub fn remarks(&self) -> &[String] {
+        &self.remarks
+    }
+}
+
+impl Indenter for Omega {
+    fn identity(&self) -> DeviceIdentity {
+        self.identity.clone()
+    }
+
+    fn capabilities(&self) -> IndenterCapabilities {
+        self.capabilities.clone()
+    }
+
+    fn configure(&mut self, wanted: &MotionLimits) -> Result<Vec<Setting>, DeviceError> {
+        let serial = &self.identity.serial;
+        limits::check_limits(serial, &self.capabilities, wanted)?;
+        let envelope = &self.config.envelope;
+        let ratio = envelope.ratio_of(wanted.max_force_n);
+        if ratio < envelope.least_ratio {
+            let least_n = (envelope.least_ratio - envelope.gravity_ratio) * envelope.n_per_ratio;
+            return Err(limits::refused(
+                serial,
+                format!(
+                    "max_force_n of at least {least_n:.2}, below which the arm may not carry itself"
+                ),
+                wanted.max_force_n.to_string(),
+            ));
+        }
+        self.owner.configure(*wanted)
+    }
+
+    fn arm(&mut self) -> Result<(), DeviceError> {
+        self.owner.arm()
+    }
+
+    fn command(&mut self, target: Point3<Robot>, speed_mm_s: f64) -> Result<(), DeviceError> {
+        self.owner.go(target, speed_mm_s)
+    }
+
+    fn poll(&mut self, samples: &mut Vec<RobotSample>) -> Result<(), DeviceError> {
+        let dropped = self.stream.take(samples);
+        if let Some(failure) = self.stream.failure() {
+            return Err(failure);
+        }
+        if dropped > 0 {
+            return Err(DeviceError::Lost {
+                role: DeviceRole::Indenter,
+                serial: self.identity.serial.clone(),
+                detail: format!(
+                    "pose stream: expected to be polled before {CAPACITY} samples waited, {dropped} found no room"
+                ),
+            });
+        }
+        Ok(())
+    }
+
+    fn hold(&mut self) -> Result<(), DeviceError> {
+        self.owner.hold()
+    }
+
+    fn disarm(&mut self) -> Result<(), DeviceError> {
+        self.owner.disarm()
+    }
+}

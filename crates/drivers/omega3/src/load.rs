@@ -1,0 +1,306 @@
+//! Finding and loading the vendor's library.
+#![expect(unsafe_code, reason = "loads a foreign library")]
+
+use std::ffi::{OsString, c_void};
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::ptr::NonNull;
+
+use skinrig_drd_abi::{Functions, Missing, SdkVersion, fns};
+
+use crate::library::Library;
+
+/// Environment variable with the path of the library itself.
+pub const LIBRARY_VARIABLE: &str = "SKINRIG_LIBDRD";
+
+/// Environment variables with the root of an unpacked SDK, the first one first.
+pub const SDK_VARIABLES: [&str; 2] = ["FDSDK", "FORCEDIM_SDK"];
+
+/// The library's file names, the one that names its interface first.
+const NAMES: &[&str] = if cfg!(target_os = "windows") {
+    &["drd64.dll"]
+} else if cfg!(target_os = "macos") {
+    &["libdrd.dylib"]
+} else {
+    &["libdrd.so.3", "libdrd.so"]
+};
+
+/// A loaded library and where it came from.
+#[derive(Debug, Clone)]
+pub struct Loaded {
+    /// The calls.
+    pub library: Library,
+    /// What was asked of the system: a path, or a name that the system looked up.
+    pub asked: PathBuf,
+    /// The file, where the system tells; else as asked.
+    pub path: PathBuf,
+    /// Its version.
+    pub version: SdkVersion,
+    /// What the operator should know about that version.
+    pub advice: Option<String>,
+}
+
+/// One attempt.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Attempt {
+    /// Path or name.
+    pub path: PathBuf,
+    /// What the system said.
+    pub error: String,
+}
+
+/// No usable library.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum LoadError {
+    /// Nothing could be loaded.
+    #[error("expected Force Dimension's libdrd, found none; tried{}; install the SDK, then name its libdrd in the rig file or in {LIBRARY_VARIABLE}, or its directory in FDSDK", list(.0))]
+    Absent(Vec<Attempt>),
+    /// A version whose functions take other arguments under the same names.
+    #[error("{}: expected SDK {} or newer, found {found}: install a newer SDK ({} or newer is advised)", path.display(), SdkVersion::OLDEST, SdkVersion::ADVISED)]
+    TooOld {
+        /// The file.
+        path: PathBuf,
+        /// Its version.
+        found: SdkVersion,
+    },
+    /// Not the whole library.
+    #[error("{}: SDK {found}: {missing}: expected a complete libdrd", path.display())]
+    Incomplete {
+        /// The file.
+        path: PathBuf,
+        /// Its version.
+        found: SdkVersion,
+        /// What it lacks.
+        missing: Missing,
+    },
+    /// A library of another kind.
+    #[error("{}: expected Force Dimension's libdrd, found a library without dhdGetSDKVersion", path.display())]
+    Stranger {
+        /// The file.
+        path: PathBuf,
+    },
+}
+
+fn list(attempts: &[Attempt]) -> String {
+    attempts
+        .iter()
+        .map(|a| format!("\n  {}: {}", a.path.display(), a.error))
+        .collect()
+}
+
+/// Where the library is looked for, in order. A path given explicitly (`configured`, then `SKINRIG_LIBDRD`) is the
+/// only place: what is loaded must not depend on what else lies around. Else the SDK directories of the environment,
+/// the usual directories, and what the system finds by name.
+#[must_use]
+pub fn places(
+    configured: Option<&Path>,
+    variable: impl Fn(&str) -> Option<OsString>,
+) -> Vec<PathBuf> {
+    let set = |name: &str| variable(name).filter(|value| !value.is_empty());
+    if let Some(path) = configured {
+        return vec![path.to_owned()];
+    }
+    if let Some(path) = set(LIBRARY_VARIABLE) {
+        return vec![PathBuf::from(path)];
+    }
+    let mut directories: Vec<PathBuf> = SDK_VARIABLES
+        .iter()
+        .filter_map(|name| set(name))
+        .flat_map(|root| sdk_directories(Path::new(&root)))
+        .collect();
+    if cfg!(unix) {
+        directories.extend(set("HOME").map(|home| Path::new(&home).join(".local/lib")));
+        directories.push(PathBuf::from("/usr/local/lib"));
+    }
+    directories
+        .iter()
+        .flat_map(|directory| NAMES.iter().map(move |name| directory.join(name)))
+        .chain(NAMES.iter().map(PathBuf::from))
+        .collect()
+}
+
+/// Where an unpacked SDK keeps its libraries: `lib/release/<system>-<machine>-<compiler>`.
+fn sdk_directories(root: &Path) -> Vec<PathBuf> {
+    let machine = match std::env::consts::ARCH {
+        "aarch64" if cfg!(target_os = "macos") => "arm64",
+        other => other,
+    };
+    if cfg!(target_os = "windows") {
+        return vec![root.join("bin")];
+    }
+    let system = if cfg!(target_os = "macos") {
+        "mac"
+    } else {
+        "lin"
+    };
+    ["gcc", "clang"]
+        .map(|compiler| root.join(format!("lib/release/{system}-{machine}-{compiler}")))
+        .to_vec()
+}
+
+/// Loads the first library found in [`places`]. It is never unloaded.
+///
+/// # Errors
+/// [`LoadError`]; a library that was found but cannot be used ends the search, so that no other version slips in.
+pub fn load(configured: Option<&Path>) -> Result<Loaded, LoadError> {
+    load_from(places(configured, |name| std::env::var_os(name)))
+}
+
+fn load_from(places: Vec<PathBuf>) -> Result<Loaded, LoadError> {
+    let mut attempts = Vec::new();
+    for path in places {
+        // SAFETY: the operator chose the library; its initialisers are those of the vendor's library.
+        match unsafe { libloading::Library::new(&path) } {
+            Ok(library) => return check(path, library),
+            Err(e) => attempts.push(Attempt {
+                path,
+                error: with_causes(&e),
+            }),
+        }
+    }
+    Err(LoadError::Absent(attempts))
+}
+
+/// The error and what lies beneath: the loader's own words are only there.
+fn with_causes(error: &dyn std::error::Error) -> String {
+    let mut words = error.to_string();
+    let mut cause = error.source();
+    while let Some(next) = cause {
+        words = format!("{words}: {next}");
+        cause = next.source();
+    }
+    words
+}
+
+fn check(asked: PathBuf, library: libloading::Library) -> Result<Loaded, LoadError> {
+    let path = loaded_file(&asked);
+    // SAFETY: the name has this type in every version of the SDK.
+    let version = match unsafe { library.get::<fns::dhdGetSDKVersion>("dhdGetSDKVersion") } {
+        // SAFETY: found in a loaded library under its own name.
+        Ok(ask) => unsafe { SdkVersion::ask(*ask) },
+        Err(_) => return Err(LoadError::Stranger { path }),
+    };
+    // From here on its code may have started threads of its own: it is never unloaded.
+    let library: &'static libloading::Library = Box::leak(Box::new(library));
+    if version < SdkVersion::OLDEST {
+        return Err(LoadError::TooOld {
+            path,
+            found: version,
+        });
+    }
+    let look_up = |name: &'static std::ffi::CStr| {
+        // SAFETY: only the address is taken.
+        unsafe { library.get::<*mut c_void>(name) }
+            .ok()
+            .and_then(|symbol| NonNull::new(*symbol))
+    };
+    // SAFETY: the library is an SDK new enough, its functions are found by their names, and it is never unloaded.
+    let functions = unsafe { Functions::resolve(look_up) };
+    let functions = functions.map_err(|missing| LoadError::Incomplete {
+        path: path.clone(),
+        found: version,
+        missing,
+    })?;
+    let advice = (version < SdkVersion::ADVISED).then(|| {
+        format!(
+            "SDK {version} works, but {} or newer tells more about its failures",
+            SdkVersion::ADVISED
+        )
+    });
+    Ok(Loaded {
+        library: Library::new(functions, version),
+        asked,
+        path,
+        version,
+        advice,
+    })
+}
+
+/// The file behind a name that the system looked up, as far as the system tells (Linux: the process's maps).
+fn loaded_file(asked: &Path) -> PathBuf {
+    let by_name = asked.components().count() == 1;
+    let maps = by_name
+        .then(|| std::fs::read_to_string("/proc/self/maps").ok())
+        .flatten();
+    let found = maps.as_deref().and_then(|maps| {
+        maps.lines()
+            .filter_map(|line| line.find('/').map(|at| Path::new(&line[at..])))
+            .find(|file| {
+                let name = file.file_name().map(|n| n.to_string_lossy().into_owned());
+                name.is_some_and(|n| n.starts_with(&*asked.to_string_lossy()))
+            })
+            .map(Path::to_owned)
+    });
+    found.unwrap_or_else(|| asked.to_owned())
+}
+
+impl fmt::Display for Loaded {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "SDK {} ({})", self.version, self.path.display())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn environment<'a>(
+        pairs: &'a [(&'a str, &'a str)],
+    ) -> impl Fn(&str) -> Option<OsString> + use<'a> {
+        |name| {
+            let found = pairs.iter().find(|(n, _)| *n == name);
+            found.map(|(_, value)| OsString::from(value))
+        }
+    }
+
+    #[test]
+    fn what_is_named_is_the_only_place() {
+        let all = [(LIBRARY_VARIABLE, "/v/libdrd.so"), ("FDSDK", "/sdk")];
+        let named = places(Some(Path::new("/c/libdrd.so")), environment(&all));
+        assert_eq!(named, [PathBuf::from("/c/libdrd.so")]);
+        let named = places(None, environment(&all));
+        assert_eq!(named, [PathBuf::from("/v/libdrd.so")]);
+    }
+
+    #[test]
+    #[cfg(target_os = "linux")]
+    fn else_the_sdk_then_the_usual_places_then_names() {
+        let found = places(
+            None,
+            environment(&[("FORCEDIM_SDK", "/sdk"), ("HOME", "/h")]),
+        );
+        let machine = std::env::consts::ARCH;
+        let first = format!("/sdk/lib/release/lin-{machine}-gcc/libdrd.so.3");
+        assert_eq!(found[0], PathBuf::from(first));
+        assert!(found.contains(&PathBuf::from("/h/.local/lib/libdrd.so.3")));
+        let [.., a, b] = found.as_slice() else {
+            panic!("{found:?}")
+        };
+        assert_eq!((a, b), (&"libdrd.so.3".into(), &"libdrd.so".into()));
+    }
+
+    #[test]
+    fn a_failure_names_every_place_and_the_loaders_words() {
+        let directory = tempfile::tempdir().unwrap();
+        let torn = directory.path().join("libdrd.so");
+        std::fs::write(&torn, b"not a library").unwrap();
+        let absent = directory.path().join("absent.so");
+        let error = load_from(vec![torn.clone(), absent.clone()]).unwrap_err();
+        let words = error.to_string();
+        for part in [
+            torn.to_str().unwrap(),
+            absent.to_str().unwrap(),
+            LIBRARY_VARIABLE,
+        ] {
+            assert!(words.contains(part), "{part} is not in {words}");
+        }
+        let LoadError::Absent(attempts) = error else {
+            panic!("{words}")
+        };
+        let cause = attempts[1].error.strip_prefix("dlopen failed: ");
+        assert!(
+            cfg!(not(unix)) || cause.is_some_and(|c| !c.is_empty()),
+            "{words}"
+        );
+    }
+}

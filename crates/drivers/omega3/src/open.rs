@@ -1,0 +1,448 @@
+//! From a loaded library to a checked, braked robot. Every step is checked; nothing moves unless the configuration
+//! says that the sample is off.
+
+use skinrig_drd_abi::{
+    DEVICE_OMEGA3, DeviceId, ErrorCode, ForceOffCause, StatusField, WATCHDOG_UNIT_US,
+};
+use skinrig_model::Setting;
+
+use crate::config::{Initialise, OmegaConfig, Watchdog};
+use crate::enumerate::{self, Found};
+use crate::error::OmegaError;
+use crate::sdk::{Answer, CallError, Quantity, Sdk};
+
+/// An open robot. Its motors are off.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Opened {
+    /// Its id in calls.
+    pub id: DeviceId,
+    /// Its serial number as text; `unknown` for one that has none to tell.
+    pub serial: String,
+    /// Its model.
+    pub model: String,
+    /// Version of its controller's firmware.
+    pub firmware: String,
+    /// What was set or read, for the record of the session.
+    pub settings: Vec<Setting>,
+    /// What the operator should know.
+    pub remarks: Vec<String>,
+}
+
+/// Opens the robot of `config` and brings it to a known, braked state.
+///
+/// # Errors
+/// [`OmegaError`]; the robot is then closed again.
+pub fn open(sdk: &dyn Sdk, config: &OmegaConfig) -> Result<Opened, OmegaError> {
+    let (id, found) = find(sdk, config)?;
+    let serial = found
+        .serial
+        .map_or_else(|| "unknown".to_owned(), |serial| serial.to_string());
+    let procedure = Procedure {
+        sdk,
+        id,
+        serial: &serial,
+        config,
+    };
+    let mut opened = Opened {
+        id,
+        serial: serial.clone(),
+        model: found.model.unwrap_or_else(|| "omega.3".to_owned()),
+        firmware: String::new(),
+        settings: Vec::new(),
+        remarks: Vec::new(),
+    };
+    match procedure.run(&mut opened, found.type_number) {
+        Ok(()) => Ok(opened),
+        Err(e) => {
+            // Best effort: the first error is the one to tell.
+            let _ = sdk.stop(id);
+            let _ = sdk.close(id);
+            Err(e)
+        }
+    }
+}
+
+/// Opens devices one after the other until the one with the wanted serial number is there.
+fn find(sdk: &dyn Sdk, config: &OmegaConfig) -> Result<(DeviceId, Found), OmegaError> {
+    let expected = config.serial.map_or_else(
+        || "one free robot".to_owned(),
+        |serial| format!("the robot with serial {serial}"),
+    );
+    let count = sdk.device_count().map_err(|cause| OmegaError::Call {
+        serial: "any".to_owned(),
+        step: "count the connected devices",
+        cause,
+    })?;
+    let mut seen: Vec<Found> = Vec::new();
+    let mut taken: Option<(DeviceId, Found)> = None;
+    for index in 0..count {
+        let found = match sdk.open(index) {
+            Err(e) => enumerate::unknown(index, e),
+            Ok(id) => {
+                let found = enumerate::look(sdk, index, id);
+                if config.serial.is_some() && found.serial == config.serial {
+                    return Ok((id, found));
+                }
+                if config.serial.is_none() && taken.is_none() {
+                    seen.push(found.clone());
+                    taken = Some((id, found));
+                    continue;
+                }
+                let _ = sdk.close(id);
+                found
+            }
+        };
+        seen.push(found);
+    }
+    match taken {
+        Some((id, found)) if seen.len() == 1 => return Ok((id, found)),
+        Some((id, _)) => {
+            let _ = sdk.close(id);
+        }
+        None => {}
+    }
+    let next = match seen.as_slice() {
+        [] => "plug the robot in, switch it on, and check your rights (a udev rule for USB vendor 1451)".to_owned(),
+        [only] => only
+            .next_step()
+            .unwrap_or_else(|| "correct the serial in the rig file, or connect that robot".to_owned()),
+        _ => "name the serial of this bench's robot in the rig file, and free that robot".to_owned(),
+    };
+    let list: Vec<String> = seen.iter().map(Found::to_string).collect();
+    Err(OmegaError::NotFound {
+        expected,
+        found: if list.is_empty() {
+            "no device".to_owned()
+        } else {
+            list.join("; ")
+        },
+        next,
+    })
+}
+
+/// The steps between an open device and a known state.
+struct Procedure<'a> {
+    sdk: &'a dyn Sdk,
+    id: DeviceId,
+    serial: &'a str,
+    config: &'a OmegaConfig,
+}
+
+impl Procedure<'_> {
+    fn run(&self, opened: &mut Opened, type_number: Option<i32>) -> Result<(), OmegaError> {
+        self.identify(opened, type_number)?;
+        self.check_status(opened)?;
+        self.mount(opened)?;
+        self.watchdog(opened)?;
+        self.initialised(opened)
+    }
+
+    fn call<T>(&self, step: &'static str, answer: Answer<T>) -> Result<T, OmegaError> {
+        answer.map_err(|cause| OmegaError::Call {
+            serial: self.serial.to_owned(),
+            step,
+            cause,
+        })
+    }
+
+    fn unfit<T>(
+        &self,
+        expected: impl Into<String>,
+        found: impl Into<String>,
+        next: impl Into<String>,
+    ) -> Result<T, OmegaError> {
+        Err(OmegaError::Unfit {
+            serial: self.serial.to_owned(),
+            expected: expected.into(),
+            found: found.into(),
+            next: next.into(),
+        })
+    }
+
+    fn identify(&self, opened: &mut Opened, type_number: Option<i32>) -> Result<(), OmegaError> {
+        let number = match type_number {
+            Some(number) => number,
+            None => self.call("ask for its type", self.sdk.system_type(self.id))?,
+        };
+        if number != DEVICE_OMEGA3 {
+            if !self.config.also_accept_types.contains(&number) {
+                return self.unfit(
+                    format!("an omega.3 (type {DEVICE_OMEGA3})"),
+                    format!("{} (type {number})", opened.model),
+                    "connect an omega.3, or accept this type in the rig file if you know it to be one",
+                );
+            }
+            opened
+                .remarks
+                .push(format!("type {number} is taken for an omega.3"));
+        }
+        let firmware = self.call("ask for its firmware", self.sdk.firmware(self.id))?;
+        opened.firmware = format!("{firmware:.2}");
+        match self.sdk.check_memory(self.id) {
+            Some(answer) => self.call("check its controller's memory", answer)?,
+            None => opened
+                .remarks
+                .push("this SDK cannot check the controller's memory".to_owned()),
+        }
+        let mode = self.call("ask how it is connected", self.sdk.com_mode(self.id))?;
+        opened.settings.push(seen("com_mode", mode));
+        if !self.sdk.is_supported(self.id) {
+            return self.unfit(
+                "a model that the library can regulate",
+                "one that it cannot",
+                "use another SDK version",
+            );
+        }
+        Ok(())
+    }
+
+    fn check_status(&self, opened: &mut Opened) -> Result<(), OmegaError> {
+        let status = self.call("read its status", self.sdk.status(self.id))?;
+        let words = format!("{:?}", status.words());
+        opened.settings.push(seen("status", words));
+        if status.get(StatusField::Power) == Some(0) {
+            return self.unfit("power", "none", "switch the robot on");
+        }
+        if status.is(StatusField::Error) {
+            let next = "power-cycle the robot; if it stays, have it serviced";
+            return self.unfit("no fault", "its controller reports one", next);
+        }
+        if status.get(StatusField::Redundancy) == Some(0) {
+            let next = "have the robot serviced";
+            return self.unfit("encoders that agree", "redundant ones that do not", next);
+        }
+        if let Some(cause) = status
+            .force_off_cause()
+            .filter(|cause| *cause != ForceOffCause::None)
+        {
+            opened.remarks.push(format!(
+                "motors last went off because of {}",
+                cause_words(cause)
+            ));
+        }
+        Ok(())
+    }
+
+    fn mount(&self, opened: &mut Opened) -> Result<(), OmegaError> {
+        let mount = &self.config.mount;
+        let angle = mount.device_angle_deg;
+        opened
+            .settings
+            .extend(self.set(Quantity::DeviceAngleDeg, angle)?);
+        match mount.effector_mass_kg {
+            Some(mass) => opened
+                .settings
+                .extend(self.set(Quantity::EffectorMassKg, mass)?),
+            None => {
+                if let Some(mass) = self.sdk.get(self.id, Quantity::EffectorMassKg) {
+                    let mass = self.call("read its effector's mass", mass)?;
+                    opened
+                        .settings
+                        .push(seen(Quantity::EffectorMassKg.name(), mass));
+                }
+            }
+        }
+        let answer = self.sdk.compensate_gravity(self.id);
+        self.call("compensate gravity", answer)?;
+        let status = self.call("read its status", self.sdk.status(self.id))?;
+        if status.get(StatusField::Gravity) == Some(0) {
+            return Err(OmegaError::ReadBack {
+                serial: self.serial.to_owned(),
+                name: "gravity_compensation".to_owned(),
+                expected: "on".to_owned(),
+                found: "off".to_owned(),
+            });
+        }
+        opened.settings.push(seen("gravity_compensation", "on"));
+        let most = self.config.envelope.max_force_n;
+        opened.settings.extend(self.set(Quantity::MaxForceN, most)?);
+        Ok(())
+    }
+
+    fn set(&self, quantity: Quantity, value: f64) -> Result<Option<Setting>, OmegaError> {
+        set_and_read_back(self.sdk, self.id, quantity, value).map_err(|e| e.into_omega(self.serial))
+    }
+
+    /// Arms the device's own watchdog. A device without one is accepted when a supervisor stands in.
+    fn watchdog(&self, opened: &mut Opened) -> Result<(), OmegaError> {
+        let units = match self.config.watchdog {
+            // Within 1..=255: the configuration was checked.
+            Watchdog::ArmMilliseconds(ms) => (ms * 1e3 / f64::from(WATCHDOG_UNIT_US)).round() as u8,
+            Watchdog::Off => 0,
+        };
+        let answer = self.sdk.enable_expert_mode();
+        self.call("enable expert mode", answer)?;
+        let set = self
+            .sdk
+            .watchdog(self.id)
+            .and_then(|before| self.sdk.set_watchdog(self.id, units).map(|()| before))
+            .and_then(|before| self.sdk.watchdog(self.id).map(|after| (before, after)));
+        match set {
+            Ok((before, after)) if after == units => {
+                opened.settings.push(seen("watchdog_found_125us", before));
+                opened.settings.push(Setting {
+                    name: "watchdog_125us".to_owned(),
+                    requested: units.to_string(),
+                    read_back: after.to_string(),
+                });
+            }
+            Ok((_, after)) => {
+                return Err(OmegaError::ReadBack {
+                    serial: self.serial.to_owned(),
+                    name: "watchdog_125us".to_owned(),
+                    expected: units.to_string(),
+                    found: after.to_string(),
+                });
+            }
+            Err(e) if has_no_watchdog(&e) && self.config.supervisor.is_some() => {
+                let words = "no watchdog in this device: only the supervisor brakes the arm if this program dies";
+                opened.remarks.push(words.to_owned());
+            }
+            Err(e) if has_no_watchdog(&e) => {
+                return self.unfit(
+                    "a watchdog in the device",
+                    format!("none ({e})"),
+                    "configure a supervisor process",
+                );
+            }
+            Err(cause) => return self.call("arm its watchdog", Err(cause)),
+        }
+        let threshold = self.sdk.velocity_threshold(self.id);
+        let threshold = self.call("read its velocity threshold", threshold)?;
+        opened.settings.push(seen("velocity_threshold", threshold));
+        if threshold == 0 {
+            let words = "the device's velocity trip is off (threshold 0)";
+            opened.remarks.push(words.to_owned());
+        }
+        Ok(())
+    }
+
+    fn initialised(&self, opened: &mut Opened) -> Result<(), OmegaError> {
+        if self.sdk.is_initialized(self.id) {
+            return Ok(());
+        }
+        if self.config.initialise == Initialise::Never {
+            return self.unfit(
+                "a robot initialised since power-up",
+                "one that is not (its LED blinks)",
+                "take the sample and tools off, keep hands clear, and start once with initialise: sample_is_off; or \
+                 put the calibration pole into the pit by hand",
+            );
+        }
+        let answer = self.sdk.auto_init(self.id);
+        self.call("initialise itself", answer)?;
+        // It leaves the regulation running.
+        let answer = self.sdk.stop(self.id);
+        self.call("brake after initialisation", answer)?;
+        if !self.sdk.is_initialized(self.id) {
+            let next = "power-cycle the robot and try again";
+            return self.unfit("an initialised robot", "one that is still not", next);
+        }
+        opened
+            .remarks
+            .push("the robot initialised itself".to_owned());
+        Ok(())
+    }
+}
+
+fn has_no_watchdog(error: &CallError) -> bool {
+    matches!(
+        error.code,
+        ErrorCode::NOT_AVAILABLE | ErrorCode::NOT_IMPLEMENTED
+    )
+}
+
+/// A value that was only read.
+fn seen(name: &str, value: impl ToString) -> Setting {
+    Setting {
+        name: name.to_owned(),
+        requested: "as found".to_owned(),
+        read_back: value.to_string(),
+    }
+}
+
+/// A quantity did not take.
+pub(crate) enum NotSet {
+    /// A call failed.
+    Call(CallError),
+    /// Another value came back.
+    Differs {
+        name: &'static str,
+        expected: String,
+        found: String,
+    },
+}
+
+impl NotSet {
+    pub(crate) fn into_omega(self, serial: &str) -> OmegaError {
+        let serial = serial.to_owned();
+        match self {
+            Self::Call(cause) => OmegaError::Call {
+                serial,
+                step: "take a setting",
+                cause,
+            },
+            Self::Differs {
+                name,
+                expected,
+                found,
+            } => OmegaError::ReadBack {
+                serial,
+                name: name.to_owned(),
+                expected,
+                found,
+            },
+        }
+    }
+}
+
+/// Largest relative difference between written and read: a device may keep single precision.
+const READ_BACK: f64 = 1e-4;
+
+/// True when `found` is `wanted` as far as a device can keep it.
+pub(crate) fn agrees(wanted: f64, found: f64) -> bool {
+    (wanted - found).abs() <= READ_BACK * wanted.abs().max(1e-3)
+}
+
+/// Sets a quantity and compares what comes back. `None`: this version of the library lacks it.
+pub(crate) fn set_and_read_back(
+    sdk: &dyn Sdk,
+    id: DeviceId,
+    quantity: Quantity,
+    value: f64,
+) -> Result<Option<Setting>, NotSet> {
+    let Some(answer) = sdk.set(id, quantity, value) else {
+        return Ok(None);
+    };
+    answer.map_err(NotSet::Call)?;
+    let Some(answer) = sdk.get(id, quantity) else {
+        return Ok(None);
+    };
+    let found = answer.map_err(NotSet::Call)?;
+    if !agrees(value, found) {
+        return Err(NotSet::Differs {
+            name: quantity.name(),
+            expected: value.to_string(),
+            found: found.to_string(),
+        });
+    }
+    Ok(Some(Setting {
+        name: quantity.name().to_owned(),
+        requested: value.to_string(),
+        read_back: found.to_string(),
+    }))
+}
+
+/// Why motors went off, for people.
+pub(crate) fn cause_words(cause: ForceOffCause) -> String {
+    match cause {
+        ForceOffCause::None => "no cause told".to_owned(),
+        ForceOffCause::Button => "the force button on the base".to_owned(),
+        ForceOffCause::Velocity => "the velocity trip: an axis was too fast".to_owned(),
+        ForceOffCause::Watchdog => "the watchdog: no command arrived in time".to_owned(),
+        ForceOffCause::Software => "a program".to_owned(),
+        ForceOffCause::UsbDisconnect => "USB: unplugged".to_owned(),
+        ForceOffCause::Deadman => "the dead-man's switch".to_owned(),
+        ForceOffCause::Unknown(code) => format!("a cause with the unknown number {code}"),
+    }
+}

@@ -1,0 +1,235 @@
+//! A small process that brakes the arm when the process that drives it dies.
+//!
+//! A second process cannot open a device while the first one holds it. So the supervisor waits on a pipe from the
+//! driver; when the pipe ends without a goodbye, the driver is dead and the device free: the supervisor opens it and
+//! brakes until the robot confirms. It has its own process group, so that Ctrl-C in a terminal does not end it first.
+//!
+//! It does not help against a driver that hangs while alive (the driver's own time limits do), nor against a broken
+//! computer (the device's watchdog does).
+
+use std::io::{BufRead, BufReader, Read, Write};
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStdin, Command, Stdio};
+use std::sync::mpsc;
+use std::time::Duration;
+
+use crate::brake::brake;
+use crate::config::{Patience, SupervisorCommand};
+use crate::error::OmegaError;
+use crate::load;
+use crate::sdk::Sdk;
+
+const GREETING: &str = "skinrig supervise-arm 1";
+const READY: &str = "ready";
+const GOODBYE: &str = "goodbye";
+
+/// The driver's end: the running supervisor.
+#[derive(Debug)]
+pub(crate) struct Supervisor {
+    child: Child,
+    pipe: ChildStdin,
+}
+
+impl Supervisor {
+    /// Starts the supervisor for the robot with `serial` and waits until it has loaded the library.
+    pub(crate) fn start(
+        command: &SupervisorCommand,
+        library: &Path,
+        serial: Option<u16>,
+        patience: Duration,
+    ) -> Result<Self, OmegaError> {
+        let fail = |what: &str, e: &dyn std::fmt::Display| {
+            OmegaError::Supervisor(format!("{what} {}: {e}", command.program.display()))
+        };
+        let mut process = Command::new(&command.program);
+        process
+            .args(&command.arguments)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped());
+        #[cfg(unix)]
+        std::os::unix::process::CommandExt::process_group(&mut process, 0);
+        let mut child = process.spawn().map_err(|e| fail("cannot start", &e))?;
+        let (Some(mut pipe), Some(answers)) = (child.stdin.take(), child.stdout.take()) else {
+            return Err(fail("cannot start", &"it has no pipes"));
+        };
+        let serial = serial.map_or_else(|| "any".to_owned(), |s| s.to_string());
+        let order = format!("{GREETING}\n{}\n{serial}\n", library.display());
+        pipe.write_all(order.as_bytes())
+            .and_then(|()| pipe.flush())
+            .map_err(|e| fail("cannot write to", &e))?;
+        match first_line(answers, patience) {
+            Some(line) if line == READY => Ok(Self { child, pipe }),
+            other => {
+                let _ = child.kill();
+                let _ = child.wait();
+                let found = other.unwrap_or_else(|| "nothing".to_owned());
+                Err(fail(
+                    "no answer from",
+                    &format!("expected {READY:?}, found {found:?}"),
+                ))
+            }
+        }
+    }
+
+    /// Whether it still runs.
+    pub(crate) fn check(&mut self) -> Result<(), String> {
+        match self.child.try_wait() {
+            Ok(None) => Ok(()),
+            Ok(Some(status)) => Err(format!("it ended with {status}")),
+            Err(e) => Err(e.to_string()),
+        }
+    }
+
+    /// The arm is braked and the device closed: it may go.
+    pub(crate) fn dismiss(mut self) {
+        let said = writeln!(self.pipe, "{GOODBYE}").and_then(|()| self.pipe.flush());
+        drop(self.pipe);
+        if said.is_ok() {
+            let _ = self.child.wait();
+        }
+    }
+}
+
+/// The first line of `answers`, read on a thread of its own so that the wait has an end.
+fn first_line(answers: impl Read + Send + 'static, patience: Duration) -> Option<String> {
+    let (tell, hear) = mpsc::sync_channel(1);
+    let reader = move || {
+        let mut line = String::new();
+        if BufReader::new(answers).read_line(&mut line).is_ok() {
+            let _ = tell.send(line.trim_end().to_owned());
+        }
+    };
+    std::thread::Builder::new()
+        .name("omega3-supervisor".to_owned())
+        .spawn(reader)
+        .ok()?;
+    hear.recv_timeout(patience).ok()
+}
+
+/// How a watch ended.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Watch {
+    /// The driver said goodbye: the arm is braked.
+    Dismissed,
+    /// The driver died; the arm was braked after this many attempts.
+    Braked {
+        /// Attempts to open and brake.
+        attempts: u32,
+    },
+}
+
+/// A watch that could not do its work.
+#[derive(Debug, thiserror::Error)]
+pub enum WatchError {
+    /// Not started by a driver.
+    #[error("expected the orders of a driver on standard input, found {0}")]
+    Orders(String),
+    /// No usable library.
+    #[error(transparent)]
+    Load(#[from] load::LoadError),
+    /// The driver died and the arm could not be braked.
+    #[error(
+        "THE ARM MAY BE LIVE: the driver died and the arm could not be braked in {attempts} attempts ({last}); press the force button on its base or switch it off at the mains"
+    )]
+    MayBeLive {
+        /// How often it was tried.
+        attempts: u32,
+        /// What the last attempt met.
+        last: String,
+    },
+}
+
+/// Attempts to open and brake the arm of a dead driver, 100 ms apart: one minute.
+const ATTEMPTS: u32 = 600;
+
+/// The supervisor process: waits on `orders` (standard input) for the driver's goodbye or its death, and in the
+/// second case brakes the arm. Progress for people goes to `log`.
+///
+/// # Errors
+/// [`WatchError`]; whoever calls prints it as loudly as possible and exits with a failure.
+pub fn supervise(
+    orders: impl Read,
+    mut answers: impl Write,
+    mut log: impl Write,
+) -> Result<Watch, WatchError> {
+    let mut orders = BufReader::new(orders);
+    let mut line = || {
+        let mut line = String::new();
+        orders
+            .read_line(&mut line)
+            .map(|_| line.trim_end().to_owned())
+    };
+    let mut order = || line().map_err(|e| WatchError::Orders(e.to_string()));
+    let greeting = order()?;
+    if greeting != GREETING {
+        return Err(WatchError::Orders(format!("{greeting:?}")));
+    }
+    let library = PathBuf::from(order()?);
+    let serial = match order()?.as_str() {
+        "any" => None,
+        text => Some(
+            text.parse::<u16>()
+                .map_err(|_| WatchError::Orders(format!("serial {text:?}")))?,
+        ),
+    };
+    let loaded = load::load(Some(&library))?;
+    writeln!(answers, "{READY}")
+        .and_then(|()| answers.flush())
+        .map_err(|e| WatchError::Orders(e.to_string()))?;
+    // A broken pipe is the driver's death as well.
+    if line().is_ok_and(|word| word == GOODBYE) {
+        return Ok(Watch::Dismissed);
+    }
+    // Nobody may read the log any more; braking matters more.
+    let _ = writeln!(
+        log,
+        "supervisor: the driver of the arm died: braking the arm"
+    );
+    let attempts = rescue(&loaded.library, serial)?;
+    let _ = writeln!(log, "supervisor: the arm is braked ({attempts} attempts)");
+    Ok(Watch::Braked { attempts })
+}
+
+fn rescue(sdk: &dyn Sdk, serial: Option<u16>) -> Result<u32, WatchError> {
+    let once = Patience {
+        brake_attempts: 1,
+        ..Patience::default()
+    };
+    let mut last = "no device".to_owned();
+    for attempt in 1..=ATTEMPTS {
+        match brake_all(sdk, serial, &once) {
+            Ok(()) => return Ok(attempt),
+            Err(why) => last = why,
+        }
+        std::thread::sleep(once.brake_retry);
+    }
+    Err(WatchError::MayBeLive {
+        attempts: ATTEMPTS,
+        last,
+    })
+}
+
+/// Opens the robot (every one, when its serial is not known) and brakes it.
+fn brake_all(sdk: &dyn Sdk, serial: Option<u16>, once: &Patience) -> Result<(), String> {
+    let count = sdk.device_count().map_err(|e| e.to_string())?;
+    let mut answer = Err(format!("it is not among the {count} connected devices"));
+    for index in 0..count {
+        let id = match sdk.open(index) {
+            Ok(id) => id,
+            Err(e) => {
+                answer = Err(e.to_string());
+                continue;
+            }
+        };
+        // A robot whose serial cannot be read may be the one: braking another one that is free harms nobody.
+        let ours = serial.is_none_or(|wanted| sdk.serial(id).is_ok_and(|found| found == wanted));
+        if ours {
+            answer = brake(sdk, id, once, |_| ()).map(drop).map_err(|e| e.last);
+        }
+        let _ = sdk.close(id);
+        if ours && answer.is_ok() && serial.is_some() {
+            return Ok(());
+        }
+    }
+    answer
+}
