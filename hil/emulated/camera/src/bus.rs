@@ -1,0 +1,363 @@
+//! The bus: makes the devices, answers for them, and starts processes that see them.
+
+use std::collections::BTreeMap;
+use std::ffi::OsStr;
+use std::io::{self, BufRead, BufReader, Write};
+use std::os::unix::net::{UnixListener, UnixStream};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread;
+
+use rustix::io::Errno;
+
+use crate::config::{Access, BusConfig, DeviceConfig};
+use crate::content::Source;
+use crate::evk1::{Evk1, SyncLine, produce};
+use crate::steer::{Addressed, Answer, Observation, Order, ROOT_VARIABLE, Remote};
+use crate::treuzell::Treuzell;
+use crate::usb::function::Function;
+use crate::usb::queues::Queues;
+use crate::usb::readiness::Readiness;
+use crate::usb::serve::{Node, listen};
+use crate::usb::testbed::{Address, TestBed};
+use crate::world::{Edge, World};
+
+/// Names the preload library where it is not beside the program.
+const SHIM_VARIABLE: &str = "SKINRIG_USBSHIM";
+const SHIM: &str = "libusbshim.so";
+
+/// A bus cannot be made.
+#[derive(Debug, thiserror::Error)]
+pub enum BusError {
+    /// The machine refuses.
+    #[error("emulated bus: {0}")]
+    Io(#[from] io::Error),
+    /// Two devices of one name, or a number that is none.
+    #[error("emulated bus: expected {expected}, found {found}")]
+    Config {
+        /// What would do.
+        expected: String,
+        /// What was given.
+        found: String,
+    },
+    /// What the pixels should do cannot be done.
+    #[error("emulated camera: {0}")]
+    Content(String),
+    /// The preload library is not there.
+    #[error("emulated bus: expected {SHIM} at {}; build skinrig-usbshim or set {SHIM_VARIABLE}", .0.display())]
+    NoShim(PathBuf),
+}
+
+enum Device {
+    Evk1(Arc<Evk1>),
+    Treuzell(Arc<Treuzell>),
+}
+
+struct Plugged {
+    config: DeviceConfig,
+    at: Address,
+    device: Device,
+    queues: Arc<Queues>,
+    present: bool,
+}
+
+struct Inner {
+    bed: TestBed,
+    world: Arc<World>,
+    sync_line: Arc<SyncLine>,
+    devices: Mutex<BTreeMap<String, Plugged>>,
+    closed: AtomicBool,
+}
+
+/// An emulated bus; everything on it ends with this value.
+pub struct Bus(Arc<Inner>);
+
+impl Bus {
+    /// Makes a bus and plugs its devices in.
+    ///
+    /// # Errors
+    /// When the configuration contradicts itself or the machine refuses.
+    pub fn start(config: &BusConfig) -> Result<Self, BusError> {
+        let inner = Arc::new(Inner {
+            bed: TestBed::create()?,
+            world: Arc::default(),
+            sync_line: Arc::default(),
+            devices: Mutex::default(),
+            closed: AtomicBool::new(false),
+        });
+        let root = inner.bed.root();
+        inner
+            .world
+            .listen(UnixListener::bind(root.join("world"))?)?;
+        let listener = UnixListener::bind(root.join("steer"))?;
+        for (n, device) in config.devices.iter().enumerate() {
+            let at = Address {
+                port: n as u8 + 1,
+                number: n as u8 + 2,
+            };
+            inner.plug(device, at)?;
+        }
+        let serving = Arc::clone(&inner);
+        thread::Builder::new()
+            .name("steer".into())
+            .spawn(move || serving.take_orders(&listener))?;
+        Ok(Self(inner))
+    }
+
+    /// The folder that stands for `/sys` and `/dev`.
+    #[must_use]
+    pub fn root(&self) -> &Path {
+        self.0.bed.root()
+    }
+
+    /// What reaches the cameras from outside.
+    #[must_use]
+    pub fn world(&self) -> &World {
+        &self.0.world
+    }
+
+    /// A line to steer the devices by.
+    ///
+    /// # Errors
+    /// When the machine refuses.
+    pub fn remote(&self) -> io::Result<Remote> {
+        Remote::connect(self.root())
+    }
+
+    /// A command that sees this bus in place of the machine's.
+    ///
+    /// # Errors
+    /// [`BusError::NoShim`].
+    pub fn command(&self, program: impl AsRef<OsStr>) -> Result<Command, BusError> {
+        let mut command = Command::new(program);
+        command
+            .env("LD_PRELOAD", shim()?)
+            .env(ROOT_VARIABLE, self.root());
+        Ok(command)
+    }
+}
+
+impl Drop for Bus {
+    fn drop(&mut self) {
+        let inner = &self.0;
+        inner.closed.store(true, Ordering::Relaxed);
+        inner.world.close();
+        let serials: Vec<String> = inner.lock().keys().cloned().collect();
+        for serial in serials {
+            // One that is unplugged already stays so.
+            let _ = inner.obey(&serial, Order::Unplug);
+        }
+        for name in ["world", "steer"] {
+            // Wakes the listener, which then ends.
+            let _ = UnixStream::connect(inner.bed.root().join(name));
+        }
+    }
+}
+
+/// The preload library: where the variable `SKINRIG_USBSHIM` says, else beside this program, where cargo puts it.
+///
+/// # Errors
+/// [`BusError::NoShim`].
+pub fn shim() -> Result<PathBuf, BusError> {
+    if let Some(path) = std::env::var_os(SHIM_VARIABLE) {
+        let path = PathBuf::from(path);
+        return if path.is_file() {
+            Ok(path)
+        } else {
+            Err(BusError::NoShim(path))
+        };
+    }
+    let program = std::env::current_exe()?;
+    let folder = program.parent().unwrap_or(Path::new("."));
+    // A test is in `deps` itself, a program above it.
+    let candidates = [folder.join(SHIM), folder.join("deps").join(SHIM)];
+    let [first, second] = &candidates;
+    if second.is_file() && !first.is_file() {
+        return Ok(second.clone());
+    }
+    if first.is_file() {
+        return Ok(first.clone());
+    }
+    Err(BusError::NoShim(first.clone()))
+}
+
+impl Inner {
+    fn lock(&self) -> std::sync::MutexGuard<'_, BTreeMap<String, Plugged>> {
+        self.devices.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn plug(&self, config: &DeviceConfig, at: Address) -> Result<(), BusError> {
+        let name = config.serial().to_owned();
+        if self.lock().get(&name).is_some_and(|d| d.present) {
+            return Err(BusError::Config {
+                expected: "a name for each device".into(),
+                found: format!("two times {name}"),
+            });
+        }
+        let ready = Readiness::create(&self.bed.node(at))?;
+        let (device, function, queues): (Device, Arc<dyn Function>, Arc<Queues>) = match config {
+            DeviceConfig::Evk1(config) => {
+                let serial =
+                    u32::from_str_radix(&config.serial, 16).map_err(|_| BusError::Config {
+                        expected: "a serial number of hexadecimal digits".into(),
+                        found: config.serial.clone(),
+                    })?;
+                let source = Source::new(&config.content)?;
+                let queues = Arc::new(Queues::new(config.fifo_bytes, ready));
+                match config.access {
+                    Access::Free => {}
+                    Access::Busy => queues.occupy(),
+                    Access::NotPermitted => self.bed.refuse(at, Errno::ACCESS)?,
+                }
+                let camera = Arc::new(Evk1::new(
+                    (**config).clone(),
+                    serial,
+                    Arc::clone(&queues),
+                    Arc::clone(&self.world),
+                    Arc::clone(&self.sync_line),
+                ));
+                let producing = Arc::clone(&camera);
+                thread::Builder::new()
+                    .name(format!("evk1 {}", config.serial))
+                    .spawn(move || produce(&producing, source))?;
+                (Device::Evk1(Arc::clone(&camera)), camera, queues)
+            }
+            DeviceConfig::Treuzell { .. } => {
+                let camera = Arc::new(Treuzell::new());
+                let queues = Arc::new(Queues::new(0, ready));
+                (Device::Treuzell(Arc::clone(&camera)), camera, queues)
+            }
+        };
+        let node = Node {
+            function: Arc::clone(&function),
+            queues: Arc::clone(&queues),
+        };
+        listen(node, UnixListener::bind(self.bed.socket(at))?)?;
+        self.bed.add(at, function.descriptors())?;
+        let plugged = Plugged {
+            config: config.clone(),
+            at,
+            device,
+            queues,
+            present: true,
+        };
+        self.lock().insert(name, plugged);
+        Ok(())
+    }
+
+    fn take_orders(self: &Arc<Self>, listener: &UnixListener) {
+        while let Ok((stream, _)) = listener.accept() {
+            if self.closed.load(Ordering::Relaxed) {
+                return;
+            }
+            let inner = Arc::clone(self);
+            let serving = move || {
+                // A line that breaks is a process that ended.
+                let _ = inner.converse(stream);
+            };
+            if thread::Builder::new()
+                .name("steer line".into())
+                .spawn(serving)
+                .is_err()
+            {
+                return;
+            }
+        }
+    }
+
+    fn converse(&self, mut stream: UnixStream) -> io::Result<()> {
+        for line in BufReader::new(stream.try_clone()?).lines() {
+            let answer = match serde_json::from_str::<Addressed>(&line?) {
+                Ok((serial, order)) => self
+                    .obey(&serial, order)
+                    .unwrap_or_else(|e| Answer::Failed(e.to_string())),
+                Err(e) => Answer::Failed(e.to_string()),
+            };
+            let mut text = serde_json::to_string(&answer)?;
+            text.push('\n');
+            stream.write_all(text.as_bytes())?;
+        }
+        Ok(())
+    }
+
+    fn obey(&self, serial: &str, order: Order) -> Result<Answer, BusError> {
+        let unknown = || BusError::Config {
+            expected: "a device of this bus".into(),
+            found: serial.to_owned(),
+        };
+        let mut devices = self.lock();
+        let newest = devices.values().map(|d| d.at.number).max();
+        let plugged = devices.get_mut(serial).ok_or_else(unknown)?;
+        let camera = match &plugged.device {
+            Device::Evk1(camera) => Ok(camera),
+            Device::Treuzell(_) => Err(BusError::Config {
+                expected: "an order for an EVK1".into(),
+                found: format!("{order:?} for {serial}"),
+            }),
+        };
+        match order {
+            Order::Unplug => {
+                if plugged.present {
+                    plugged.present = false;
+                    match &plugged.device {
+                        Device::Evk1(camera) => camera.unplug(),
+                        Device::Treuzell(_) => plugged.queues.unplug(),
+                    }
+                    // Wakes the listener, which then ends.
+                    let _ = UnixStream::connect(self.bed.socket(plugged.at));
+                    self.bed.remove(plugged.at)?;
+                }
+            }
+            Order::Plug => {
+                let config = plugged.config.clone();
+                let at = Address {
+                    port: plugged.at.port,
+                    number: newest.unwrap_or(1) + 1,
+                };
+                drop(devices);
+                self.plug(&config, at)?;
+            }
+            Order::Stall => plugged.queues.stall(),
+            Order::Cut(bytes) => plugged.queues.cut_next(bytes),
+            Order::Garbage(words) => camera?.lock().faults.garbage.extend(words),
+            Order::Stick(address) => {
+                camera?.lock().faults.stuck.insert(address);
+            }
+            Order::Silence(on) => camera?.lock().faults.silent = on,
+            Order::FailReads(on) => camera?.lock().faults.failing_reads = on,
+            Order::Edge {
+                channel,
+                rising,
+                at_ns,
+            } => {
+                let edge = Edge {
+                    channel,
+                    rising,
+                    at_ns,
+                };
+                self.world.edge(serial, edge);
+            }
+            Order::Observe => {
+                let counters = camera?.lock().counters;
+                let handed = plugged.queues.handed();
+                return Ok(Answer::Observed(Observation { handed, counters }));
+            }
+            Order::Journal => {
+                return Ok(Answer::Journal(match &plugged.device {
+                    Device::Evk1(camera) => camera.lock().journal.clone(),
+                    Device::Treuzell(camera) => camera.journal(),
+                }));
+            }
+            Order::Register(address) => {
+                let value = camera?.lock().registers.read(address);
+                return value.map(Answer::Register).ok_or_else(|| BusError::Config {
+                    expected: "a register of an EVK1".into(),
+                    found: format!("{address:#06x}"),
+                });
+            }
+        }
+        Ok(Answer::Done)
+    }
+}

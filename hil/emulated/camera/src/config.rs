@@ -1,0 +1,221 @@
+//! What is on the bus: devices, what they show, how their clocks run.
+//!
+//! The same values as JSON are the input of `emulated-cameras`; every key but `kind` and `serial` has a default.
+
+use std::path::PathBuf;
+
+use serde::{Deserialize, Serialize};
+use skinrig_model::{CameraId, RigidTransform, Robot, SimLevel, Skin};
+
+/// A bus and its devices, in the order of their ports.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BusConfig {
+    /// The devices.
+    pub devices: Vec<DeviceConfig>,
+}
+
+/// One device.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum DeviceConfig {
+    /// A Prophesee EVK1 Gen3.1.
+    Evk1(Box<Evk1Config>),
+    /// Another maker's protocol under the same vendor and product number (EVK3): it records every vendor request,
+    /// none of which may reach it.
+    Treuzell {
+        /// Its name on this bus.
+        serial: String,
+    },
+}
+
+impl DeviceConfig {
+    /// The name under which the device is steered.
+    #[must_use]
+    pub fn serial(&self) -> &str {
+        match self {
+            Self::Evk1(config) => &config.serial,
+            Self::Treuzell { serial } => serial,
+        }
+    }
+}
+
+impl From<Evk1Config> for DeviceConfig {
+    fn from(config: Evk1Config) -> Self {
+        Self::Evk1(Box::new(config))
+    }
+}
+
+/// Who may use a device.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Access {
+    /// Whoever opens it.
+    #[default]
+    Free,
+    /// Another program holds its interface (claim: EBUSY).
+    Busy,
+    /// The user may not open it, as without an udev rule (open: EACCES).
+    NotPermitted,
+}
+
+/// When bytes are made.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Pacing {
+    /// At the rate of real time. A host that is too slow loses events, as with a real camera.
+    #[default]
+    RealTime,
+    /// As fast as the host takes them: the camera's time waits. Nothing is ever lost.
+    HostTime,
+}
+
+/// What the pixels do.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
+pub enum Content {
+    /// Nothing.
+    #[default]
+    Silence,
+    /// Events at random pixels and times.
+    Noise {
+        /// Mean rate of the whole sensor, events/s; up to a few million.
+        events_per_s: f64,
+        /// Seed.
+        seed: u64,
+    },
+    /// A fixed pattern at a fixed rate, cheap to make: for the sensor's maximum of 50 Mev/s and beyond.
+    Dense {
+        /// Rate, 10^6 events/s.
+        mev_per_s: f64,
+    },
+    /// The events of an EVT2 RAW file, shifted so that the first comes at the start; silence after the last.
+    File {
+        /// The file.
+        path: PathBuf,
+    },
+    /// What a camera of the simulated bench sees of the tip that [`world`](crate::world) reports.
+    Scene(Box<SceneContent>),
+}
+
+/// A camera of the simulated bench.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SceneContent {
+    /// Which of the two.
+    pub camera: CameraId,
+    /// Seed of the bench: true geometry, noise, hot pixels.
+    pub seed: u64,
+    /// `geometric` or `optical`.
+    pub level: SimLevel,
+    /// Where the skin lies in the robot's frame; absent: as in the simulated bench.
+    #[serde(default)]
+    pub robot_from_skin: Option<RigidTransform<Robot, Skin>>,
+}
+
+/// An EVK1. Defaults marked *assumed* are not known from public sources.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Evk1Config {
+    /// Eight hexadecimal digits, as the software prints register 0x0020.
+    pub serial: String,
+    /// USB product number: 0x00f4, and 0x00f1 or 0x00bc on other boards.
+    pub product_id: u16,
+    /// Speed of the connection, Mbit/s: 5000, or 480 on a USB 2 port.
+    pub speed_mbit: u32,
+    /// Who may use it.
+    pub access: Access,
+    /// Answer to request 0x70: 2 for an EVK1, 3 for a CX3 board.
+    pub board_version: u16,
+    /// Answer to request 0x72: 0x1c for Gen3.1, 0x11 for the rescue image.
+    pub system_id: u16,
+    /// Register 0x0804: major << 16, minor << 8, micro.
+    pub fpga_version: u32,
+    /// Register 0x0218. That of the sensor without exposure measurement is not known; the default is the register
+    /// map's.
+    pub chip_id: u32,
+    /// The FPGA has booted this long after plugging, ms.
+    pub boot_ms: u64,
+    /// Its clock is fast by this, parts per million.
+    pub drift_ppm: f64,
+    /// Its time at the first start, µs.
+    pub origin_us: u64,
+    /// Whether its time begins again at every start, or goes on meanwhile (not known; both occur here).
+    pub time_restarts: bool,
+    /// A trigger edge is seen this late, ns (assumed 0).
+    pub trigger_delay_ns: u32,
+    /// And later by up to this, uniformly, ns (assumed 0).
+    pub trigger_jitter_ns: u32,
+    /// Bytes that it holds while no transfer waits (assumed 512 KiB).
+    pub fifo_bytes: usize,
+    /// Words of an earlier session that its buffers still hold.
+    pub stale_words: usize,
+    /// When bytes are made.
+    pub pacing: Pacing,
+    /// What the pixels do.
+    pub content: Content,
+}
+
+impl Default for Evk1Config {
+    fn default() -> Self {
+        Self {
+            serial: "00001621".to_owned(),
+            product_id: 0x00f4,
+            speed_mbit: 5000,
+            access: Access::Free,
+            board_version: 2,
+            system_id: 0x1c,
+            fpga_version: 0x0003_0000,
+            chip_id: 0x9020_0c03,
+            boot_ms: 0,
+            drift_ppm: 0.0,
+            origin_us: 0,
+            time_restarts: true,
+            trigger_delay_ns: 0,
+            trigger_jitter_ns: 0,
+            fifo_bytes: 512 << 10,
+            stale_words: 0,
+            pacing: Pacing::RealTime,
+            content: Content::Silence,
+        }
+    }
+}
+
+impl Evk1Config {
+    /// A camera with this serial number and everything else by default.
+    #[must_use]
+    pub fn new(serial: &str) -> Self {
+        Self {
+            serial: serial.to_owned(),
+            ..Self::default()
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn json_names_what_differs_from_the_defaults() {
+        let text = r#"{"devices": [
+            {"kind": "evk1", "serial": "00001621", "drift_ppm": 12.5,
+             "content": {"kind": "scene", "camera": "camera2", "seed": 7, "level": "geometric"}},
+            {"kind": "treuzell", "serial": "evk3"}]}"#;
+        let bus: BusConfig = serde_json::from_str(text).unwrap();
+        let DeviceConfig::Evk1(camera) = &bus.devices[0] else {
+            panic!("{bus:?}")
+        };
+        assert_eq!(camera.drift_ppm, 12.5);
+        assert_eq!(camera.fifo_bytes, Evk1Config::default().fifo_bytes);
+        let Content::Scene(scene) = &camera.content else {
+            panic!("{camera:?}")
+        };
+        assert_eq!(scene.camera, CameraId::ALL[1]);
+        let again: BusConfig = serde_json::from_str(&serde_json::to_string(&bus).unwrap()).unwrap();
+        assert_eq!(again, bus);
+        let wrong = text.replace("drift_ppm", "drift");
+        let error = serde_json::from_str::<BusConfig>(&wrong).unwrap_err();
+        assert!(error.to_string().contains("drift"), "{error}");
+    }
+}

@@ -1,0 +1,94 @@
+//! What a camera of the simulated bench sees of a tip that moves in real time.
+
+use skinrig_model::{Point3, RigidTransform, Robot, SimLevel, Skin};
+use skinrig_sim::SimConfig;
+use skinrig_sim::geometric::GeometricModel;
+use skinrig_sim::optical::OpticalModel;
+use skinrig_sim::random::{Purpose, derive_seed};
+use skinrig_sim::scene::{GRID_NS, PixelEvent, PixelModel, SceneConfig, TipSample};
+
+use crate::bus::BusError;
+use crate::config::SceneContent;
+use crate::world::World;
+
+pub(crate) struct Scene {
+    scene: SceneConfig,
+    config: SimConfig,
+    starts: u64,
+    skin_from_robot: RigidTransform<Skin, Robot>,
+    /// Where the tip is before anybody says.
+    rest: Point3<Skin>,
+    /// The pixels of this run, and the last sample that they have seen.
+    running: Option<(Box<dyn PixelModel>, TipSample)>,
+    /// Events that belong to the next packet.
+    ahead: Vec<PixelEvent>,
+}
+
+impl Scene {
+    pub fn new(content: &SceneContent) -> Result<Self, BusError> {
+        if content.level == SimLevel::Kinematic {
+            return Err(BusError::Content(
+                "expected a scene of level geometric or optical, found kinematic, which has no pixels"
+                    .to_owned(),
+            ));
+        }
+        let config = SimConfig::new(content.seed, content.level);
+        let robot_from_skin = content.robot_from_skin.unwrap_or(config.robot_from_skin);
+        Ok(Self {
+            scene: config.scene(content.camera),
+            skin_from_robot: robot_from_skin.inverse(),
+            rest: config.start,
+            config,
+            starts: 0,
+            running: None,
+            ahead: Vec::new(),
+        })
+    }
+
+    /// Events begin with the grid step after `from_ns`. Every start has noise of its own.
+    pub fn start(&mut self, world: &World, from_ns: i64) {
+        let t_ns = (from_ns / GRID_NS + 1) * GRID_NS;
+        let first = TipSample {
+            t_ns,
+            position: self.tip(world, t_ns),
+        };
+        let mut scene = self.scene.clone();
+        if self.starts > 0 {
+            scene.seed = derive_seed(scene.seed, Purpose::Pixels, 1_000 + self.starts);
+        }
+        self.starts += 1;
+        let pixels: Box<dyn PixelModel> = match self.config.level {
+            SimLevel::Optical => Box::new(OpticalModel::new(&scene)),
+            SimLevel::Kinematic | SimLevel::Geometric => {
+                Box::new(GeometricModel::new(&scene, &self.config.geometric))
+            }
+        };
+        self.ahead.clear();
+        self.running = Some((pixels, first));
+    }
+
+    fn tip(&self, world: &World, t_ns: i64) -> Point3<Skin> {
+        world.tip_at(t_ns).map_or(self.rest, |[x, y, z]| {
+            self.skin_from_robot.apply(Point3::new(x, y, z))
+        })
+    }
+
+    pub fn events(&mut self, world: &World, until_ns: i64, out: &mut Vec<PixelEvent>) {
+        let Some((mut pixels, mut last)) = self.running.take() else {
+            return;
+        };
+        let mut tips = vec![last];
+        while last.t_ns < until_ns {
+            let t_ns = last.t_ns + GRID_NS;
+            let position = self.tip(world, t_ns);
+            last = TipSample { t_ns, position };
+            tips.push(last);
+        }
+        if tips.len() > 1 {
+            pixels.advance(&tips, &mut self.ahead);
+        }
+        self.running = Some((pixels, last));
+        let due = self.ahead.partition_point(|e| e.t_ns < until_ns);
+        out.extend(self.ahead.drain(..due));
+    }
+}

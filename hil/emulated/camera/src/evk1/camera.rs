@@ -1,0 +1,286 @@
+//! One camera: its registers, what is wrong with it, and what it counted.
+
+use std::collections::BTreeSet;
+use std::mem;
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use serde::{Deserialize, Serialize};
+
+use super::clock::{Oscillator, SyncLine, TimeBase};
+use super::registers as r;
+use super::registers::Registers;
+use super::sensor::{Gates, Roi, Sync, runs};
+use crate::config::{Evk1Config, Pacing};
+use crate::steer::Request;
+use crate::usb::descriptors::Descriptors;
+use crate::usb::queues::Queues;
+use crate::world::{World, now_ns};
+
+/// What a camera has counted since it was plugged in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct Counters {
+    /// Bytes made.
+    pub made_bytes: u64,
+    /// Bytes that found no place, because the host did not fetch those before.
+    pub dropped_bytes: u64,
+    /// Trigger edges sent.
+    pub trigger_words: u64,
+    /// Trigger edges that became known only after their place in the stream, and were sent late.
+    pub late_edges: u64,
+    /// Requests for registers that do not exist.
+    pub unknown_registers: u64,
+    /// Requests that a camera refuses or that no driver may send (flash, boot loader).
+    pub refused_requests: u64,
+    /// Times that the time base was started.
+    pub starts: u64,
+}
+
+/// What is wrong with a camera.
+#[derive(Debug, Clone, Default)]
+pub struct Faults {
+    /// Registers whose writes do not take.
+    pub stuck: BTreeSet<u32>,
+    /// No control request is answered any more.
+    pub silent: bool,
+    /// Register reads report failure.
+    pub failing_reads: bool,
+    /// Words to put into the next packet.
+    pub garbage: Vec<u32>,
+}
+
+/// One run of the time base.
+#[derive(Debug)]
+pub struct Run {
+    /// Tells it from the runs before.
+    pub number: u64,
+    /// When it began, true time, ns.
+    pub from_ns: i64,
+    /// The camera's time in it.
+    pub time: TimeBase,
+}
+
+pub struct Model {
+    pub registers: Registers,
+    pub roi: Arc<Roi>,
+    pub faults: Faults,
+    pub counters: Counters,
+    pub journal: Vec<Request>,
+    /// Number and beginning of the run under way.
+    running: Option<(u64, i64, Sync)>,
+    /// Camera time at the end of the last run, µs.
+    reached_us: u64,
+    unplugged: bool,
+}
+
+impl Model {
+    fn is_running(&self, run: u64) -> bool {
+        !self.unplugged && self.running.is_some_and(|(number, ..)| number == run)
+    }
+}
+
+/// An emulated EVK1.
+pub struct Evk1 {
+    pub config: Evk1Config,
+    pub descriptors: Descriptors,
+    pub queues: Arc<Queues>,
+    pub world: Arc<World>,
+    pub sync_line: Arc<SyncLine>,
+    plugged: Instant,
+    model: Mutex<Model>,
+    changed: Condvar,
+}
+
+impl Evk1 {
+    /// A camera that has just been plugged in; `serial` is its number as a register value.
+    pub fn new(
+        config: Evk1Config,
+        serial: u32,
+        queues: Arc<Queues>,
+        world: Arc<World>,
+        sync_line: Arc<SyncLine>,
+    ) -> Self {
+        // Class, subclass and strings of an EVK1 are not known: vendor-specific, none, none.
+        let descriptors = Descriptors {
+            vendor: 0x04b4,
+            product: config.product_id,
+            interface_class: 0xff,
+            interface_subclass: 0,
+            endpoints: vec![0x81],
+            speed_mbit: config.speed_mbit,
+            strings: [const { None }; 3],
+        };
+        let registers = Registers::power_up(&config, serial);
+        let model = Model {
+            roi: Arc::new(Roi::read(&registers)),
+            registers,
+            faults: Faults::default(),
+            counters: Counters::default(),
+            journal: Vec::new(),
+            running: None,
+            reached_us: config.origin_us,
+            unplugged: false,
+        };
+        let stale: Vec<u8> = (0..config.stale_words as u32)
+            .flat_map(|n| (0x8fff_0000 | n & 0xffff).to_le_bytes())
+            .collect();
+        queues.push(stale, true);
+        Self {
+            config,
+            descriptors,
+            queues,
+            world,
+            sync_line,
+            plugged: Instant::now(),
+            model: Mutex::new(model),
+            changed: Condvar::new(),
+        }
+    }
+
+    pub fn lock(&self) -> MutexGuard<'_, Model> {
+        self.model.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The FPGA has booted.
+    pub fn is_booted(&self) -> bool {
+        self.plugged.elapsed() >= Duration::from_millis(self.config.boot_ms)
+    }
+
+    pub fn oscillator(&self) -> Oscillator {
+        Oscillator::new(self.config.drift_ppm)
+    }
+
+    /// Does what a register write sets off.
+    pub fn written(&self, model: &mut Model, address: u32, value: u32) {
+        match address {
+            r::ROI_CTRL if value >> 5 & 1 == 1 => {
+                model.roi = Arc::new(Roi::read(&model.registers));
+            }
+            r::CCAM2_CONTROL => self.start_or_stop(model),
+            _ => {}
+        }
+    }
+
+    fn start_or_stop(&self, model: &mut Model) {
+        let should_run = runs(&model.registers);
+        match (model.running, should_run) {
+            (None, true) => {
+                let sync = Sync::read(&model.registers);
+                let from_ns = now_ns();
+                model.counters.starts += 1;
+                model.running = Some((model.counters.starts, from_ns, sync));
+                if sync == Sync::Master {
+                    self.sync_line.begin(self.oscillator(), from_ns);
+                }
+                self.changed.notify_all();
+            }
+            (Some((_, _, sync)), false) => {
+                model.running = None;
+                if sync == Sync::Master {
+                    self.sync_line.end(now_ns());
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// Waits for the next run of the time base; `None` when the camera is gone.
+    pub fn next_run(&self, after: u64) -> Option<Run> {
+        let mut model = self.lock();
+        loop {
+            if model.unplugged {
+                return None;
+            }
+            if let Some((number, from_ns, sync)) = model.running
+                && number != after
+            {
+                let base_us = if self.config.time_restarts {
+                    self.config.origin_us
+                } else {
+                    model.reached_us
+                };
+                let time = match sync {
+                    Sync::Slave => TimeBase::Counted {
+                        from_ns,
+                        base_us: 0,
+                        current: None,
+                    },
+                    Sync::Standalone | Sync::Master => TimeBase::Own {
+                        oscillator: self.oscillator(),
+                        from_ns,
+                        // A master's slaves count from 0, and so does it.
+                        base_us: if sync == Sync::Master { 0 } else { base_us },
+                    },
+                };
+                return Some(Run {
+                    number,
+                    from_ns,
+                    time,
+                });
+            }
+            model = self
+                .changed
+                .wait(model)
+                .unwrap_or_else(PoisonError::into_inner);
+        }
+    }
+
+    /// What the registers let through in this run; `None` when it has ended.
+    pub fn gates(&self, run: u64) -> Option<Gates> {
+        let model = self.lock();
+        model
+            .is_running(run)
+            .then(|| Gates::read(&model.registers, &model.roi))
+    }
+
+    /// Words that belong into the next packet and mean nothing.
+    pub fn garbage(&self) -> Vec<u32> {
+        mem::take(&mut self.lock().faults.garbage)
+    }
+
+    /// Hands a packet of a run over and books it, unless the run has ended meanwhile. What finds no place is lost.
+    pub fn send(
+        &self,
+        run: u64,
+        mut bytes: Vec<u8>,
+        end: bool,
+        reached_us: u64,
+        count: impl FnOnce(&mut Counters),
+    ) {
+        // Held while the packet is pushed, so that none comes after the answer to the write that stops the run.
+        let mut model = self.lock();
+        if !model.is_running(run) {
+            return;
+        }
+        let made = bytes.len();
+        if self.config.pacing == Pacing::RealTime {
+            bytes.truncate(self.queues.free() / 4 * 4);
+        }
+        let dropped = made - bytes.len();
+        let dropped_words = dropped / 4;
+        self.queues.push(bytes, end);
+        count(&mut model.counters);
+        model.counters.made_bytes += made as u64;
+        model.counters.dropped_bytes += dropped as u64;
+        model.reached_us = reached_us;
+        if dropped_words > 0 {
+            // One per word that found no place, and no more than the register holds (assumed).
+            let hits = model.registers.get(r::OVERFLOW_HITCOUNT) as usize + dropped_words;
+            model
+                .registers
+                .set(r::OVERFLOW_HITCOUNT, hits.min(0xffff) as u32);
+        }
+    }
+
+    /// The cable is pulled.
+    pub fn unplug(&self) {
+        let mut model = self.lock();
+        model.unplugged = true;
+        if let Some((_, _, Sync::Master)) = model.running.take() {
+            self.sync_line.end(now_ns());
+        }
+        drop(model);
+        self.queues.unplug();
+        self.changed.notify_all();
+    }
+}

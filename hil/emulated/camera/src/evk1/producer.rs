@@ -1,0 +1,251 @@
+//! Makes the stream of one camera: packet by packet, as long as its time base runs.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use skinrig_formats::evt2::{Encoder, TIME_HIGH_CADENCE_US};
+use skinrig_model::{CdEvent, Polarity, TriggerEdge};
+
+use super::camera::{Evk1, Run};
+use super::sensor::Gates;
+use crate::config::Pacing;
+use crate::content::{PixelEvent, Source, Splitmix};
+use crate::world::Edge;
+
+/// How often a wait looks whether the run has ended.
+const PATIENCE: Duration = Duration::from_millis(5);
+
+/// The input that trigger out loops back to.
+const LOOP_BACK: u8 = 6;
+
+/// Streams until the camera is unplugged.
+pub fn produce(camera: &Arc<Evk1>, mut source: Source) {
+    let mut last = 0;
+    while let Some(run) = camera.next_run(last) {
+        last = run.number;
+        Producer::new(camera, run, &mut source).stream();
+    }
+}
+
+/// A run of the time base.
+struct Producer<'a> {
+    camera: &'a Evk1,
+    source: &'a mut Source,
+    run: Run,
+    /// True time up to which everything has been made, ns.
+    made_ns: i64,
+    encoder: Encoder,
+    /// Camera time up to which everything has been made, µs.
+    reached_us: u64,
+    /// True when pulses of trigger out began, ns.
+    pulses_from_ns: Option<i64>,
+    /// Edges that jitter has moved into the next packet.
+    edges: Vec<Edge>,
+    random: Splitmix,
+    events: Vec<PixelEvent>,
+}
+
+impl<'a> Producer<'a> {
+    fn new(camera: &'a Evk1, mut run: Run, source: &'a mut Source) -> Self {
+        let from_ns = run.from_ns;
+        let first_us = run.time.at(from_ns, &camera.sync_line);
+        // Edges of before are not seen.
+        camera.world.take_edges(&camera.config.serial, from_ns);
+        source.start(&camera.world, from_ns);
+        Self {
+            camera,
+            source,
+            random: Splitmix(run.number),
+            run,
+            made_ns: from_ns,
+            encoder: Encoder::new(first_us),
+            reached_us: first_us,
+            pulses_from_ns: None,
+            edges: Vec::new(),
+            events: Vec::new(),
+        }
+    }
+
+    fn stream(&mut self) {
+        let Evk1 {
+            config,
+            world,
+            queues,
+            ..
+        } = self.camera;
+        while let Some(before) = self.camera.gates(self.run.number) {
+            let until_ns = self.made_ns + i64::from(before.packet_us) * 1_000;
+            let due = match config.pacing {
+                Pacing::RealTime => world.wait_until(until_ns, PATIENCE),
+                Pacing::HostTime => queues.wait_for_room(config.fifo_bytes, PATIENCE),
+            };
+            // What was written meanwhile counts for this packet.
+            if due && let Some(gates) = self.camera.gates(self.run.number) {
+                self.packet(until_ns, &gates);
+            }
+        }
+    }
+
+    /// Everything up to `until_ns` as one packet.
+    fn packet(&mut self, until_ns: i64, gates: &Gates) {
+        let line = &self.camera.sync_line;
+        let end_us = self.run.time.at(until_ns, line);
+        let (edges, late) = self.due_edges(until_ns, gates);
+        let garbage = self.camera.garbage();
+        let mut bytes: Vec<u8> = garbage.into_iter().flat_map(u32::to_le_bytes).collect();
+        let dense = self.source.dense().filter(|_| {
+            gates.pixels && gates.filter.is_none() && gates.roi.is_full() && !gates.no_off
+        });
+        let stands_still = end_us == self.reached_us;
+        if let Some(dense) = dense
+            && !stands_still
+        {
+            let mut edges = edges.iter().peekable();
+            let mut slot_us = self.reached_us.next_multiple_of(TIME_HIGH_CADENCE_US);
+            while slot_us < end_us {
+                // Always in order: slots follow one another.
+                let _ = self.encoder.advance_to(slot_us, &mut bytes);
+                dense.slot(slot_us, &mut bytes);
+                slot_us += TIME_HIGH_CADENCE_US;
+                while let Some(edge) = edges.next_if(|e| e.t_us < slot_us) {
+                    push_edge(&mut self.encoder, *edge, &mut bytes);
+                }
+            }
+            for edge in edges {
+                push_edge(&mut self.encoder, *edge, &mut bytes);
+            }
+        } else {
+            self.pixel_events(until_ns, gates);
+            self.encode(until_ns, end_us, &edges, &mut bytes);
+        }
+        let triggers = edges.len() as u64;
+        self.made_ns = until_ns;
+        self.reached_us = end_us;
+        let number = self.run.number;
+        let short = gates.short_packets;
+        self.camera.send(number, bytes, short, end_us, |counters| {
+            counters.trigger_words += triggers;
+            counters.late_edges += late;
+        });
+    }
+
+    /// The events of the packet, filtered by what the registers let through.
+    fn pixel_events(&mut self, until_ns: i64, gates: &Gates) {
+        self.events.clear();
+        self.source
+            .events(&self.camera.world, self.made_ns, until_ns, &mut self.events);
+        if !gates.pixels {
+            self.events.clear();
+        }
+        self.events
+            .retain(|e| gates.roi.has(e.x, e.y) && !(gates.no_off && e.polarity == Polarity::Off));
+        if let Some((events, period_us)) = gates.filter {
+            let spans = u64::from(gates.packet_us) / u64::from(period_us);
+            if (self.events.len() as u64) < u64::from(events) * spans.max(1) {
+                self.events.clear();
+            }
+        }
+    }
+
+    /// Writes events and edges in the order of time, and the time base up to the end of the packet.
+    fn encode(&mut self, until_ns: i64, end_us: u64, edges: &[TriggerEdge], bytes: &mut Vec<u8>) {
+        let line = &self.camera.sync_line;
+        if end_us == self.reached_us {
+            // A slave whose master does not run: the words flow, their time stands still (EVK1 reference, section 5).
+            let words = (until_ns - self.made_ns) / (TIME_HIGH_CADENCE_US as i64 * 1_000);
+            let high = 0x8000_0000 | (end_us >> 6) as u32 & 0x0fff_ffff;
+            bytes.extend((0..words).flat_map(|_| high.to_le_bytes()));
+        }
+        let mut edges = edges.iter().peekable();
+        for event in &self.events {
+            let t_us = self.run.time.at(event.t_ns, line);
+            while let Some(edge) = edges.next_if(|e| e.t_us <= t_us) {
+                push_edge(&mut self.encoder, *edge, bytes);
+            }
+            let event = CdEvent {
+                t_us,
+                x: event.x,
+                y: event.y,
+                polarity: event.polarity,
+            };
+            let written = self.encoder.cd(event, bytes);
+            debug_assert!(written.is_ok(), "pixel events out of order: {written:?}");
+        }
+        for edge in edges {
+            push_edge(&mut self.encoder, *edge, bytes);
+        }
+        // The last microsecond belongs to the next packet, which may have an event in it.
+        let reached = self
+            .encoder
+            .advance_to(end_us.max(self.encoder.reached_us()), bytes);
+        debug_assert!(reached.is_ok(), "time ran backwards: {reached:?}");
+    }
+
+    /// The edges that the camera sees before `until_ns`, and how many of them it should have seen earlier.
+    fn due_edges(&mut self, until_ns: i64, gates: &Gates) -> (Vec<TriggerEdge>, u64) {
+        let Evk1 {
+            config,
+            world,
+            sync_line,
+            ..
+        } = self.camera;
+        let delay_ns = i64::from(config.trigger_delay_ns);
+        for mut edge in world.take_edges(&config.serial, until_ns - delay_ns) {
+            let jitter = self.random.below(u64::from(config.trigger_jitter_ns) + 1);
+            edge.at_ns += delay_ns + jitter as i64;
+            self.edges.push(edge);
+        }
+        self.loop_back(until_ns, gates);
+        self.edges.sort_by_key(|e| e.at_ns);
+        let due = self.edges.partition_point(|e| e.at_ns < until_ns);
+        let mut late = 0;
+        let mut seen = Vec::new();
+        for edge in self.edges.drain(..due) {
+            if edge.at_ns < self.made_ns {
+                late += 1;
+            }
+            if gates.triggers >> edge.channel & 1 == 1 {
+                let t_us = self.run.time.at(edge.at_ns.max(self.made_ns), sync_line);
+                seen.push(TriggerEdge {
+                    t_us,
+                    channel: edge.channel,
+                    rising: edge.rising,
+                });
+            }
+        }
+        (seen, late)
+    }
+
+    /// The edges of the camera's own trigger output, which come back on input 6.
+    fn loop_back(&mut self, until_ns: i64, gates: &Gates) {
+        let Some((period_us, width_us)) = gates.pulses else {
+            self.pulses_from_ns = None;
+            return;
+        };
+        let from_ns = *self.pulses_from_ns.get_or_insert(self.made_ns);
+        let (period_ns, width_ns) = (i64::from(period_us) * 1_000, i64::from(width_us) * 1_000);
+        let mut rise_ns = from_ns + (self.made_ns - from_ns) / period_ns * period_ns;
+        while rise_ns < until_ns {
+            for (rising, at_ns) in [(true, rise_ns), (false, rise_ns + width_ns)] {
+                if (self.made_ns..until_ns).contains(&at_ns) {
+                    self.edges.push(Edge {
+                        channel: LOOP_BACK,
+                        rising,
+                        at_ns,
+                    });
+                }
+            }
+            rise_ns += period_ns;
+        }
+    }
+}
+
+fn push_edge(encoder: &mut Encoder, edge: TriggerEdge, bytes: &mut Vec<u8>) {
+    // An edge that the encoder has passed within a dense slot keeps its place in the stream.
+    let t_us = edge.t_us.max(encoder.reached_us());
+    let written = encoder.trigger(TriggerEdge { t_us, ..edge }, bytes);
+    debug_assert!(
+        written.is_ok(),
+        "a trigger channel that does not exist: {written:?}"
+    );
+}

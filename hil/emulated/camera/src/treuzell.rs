@@ -1,0 +1,55 @@
+//! A camera of another maker's protocol under the EVK1's vendor and product number: it must be left alone.
+
+use std::sync::{Mutex, PoisonError};
+
+use crate::steer::Request;
+use crate::usb::descriptors::Descriptors;
+use crate::usb::function::{Function, Reply};
+use crate::usb::usbfs::Setup;
+
+/// An EVK3 as far as enumeration goes: interface subclass 0x19, three bulk endpoints (EVK1 reference, section 1.1).
+pub struct Treuzell {
+    descriptors: Descriptors,
+    journal: Mutex<Vec<Request>>,
+}
+
+impl Treuzell {
+    pub fn new() -> Self {
+        Self {
+            descriptors: Descriptors {
+                vendor: 0x04b4,
+                product: 0x00f4,
+                interface_class: 0xff,
+                interface_subclass: 0x19,
+                endpoints: vec![0x82, 0x02, 0x81],
+                speed_mbit: 5000,
+                strings: [const { None }; 3],
+            },
+            journal: Mutex::default(),
+        }
+    }
+
+    /// Every vendor request that has reached it.
+    pub fn journal(&self) -> Vec<Request> {
+        self.journal
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .clone()
+    }
+}
+
+impl Function for Treuzell {
+    fn descriptors(&self) -> &Descriptors {
+        &self.descriptors
+    }
+
+    fn control(&self, setup: Setup, data: &[u8]) -> Reply {
+        if setup.is_vendor() {
+            self.journal
+                .lock()
+                .unwrap_or_else(PoisonError::into_inner)
+                .push(Request::new(setup, data));
+        }
+        Reply::Stall
+    }
+}

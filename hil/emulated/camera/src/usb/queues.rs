@@ -1,0 +1,442 @@
+//! The transfers of one device: waiting, finished, and the bytes that the device has ready.
+//!
+//! As in Linux's usbfs: every open file has its own transfers, an interface belongs to one of them, and what a
+//! transfer brought is fetched by whoever submitted it.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::mem;
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use rustix::io::Errno;
+use serde::{Deserialize, Serialize};
+
+use super::readiness::Readiness;
+use super::usbfs::Urb;
+
+/// A transfer under way: the URB and its address in the process under test.
+#[derive(Debug, Clone, Copy)]
+pub struct Submitted {
+    pub address: u64,
+    pub urb: Urb,
+}
+
+/// A finished transfer, and what it brings into the process's memory at which address.
+#[derive(Debug)]
+pub struct Finished {
+    pub address: u64,
+    pub urb: Urb,
+    pub to: u64,
+    pub bytes: Vec<u8>,
+    /// Bytes of the data endpoint (and not of a control request).
+    pub data: bool,
+}
+
+/// What has been handed to the host from the data endpoint.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct Handed {
+    /// Bytes.
+    pub bytes: u64,
+    /// CRC-32 (IEEE 802.3) over all of them.
+    pub crc32: u32,
+    /// Transfers.
+    pub transfers: u64,
+}
+
+#[derive(Debug, Default)]
+struct OpenFile {
+    /// Transfers that wait for bytes.
+    waiting: VecDeque<Submitted>,
+    /// Control requests that never get an answer.
+    unanswered: Vec<Submitted>,
+    done: VecDeque<Finished>,
+}
+
+#[derive(Debug)]
+struct State {
+    files: BTreeMap<u64, OpenFile>,
+    next_file: u64,
+    claimed_by: Option<u64>,
+    unplugged: bool,
+    halted: bool,
+    /// Bytes that no transfer has taken yet, oldest first; `head` of the first are gone.
+    fifo: VecDeque<Vec<u8>>,
+    head: usize,
+    level: usize,
+    /// The last byte of the FIFO ends a packet.
+    ended: bool,
+    /// The next transfer ends this many bytes early.
+    cut: Option<usize>,
+    handed: Handed,
+    ready: Readiness,
+}
+
+/// The queues of one device. `room` is signalled whenever a transfer starts to wait.
+#[derive(Debug)]
+pub struct Queues {
+    state: Mutex<State>,
+    room: Condvar,
+    capacity: usize,
+}
+
+/// Whoever holds the interface of a busy device without being a process under test.
+const SOMEBODY: u64 = 0;
+
+impl Queues {
+    /// The queues of a device that can hold `capacity` bytes.
+    pub fn new(capacity: usize, ready: Readiness) -> Self {
+        let state = State {
+            files: BTreeMap::new(),
+            next_file: SOMEBODY + 1,
+            claimed_by: None,
+            unplugged: false,
+            halted: false,
+            fifo: VecDeque::new(),
+            head: 0,
+            level: 0,
+            ended: false,
+            cut: None,
+            handed: Handed::default(),
+            ready,
+        };
+        Self {
+            state: Mutex::new(state),
+            room: Condvar::new(),
+            capacity,
+        }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Somebody else holds the interface from now on.
+    pub fn occupy(&self) {
+        self.lock().claimed_by = Some(SOMEBODY);
+    }
+
+    // ---- from the process under test
+
+    pub fn open(&self) -> u64 {
+        let mut state = self.lock();
+        let file = state.next_file;
+        state.next_file += 1;
+        state.files.insert(file, OpenFile::default());
+        file
+    }
+
+    pub fn close(&self, file: u64) {
+        let mut state = self.lock();
+        state.files.remove(&file);
+        if state.claimed_by == Some(file) {
+            state.claimed_by = None;
+        }
+        state.tell();
+    }
+
+    pub fn claim(&self, file: u64) -> Result<(), Errno> {
+        let mut state = self.lock();
+        state.plugged()?;
+        if state.claimed_by.is_some_and(|by| by != file) {
+            return Err(Errno::BUSY);
+        }
+        state.claimed_by = Some(file);
+        Ok(())
+    }
+
+    pub fn release(&self, file: u64) -> Result<(), Errno> {
+        let mut state = self.lock();
+        state.plugged()?;
+        if state.claimed_by != Some(file) {
+            return Err(Errno::INVAL);
+        }
+        state.claimed_by = None;
+        Ok(())
+    }
+
+    pub fn plugged(&self) -> Result<(), Errno> {
+        self.lock().plugged()
+    }
+
+    /// A transfer from the data endpoint.
+    pub fn submit(&self, file: u64, transfer: Submitted) -> Result<(), Errno> {
+        let mut state = self.lock();
+        state.plugged()?;
+        // The kernel claims for a process that forgot to.
+        match state.claimed_by {
+            Some(by) if by != file => return Err(Errno::BUSY),
+            _ => state.claimed_by = Some(file),
+        }
+        if state.halted {
+            state.finish(file, transfer, Errno::PIPE.raw_os_error(), Vec::new());
+            return Ok(());
+        }
+        if let Some(open) = state.files.get_mut(&file) {
+            open.waiting.push_back(transfer);
+        }
+        state.serve();
+        self.room.notify_all();
+        Ok(())
+    }
+
+    /// A control request that has been answered already.
+    pub fn answered(&self, file: u64, finished: Finished) -> Result<(), Errno> {
+        let mut state = self.lock();
+        state.plugged()?;
+        if let Some(open) = state.files.get_mut(&file) {
+            open.done.push_back(finished);
+        }
+        state.tell();
+        Ok(())
+    }
+
+    /// A control request that the device does not answer.
+    pub fn unanswered(&self, file: u64, transfer: Submitted) -> Result<(), Errno> {
+        let mut state = self.lock();
+        state.plugged()?;
+        if let Some(open) = state.files.get_mut(&file) {
+            open.unanswered.push(transfer);
+        }
+        Ok(())
+    }
+
+    /// Cancels the transfer whose URB is at `address`; what it has got so far goes with it.
+    pub fn discard(&self, file: u64, address: u64) -> Result<(), Errno> {
+        let mut state = self.lock();
+        let Some(open) = state.files.get_mut(&file) else {
+            return Err(Errno::INVAL);
+        };
+        if let Some(n) = open.unanswered.iter().position(|t| t.address == address) {
+            let transfer = open.unanswered.remove(n);
+            state.finish(file, transfer, Errno::NOENT.raw_os_error(), Vec::new());
+            return Ok(());
+        }
+        let Some(n) = open.waiting.iter().position(|t| t.address == address) else {
+            return Err(Errno::INVAL);
+        };
+        let Some(transfer) = open.waiting.remove(n) else {
+            return Err(Errno::INVAL);
+        };
+        let bytes = if n == 0 {
+            state.take(transfer.urb.length())
+        } else {
+            Vec::new()
+        };
+        state.finish(file, transfer, Errno::NOENT.raw_os_error(), bytes);
+        Ok(())
+    }
+
+    /// The oldest finished transfer.
+    pub fn reap(&self, file: u64) -> Result<Finished, Errno> {
+        let mut state = self.lock();
+        let gone = state.unplugged;
+        let open = state.files.get_mut(&file).ok_or(Errno::NODEV)?;
+        let finished = open.done.pop_front();
+        state.tell();
+        match finished {
+            Some(finished) => Ok(finished),
+            None if gone => Err(Errno::NODEV),
+            None => Err(Errno::AGAIN),
+        }
+    }
+
+    /// Counts what a reaped transfer brought.
+    pub fn count(&self, bytes: &[u8]) {
+        let before = self.lock().handed;
+        // Only the thread that serves the file counts, so nothing comes in between.
+        let mut crc = crc32fast::Hasher::new_with_initial_len(before.crc32, before.bytes);
+        crc.update(bytes);
+        self.lock().handed = Handed {
+            bytes: before.bytes + bytes.len() as u64,
+            crc32: crc.finalize(),
+            transfers: before.transfers + 1,
+        };
+    }
+
+    /// The host clears a stall of the data endpoint.
+    pub fn clear_halt(&self) {
+        self.lock().halted = false;
+    }
+
+    /// The host resets the port: bytes that nobody has fetched are gone.
+    pub fn reset(&self) {
+        let mut state = self.lock();
+        state.halted = false;
+        state.empty();
+    }
+
+    // ---- from the device
+
+    /// Adds bytes to the FIFO; `end` when the device ends a packet with them, which ends a transfer as well.
+    pub fn push(&self, bytes: Vec<u8>, end: bool) {
+        let mut state = self.lock();
+        if state.unplugged {
+            return;
+        }
+        if !bytes.is_empty() {
+            state.level += bytes.len();
+            state.fifo.push_back(bytes);
+        }
+        state.ended = end;
+        state.serve();
+    }
+
+    /// How many bytes the device can get rid of: into waiting transfers and the FIFO.
+    pub fn free(&self) -> usize {
+        let state = self.lock();
+        let waiting: usize = state
+            .files
+            .values()
+            .flat_map(|f| &f.waiting)
+            .map(|t| t.urb.length())
+            .sum();
+        (self.capacity + waiting).saturating_sub(state.level)
+    }
+
+    /// Waits until more than `bytes` are free, at most for `patience`.
+    pub fn wait_for_room(&self, bytes: usize, patience: Duration) -> bool {
+        if self.free() > bytes {
+            return true;
+        }
+        let state = self.lock();
+        let waited = self.room.wait_timeout(state, patience);
+        drop(waited);
+        self.free() > bytes
+    }
+
+    // ---- from whoever makes faults
+
+    /// The cable is pulled: everything under way ends, nothing begins.
+    pub fn unplug(&self) {
+        let mut state = self.lock();
+        state.unplugged = true;
+        state.empty();
+        state.abort(Errno::SHUTDOWN);
+        self.room.notify_all();
+    }
+
+    /// The data endpoint stalls until the host clears it.
+    pub fn stall(&self) {
+        let mut state = self.lock();
+        state.halted = true;
+        state.abort(Errno::PIPE);
+    }
+
+    /// The next transfer of the data endpoint that has more than `bytes` ends that much early; they follow in the next.
+    pub fn cut_next(&self, bytes: usize) {
+        self.lock().cut = Some(bytes);
+    }
+
+    /// What has been handed to the host so far.
+    pub fn handed(&self) -> Handed {
+        self.lock().handed
+    }
+}
+
+impl State {
+    fn plugged(&self) -> Result<(), Errno> {
+        if self.unplugged {
+            Err(Errno::NODEV)
+        } else {
+            Ok(())
+        }
+    }
+
+    /// Lets waiting transfers end: full, or with the last bytes of a packet.
+    fn serve(&mut self) {
+        while let Some((file, transfer)) = self.next_waiting() {
+            let length = transfer.urb.length();
+            let full = self.level >= length;
+            if self.level == 0 || !(full || self.ended) {
+                return;
+            }
+            let mut wanted = self.level.min(length);
+            if let Some(cut) = self.cut
+                && wanted > cut
+            {
+                wanted -= cut;
+                self.cut = None;
+            }
+            let bytes = self.take(wanted);
+            if let Some(open) = self.files.get_mut(&file) {
+                open.waiting.pop_front();
+            }
+            self.finish(file, transfer, 0, bytes);
+        }
+    }
+
+    fn next_waiting(&self) -> Option<(u64, Submitted)> {
+        self.files
+            .iter()
+            .find_map(|(file, open)| open.waiting.front().map(|t| (*file, *t)))
+    }
+
+    /// Takes up to `wanted` bytes off the FIFO.
+    fn take(&mut self, wanted: usize) -> Vec<u8> {
+        let wanted = wanted.min(self.level);
+        self.level -= wanted;
+        if self.head == 0
+            && let Some(first) = self.fifo.front()
+            && first.len() == wanted
+        {
+            return self.fifo.pop_front().unwrap_or_default();
+        }
+        let mut taken = Vec::with_capacity(wanted);
+        while taken.len() < wanted {
+            let Some(first) = self.fifo.front() else {
+                break;
+            };
+            let end = first.len().min(self.head + wanted - taken.len());
+            taken.extend_from_slice(&first[self.head..end]);
+            if end == first.len() {
+                self.fifo.pop_front();
+                self.head = 0;
+            } else {
+                self.head = end;
+            }
+        }
+        taken
+    }
+
+    fn empty(&mut self) {
+        self.fifo.clear();
+        (self.head, self.level, self.cut) = (0, 0, None);
+    }
+
+    /// Ends a transfer of the data endpoint; `errno` 0 for success.
+    fn finish(&mut self, file: u64, transfer: Submitted, errno: i32, bytes: Vec<u8>) {
+        let Submitted { address, mut urb } = transfer;
+        urb.finish(-errno, bytes.len());
+        if let Some(open) = self.files.get_mut(&file) {
+            open.done.push_back(Finished {
+                address,
+                urb,
+                to: urb.buffer(),
+                data: !bytes.is_empty(),
+                bytes,
+            });
+        }
+        self.tell();
+    }
+
+    /// Ends everything under way.
+    fn abort(&mut self, errno: Errno) {
+        let files: Vec<u64> = self.files.keys().copied().collect();
+        for file in files {
+            let Some(open) = self.files.get_mut(&file) else {
+                continue;
+            };
+            let waiting = mem::take(&mut open.waiting);
+            let unanswered = mem::take(&mut open.unanswered);
+            for transfer in waiting.into_iter().chain(unanswered) {
+                self.finish(file, transfer, errno.raw_os_error(), Vec::new());
+            }
+        }
+        self.tell();
+    }
+
+    fn tell(&mut self) {
+        let ready = self.unplugged || self.files.values().any(|f| !f.done.is_empty());
+        self.ready.set(ready);
+    }
+}

@@ -1,0 +1,147 @@
+//! The folder that a process under test takes for the machine's `/sys` and `/dev`.
+
+use std::fs;
+use std::io;
+use std::os::unix::fs::symlink;
+use std::path::{Path, PathBuf};
+
+use super::descriptors::Descriptors;
+
+const HUB: &str = "devices/pci0000:00/0000:00:14.0/usb1";
+
+/// Longest path of a Unix socket on Linux, without its end.
+const SOCKET_PATH: usize = 107;
+
+/// The folder; removed with this value.
+#[derive(Debug)]
+pub struct TestBed(tempfile::TempDir);
+
+/// Where a device is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Address {
+    /// The port on the one hub, from 1: changes when a device is plugged elsewhere.
+    pub port: u8,
+    /// Number on the bus, from 2: new at every plugging.
+    pub number: u8,
+}
+
+impl Address {
+    fn node(self) -> String {
+        format!("dev/bus/usb/001/{:03}", self.number)
+    }
+}
+
+impl TestBed {
+    /// A folder without devices.
+    pub fn create() -> io::Result<Self> {
+        let folder = tempfile::Builder::new().prefix("usb").tempdir()?;
+        let root = folder.path();
+        if root.join("ioctl/dev/bus/usb/001/002").as_os_str().len() > SOCKET_PATH {
+            return Err(io::Error::other(format!(
+                "expected a short path for temporary files (Unix sockets end at {SOCKET_PATH} bytes), found {}: set TMPDIR=/tmp",
+                root.display()
+            )));
+        }
+        for sub in [
+            "sys/bus/usb/devices",
+            "sys/dev/char",
+            "sys/class",
+            "sys/block",
+            "dev/bus/usb/001",
+            "dev/.node",
+            "ioctl/dev/bus/usb/001",
+            "refuse/dev/bus/usb/001",
+        ] {
+            fs::create_dir_all(root.join(sub))?;
+        }
+        fs::create_dir_all(root.join("sys").join(HUB))?;
+        Ok(Self(folder))
+    }
+
+    pub fn root(&self) -> &Path {
+        self.0.path()
+    }
+
+    /// The file that stands for the device.
+    pub fn node(&self, at: Address) -> PathBuf {
+        self.root().join(at.node())
+    }
+
+    /// The socket on which its system calls arrive.
+    pub fn socket(&self, at: Address) -> PathBuf {
+        self.root().join("ioctl").join(at.node())
+    }
+
+    /// From now on opening the device gives this error.
+    pub fn refuse(&self, at: Address, errno: rustix::io::Errno) -> io::Result<()> {
+        let file = self.root().join("refuse").join(at.node());
+        fs::write(file, errno.raw_os_error().to_string())
+    }
+
+    /// Lists a device.
+    pub fn add(&self, at: Address, descriptors: &Descriptors) -> io::Result<()> {
+        let sys = self.root().join("sys");
+        let Address { port, number } = at;
+        let place = format!("{HUB}/1-{port}");
+        let device = sys.join(&place);
+        fs::create_dir_all(&device)?;
+        let mut all = descriptors.device().to_vec();
+        all.extend(descriptors.configuration());
+        fs::write(device.join("descriptors"), all)?;
+        let minor = number - 1;
+        let (vendor, product) = (descriptors.vendor, descriptors.product);
+        for (name, value) in [
+            ("busnum", "1".to_owned()),
+            ("devnum", number.to_string()),
+            ("devpath", port.to_string()),
+            ("speed", descriptors.speed_mbit.to_string()),
+            ("bConfigurationValue", "1".to_owned()),
+            ("bNumConfigurations", "1".to_owned()),
+            ("idVendor", format!("{vendor:04x}")),
+            ("idProduct", format!("{product:04x}")),
+            ("dev", format!("189:{minor}")),
+            (
+                "uevent",
+                format!(
+                    "MAJOR=189\nMINOR={minor}\nDEVNAME=bus/usb/001/{number:03}\nDEVTYPE=usb_device\n\
+                     BUSNUM=001\nDEVNUM={number:03}\nPRODUCT={vendor:x}/{product:x}/0"
+                ),
+            ),
+        ] {
+            fs::write(device.join(name), format!("{value}\n"))?;
+        }
+        for (name, text) in ["manufacturer", "product", "serial"]
+            .into_iter()
+            .zip(&descriptors.strings)
+        {
+            if let Some(text) = text {
+                fs::write(device.join(name), format!("{text}\n"))?;
+            }
+        }
+        symlink("../../../../../bus/usb", device.join("subsystem"))?;
+        symlink(
+            format!("../../{place}"),
+            sys.join(format!("dev/char/189:{minor}")),
+        )?;
+        // umockdev's preload library finds the device's numbers here.
+        symlink(
+            format!("189:{minor}"),
+            self.root()
+                .join(format!("dev/.node/bus_usb_001_{number:03}")),
+        )?;
+        // Last: this makes it visible.
+        symlink(
+            format!("../../../{place}"),
+            sys.join(format!("bus/usb/devices/1-{port}")),
+        )
+    }
+
+    /// Takes a device off the list; its file stays for those who have it open.
+    pub fn remove(&self, at: Address) -> io::Result<()> {
+        let sys = self.root().join("sys");
+        fs::remove_file(sys.join(format!("bus/usb/devices/1-{}", at.port)))?;
+        fs::remove_file(sys.join(format!("dev/char/189:{}", at.number - 1)))?;
+        fs::remove_dir_all(sys.join(format!("{HUB}/1-{}", at.port)))?;
+        fs::remove_file(self.socket(at))
+    }
+}

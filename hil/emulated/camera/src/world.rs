@@ -1,0 +1,334 @@
+//! What reaches the cameras from outside: edges on their trigger inputs and the position of the robot's tip.
+//!
+//! Times are those of this machine's monotonic clock (`CLOCK_MONOTONIC`), ns, in every process.
+//!
+//! Other processes write lines to the Unix stream socket `ROOT/world`:
+//!
+//! ```text
+//! edge SERIAL CHANNEL LEVEL T_NS     an edge at a camera's trigger input: LEVEL 1 rises, 0 falls
+//! time T_NS                          no later line of this connection is about anything before T_NS
+//! tip T_NS X_MM Y_MM Z_MM            where the robot's tip is, in the robot's frame
+//! ```
+//!
+//! Lines of one connection come in time order. Cameras lag behind the present by [`LATENCY_NS`], so that an edge
+//! finds its place in the stream. A process whose own time may fall further behind, such as a simulated microcontroller
+//! on a busy machine, writes `time` at least every millisecond of it: cameras then never pass what it has
+//! announced, and its edges keep their exact places. A line that cannot be read is answered with `error: ...` and ends
+//! the connection.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::io::{BufRead, BufReader, Write};
+use std::os::unix::net::{UnixListener, UnixStream};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::thread;
+use std::time::Duration;
+
+use rustix::time::{ClockId, clock_gettime};
+
+/// How far cameras lag behind the present at least, ns.
+pub const LATENCY_NS: i64 = 2_000_000;
+
+/// How long tip positions are remembered, ns.
+const REMEMBERED_NS: i64 = 2_000_000_000;
+
+/// How long edges are remembered that no camera takes, ns.
+const EDGES_REMEMBERED_NS: i64 = 60_000_000_000;
+
+/// An edge at a trigger input.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Edge {
+    /// The input: 0 is TRIG IN, 6 the loop-back of trigger out, 7 the auxiliary input.
+    pub channel: u8,
+    /// True for a rising edge.
+    pub rising: bool,
+    /// When, monotonic clock, ns.
+    pub at_ns: i64,
+}
+
+/// Where the tip was.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Tip {
+    /// When, monotonic clock, ns.
+    pub at_ns: i64,
+    /// Robot frame, mm.
+    pub position_mm: [f64; 3],
+}
+
+#[derive(Debug, Default)]
+struct State {
+    edges: BTreeMap<String, VecDeque<Edge>>,
+    tips: VecDeque<Tip>,
+    /// By connection: what it says is about this time or later.
+    announced: BTreeMap<u64, i64>,
+    next_source: u64,
+    closed: bool,
+}
+
+/// What reaches the cameras of one bus.
+#[derive(Debug, Default)]
+pub struct World {
+    state: Mutex<State>,
+    changed: Condvar,
+}
+
+/// The monotonic clock, ns.
+#[must_use]
+pub fn now_ns() -> i64 {
+    let now = clock_gettime(ClockId::Monotonic);
+    now.tv_sec * 1_000_000_000 + now.tv_nsec
+}
+
+impl World {
+    fn lock(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// An edge at the trigger input of the camera with this serial number.
+    pub fn edge(&self, serial: &str, edge: Edge) {
+        let mut state = self.lock();
+        let edges = state.edges.entry(serial.to_owned()).or_default();
+        edges.push_back(edge);
+        // A camera that does not run takes none.
+        while edges
+            .front()
+            .is_some_and(|e| e.at_ns < edge.at_ns - EDGES_REMEMBERED_NS)
+        {
+            edges.pop_front();
+        }
+    }
+
+    /// Where the tip is.
+    pub fn tip(&self, tip: Tip) {
+        let mut state = self.lock();
+        state.tips.push_back(tip);
+        while state
+            .tips
+            .front()
+            .is_some_and(|t| t.at_ns < tip.at_ns - REMEMBERED_NS)
+        {
+            state.tips.pop_front();
+        }
+    }
+
+    /// A new source of edges that announces its own time; see [`World::announce`].
+    pub fn source(&self) -> u64 {
+        let mut state = self.lock();
+        state.next_source += 1;
+        state.next_source
+    }
+
+    /// Nothing that `source` says from now on is about anything before `t_ns`.
+    pub fn announce(&self, source: u64, t_ns: i64) {
+        self.lock().announced.insert(source, t_ns);
+        self.changed.notify_all();
+    }
+
+    /// `source` has no more to say.
+    pub fn leave(&self, source: u64) {
+        self.lock().announced.remove(&source);
+        self.changed.notify_all();
+    }
+
+    /// Waits until everything before `t_ns` is known, at most for `patience`.
+    pub(crate) fn wait_until(&self, t_ns: i64, patience: Duration) -> bool {
+        let state = self.lock();
+        let ahead_ns = t_ns - state.horizon();
+        if ahead_ns <= 0 {
+            return true;
+        }
+        let nap = Duration::from_nanos(ahead_ns as u64).min(patience);
+        let (state, _) = self
+            .changed
+            .wait_timeout(state, nap)
+            .unwrap_or_else(PoisonError::into_inner);
+        t_ns <= state.horizon()
+    }
+
+    /// The edges of a camera before `until_ns`.
+    pub(crate) fn take_edges(&self, serial: &str, until_ns: i64) -> Vec<Edge> {
+        let mut state = self.lock();
+        let Some(edges) = state.edges.get_mut(serial) else {
+            return Vec::new();
+        };
+        let (due, later): (Vec<Edge>, Vec<Edge>) =
+            edges.drain(..).partition(|e| e.at_ns < until_ns);
+        edges.extend(later);
+        due
+    }
+
+    /// Where the tip was at `t_ns`: between two reports on the line between them, before the first and after the last
+    /// at these. `None` when nobody has said.
+    pub(crate) fn tip_at(&self, t_ns: i64) -> Option<[f64; 3]> {
+        let state = self.lock();
+        let after = state.tips.partition_point(|t| t.at_ns <= t_ns);
+        match (
+            after.checked_sub(1).and_then(|n| state.tips.get(n)),
+            state.tips.get(after),
+        ) {
+            (Some(a), Some(b)) => {
+                let share = (t_ns - a.at_ns) as f64 / (b.at_ns - a.at_ns) as f64;
+                Some(std::array::from_fn(|k| {
+                    a.position_mm[k] + share * (b.position_mm[k] - a.position_mm[k])
+                }))
+            }
+            (Some(only), None) | (None, Some(only)) => Some(only.position_mm),
+            (None, None) => None,
+        }
+    }
+
+    /// Takes what other processes say on `listener`.
+    pub(crate) fn listen(self: &Arc<Self>, listener: UnixListener) -> std::io::Result<()> {
+        let world = Arc::clone(self);
+        thread::Builder::new()
+            .name("world".into())
+            .spawn(move || {
+                while let Ok((stream, _)) = listener.accept() {
+                    if world.lock().closed {
+                        return;
+                    }
+                    let world = Arc::clone(&world);
+                    let reader = move || world.read(stream);
+                    if thread::Builder::new()
+                        .name("world line".into())
+                        .spawn(reader)
+                        .is_err()
+                    {
+                        return;
+                    }
+                }
+            })
+            .map(drop)
+    }
+
+    fn read(&self, mut stream: UnixStream) {
+        let source = self.source();
+        if let Ok(reading) = stream.try_clone() {
+            for line in BufReader::new(reading).lines().map_while(Result::ok) {
+                if let Err(what) = self.obey(source, &line) {
+                    let _ = writeln!(stream, "error: {what}");
+                    break;
+                }
+            }
+        }
+        self.leave(source);
+    }
+
+    fn obey(&self, source: u64, line: &str) -> Result<(), String> {
+        let words: Vec<&str> = line.split_ascii_whitespace().collect();
+        let number = |word: &str| -> Result<i64, String> {
+            word.parse()
+                .map_err(|_| format!("expected a whole number, found `{word}` in `{line}`"))
+        };
+        match words[..] {
+            ["edge", serial, channel, level, at] => {
+                let channel = u8::try_from(number(channel)?).ok().filter(|c| *c < 8);
+                let rising = match level {
+                    "0" => Some(false),
+                    "1" => Some(true),
+                    _ => None,
+                };
+                let (Some(channel), Some(rising)) = (channel, rising) else {
+                    return Err(format!(
+                        "expected a channel in 0..8 and a level 0 or 1, found `{line}`"
+                    ));
+                };
+                let at_ns = number(at)?;
+                self.edge(
+                    serial,
+                    Edge {
+                        channel,
+                        rising,
+                        at_ns,
+                    },
+                );
+                Ok(())
+            }
+            ["time", at] => {
+                self.announce(source, number(at)?);
+                Ok(())
+            }
+            ["tip", at, x, y, z] => {
+                let mut position_mm = [0.0; 3];
+                for (to, word) in position_mm.iter_mut().zip([x, y, z]) {
+                    *to = word
+                        .parse()
+                        .ok()
+                        .filter(|v: &f64| v.is_finite())
+                        .ok_or_else(|| format!("expected mm, found `{word}` in `{line}`"))?;
+                }
+                self.tip(Tip {
+                    at_ns: number(at)?,
+                    position_mm,
+                });
+                Ok(())
+            }
+            _ => Err(format!(
+                "expected `edge SERIAL CHANNEL LEVEL T_NS`, `time T_NS` or `tip T_NS X Y Z`, found `{line}`"
+            )),
+        }
+    }
+
+    pub(crate) fn close(&self) {
+        self.lock().closed = true;
+        self.changed.notify_all();
+    }
+}
+
+impl State {
+    /// Everything before this is known.
+    fn horizon(&self) -> i64 {
+        let present = now_ns() - LATENCY_NS;
+        self.announced.values().fold(present, |a, b| a.min(*b))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_are_obeyed_or_refused_with_what_was_expected() {
+        let world = World::default();
+        world.obey(1, "edge 00001621 0 1 1000").unwrap();
+        world.obey(1, "edge 00001621 0 0 2000").unwrap();
+        world.obey(1, "edge 00001622 7 1 1500").unwrap();
+        world.obey(1, "tip 1000 0 0 4").unwrap();
+        world.obey(1, "tip 2000 1 -2 5").unwrap();
+        let first = Edge {
+            channel: 0,
+            rising: true,
+            at_ns: 1000,
+        };
+        assert_eq!(world.take_edges("00001621", 2000), [first]);
+        assert_eq!(world.take_edges("00001621", 2001).len(), 1);
+        assert_eq!(world.tip_at(500), Some([0.0, 0.0, 4.0]));
+        assert_eq!(world.tip_at(1500), Some([0.5, -1.0, 4.5]));
+        assert_eq!(world.tip_at(9000), Some([1.0, -2.0, 5.0]));
+        for bad in [
+            "",
+            "edge 00001621 9 1 1000",
+            "edge 00001621 0 2 1000",
+            "time soon",
+            "tip 1 nan 0 0",
+            "jump 1",
+        ] {
+            let said = world.obey(1, bad).unwrap_err();
+            assert!(said.contains("expected") && said.contains(bad), "{said}");
+        }
+    }
+
+    #[test]
+    fn cameras_wait_for_who_announces_a_time() {
+        let world = World::default();
+        let long_ago = now_ns() - 1_000_000_000;
+        assert!(world.wait_until(long_ago, Duration::ZERO));
+        world.announce(1, long_ago - 1);
+        assert!(!world.wait_until(long_ago, Duration::ZERO));
+        world.announce(1, long_ago);
+        assert!(world.wait_until(long_ago, Duration::ZERO));
+        world.announce(2, 0);
+        assert!(!world.wait_until(long_ago, Duration::ZERO));
+        world.leave(2);
+        assert!(world.wait_until(long_ago, Duration::ZERO));
+    }
+}

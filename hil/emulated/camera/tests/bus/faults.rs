@@ -1,0 +1,128 @@
+//! What goes wrong, and that libusb sees it as it would on a real bus.
+
+use rusb::Error;
+use skinrig_emulated_camera::config::Content;
+use skinrig_emulated_camera::harness::on_bus;
+use skinrig_emulated_camera::steer::Order;
+use skinrig_emulated_camera::{DeviceConfig, Evk1Config};
+
+use crate::client::{Camera, Seen, devices};
+
+const SERIAL: &str = "00001621";
+
+fn bus() -> Vec<DeviceConfig> {
+    let camera = Evk1Config {
+        content: Content::Noise {
+            events_per_s: 1e5,
+            seed: 1,
+        },
+        ..Evk1Config::new(SERIAL)
+    };
+    vec![camera.into()]
+}
+
+fn running() -> Camera {
+    let mut camera = Camera::open(0);
+    camera.configure(1 << 12);
+    camera.start();
+    camera.transfer().expect("a packet");
+    camera
+}
+
+#[test]
+fn a_pulled_cable_ends_everything_and_a_new_one_begins_anew() {
+    on_bus(
+        "faults::a_pulled_cable_ends_everything_and_a_new_one_begins_anew",
+        bus(),
+        |remote| {
+            let mut camera = running();
+            remote.order(SERIAL, Order::Unplug).unwrap();
+            let end = loop {
+                if let Err(e) = camera.transfer() {
+                    break e;
+                }
+            };
+            assert_eq!(end, Error::NoDevice);
+            assert_eq!(camera.read(0x0020), Err(Error::NoDevice));
+            assert!(devices().is_empty());
+            remote.order(SERIAL, Order::Plug).unwrap();
+            let camera = Camera::open(0);
+            assert_eq!(camera.read(0x0008), Ok(0x20), "powered up anew");
+            drop(camera);
+            drop(running());
+        },
+    );
+}
+
+#[test]
+fn a_stall_lasts_until_it_is_cleared() {
+    on_bus(
+        "faults::a_stall_lasts_until_it_is_cleared",
+        bus(),
+        |remote| {
+            let mut camera = running();
+            remote.order(SERIAL, Order::Stall).unwrap();
+            assert_eq!(camera.transfer(), Err(Error::Pipe));
+            assert_eq!(camera.transfer(), Err(Error::Pipe));
+            camera.handle.clear_halt(0x81).unwrap();
+            assert!(camera.transfer().unwrap() > 0);
+        },
+    );
+}
+
+#[test]
+fn a_transfer_may_end_within_a_word_and_garbage_may_come() {
+    on_bus(
+        "faults::a_transfer_may_end_within_a_word_and_garbage_may_come",
+        bus(),
+        |remote| {
+            let mut camera = running();
+            let mut odd = 0;
+            for cut in 1..=3 {
+                remote.order(SERIAL, Order::Cut(cut)).unwrap();
+                for _ in 0..3 {
+                    odd += usize::from(!camera.transfer().unwrap().is_multiple_of(4));
+                }
+            }
+            assert!(odd >= 3, "{odd}");
+            let garbage = vec![0x2000_0000, 0x7fff_ffff, 0xb000_0001];
+            remote
+                .order(SERIAL, Order::Garbage(garbage.clone()))
+                .unwrap();
+            let found = |bytes: &[u8]| {
+                let wanted: Vec<u8> = garbage.iter().flat_map(|w| w.to_le_bytes()).collect();
+                bytes.windows(wanted.len()).any(|w| w == wanted)
+            };
+            for _ in 0..1000 {
+                camera.transfer().unwrap();
+                if found(&camera.received) {
+                    break;
+                }
+            }
+            assert!(found(&camera.received));
+            camera.stop();
+            let seen = Seen::of(&camera.received);
+            assert!(seen.events.is_sorted_by_key(|e| e.t_us));
+            let handed = remote.observe(SERIAL).unwrap().handed;
+            assert_eq!(handed.crc32, crc32fast::hash(&camera.received));
+        },
+    );
+}
+
+#[test]
+fn a_register_may_stick_and_a_request_may_stay_unanswered() {
+    on_bus(
+        "faults::a_register_may_stick_and_a_request_may_stay_unanswered",
+        bus(),
+        |remote| {
+            let camera = Camera::open(0);
+            remote.order(SERIAL, Order::Stick(0x0354)).unwrap();
+            camera.write(0x0354, 0x7900_0029).unwrap();
+            assert_eq!(camera.read(0x0354), Ok(0));
+            remote.order(SERIAL, Order::Silence(true)).unwrap();
+            assert_eq!(camera.read(0x0354), Err(Error::Timeout));
+            remote.order(SERIAL, Order::Silence(false)).unwrap();
+            assert_eq!(camera.read(0x0204), Ok(0xb));
+        },
+    );
+}
