@@ -76,6 +76,7 @@ const HARNESSES: &[&str] = &[
     "skinrig-bench",
     "skinrig-emulated-libdrd",
     "skinrig-emulated-camera",
+    "skinrig-emulated-trigger-box",
     "skinrig-usbshim",
 ];
 

@@ -47,13 +47,19 @@ pub fn trigger_box(
             last.is_none_or(|l| l < sent.t),
             "trigger box: instants out of order"
         );
+        let mut free = sent.t + train;
         last = Some(sent.t);
-        expect_error!(
-            device.send(mark),
-            DeviceError::State { .. },
-            "trigger box: a mark during a train must be a State error"
-        );
-        let free = sent.t + train;
+        match device.send(mark) {
+            Err(DeviceError::State { .. }) => {}
+            // On a real clock the train may be over before the question reaches the box.
+            Ok(again) if clock.now() >= free => {
+                free = again.t + train;
+                last = Some(again.t);
+            }
+            other => {
+                panic!("trigger box: a mark during a train must be a State error: found {other:?}")
+            }
+        }
         let wait = free - clock.now() + TICK;
         pass(clock.as_mut(), wait, || {});
     }

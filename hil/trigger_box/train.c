@@ -1,0 +1,223 @@
+// The pulse trains: each edge is due at an instant of the clock and rises or falls in exactly that cycle.
+//
+// The compare interrupt of Timer1 comes a little early, waits for the rest in a loop that accounts for every cycle, and
+// writes the port once. Other interrupts may delay its beginning, never the edge.
+#include "train.h"
+
+#include <avr/interrupt.h>
+#include <util/atomic.h>
+#include <util/delay.h>
+
+#include "clock.h"
+#include "events.h"
+#include "pins.h"
+#include "protocol.h"
+
+// How long before an edge its interrupt is due: longer than the longest stretch without interrupts.
+#define LEAD_TICKS (20UL * TICKS_PER_US)
+// From "now" to the first edge of a train that need not wait.
+#define START_LEAD_TICKS (100UL * TICKS_PER_US)
+// Cycles between the reading of Timer1 in `write_at` and the change of the port, besides the wait itself.
+#define WRITE_CYCLES 17
+
+struct train {
+    uint8_t kind;       // event_kind
+    uint32_t payload;   // 20 bits
+    uint32_t widths;    // bit k: pulse k is long; the start pulse apart
+    uint64_t start;     // first rising edge
+};
+
+enum { IDLE, ACTIVE };
+static volatile uint8_t state;
+static volatile bool waiting; // `next` begins after `current`
+static struct train current, next;
+
+static uint8_t pulse;       // of the current train
+static bool high;           // the outputs are up
+static uint32_t rise;       // lower 32 bits of the present pulse's rising edge
+static uint32_t due;        // lower 32 bits of the next edge
+static uint64_t free_at;    // from here on another train may begin
+
+static struct train_counts counts;
+
+// Writes `value` to the port of the outputs in the cycle in which the lower half of the clock reads `at`. True when
+// that cycle was over already; then it writes at once.
+static inline bool write_at(uint16_t at, uint8_t value)
+{
+    uint16_t left = at - WRITE_CYCLES;
+    uint16_t now;
+    uint8_t late;
+    asm volatile("lds %A[now], %[timer]\n\t"
+                 "lds %B[now], %[timer]+1\n\t"
+                 "sub %A[left], %A[now]\n\t"
+                 "sbc %B[left], %B[now]\n\t"
+                 "mov %[late], %B[left]\n\t"
+                 "brmi 2f\n\t"
+                 "1: sbiw %[left], 4\n\t" // four cycles a turn
+                 "brcc 1b\n\t"
+                 "sbrc %A[left], 0\n\t" // the rest: 0 to 3 cycles
+                 "rjmp .+0\n\t"
+                 "sbrc %A[left], 1\n\t"
+                 "rjmp .+0\n\t"
+                 "sbrc %A[left], 1\n\t"
+                 "rjmp .+0\n\t"
+                 "2: out %[port], %[value]\n\t"
+                 : [left] "+w"(left), [now] "=&r"(now), [late] "=&r"(late)
+                 : [timer] "n"(_SFR_MEM_ADDR(TCNT1L)), [port] "I"(_SFR_IO_ADDR(PORTB)), [value] "r"(value)
+                 : "memory");
+    return late & 0x80;
+}
+
+static uint32_t width_us(uint8_t k)
+{
+    if (k == 0)
+        return START_WIDTH_US;
+    return (current.widths >> k) & 1 ? ONE_WIDTH_US : ZERO_WIDTH_US;
+}
+
+static void begin(void)
+{
+    pulse = 0;
+    high = false;
+    rise = due = (uint32_t)current.start;
+    state = ACTIVE;
+    free_at = current.start + TRAIN_US * TICKS_PER_US;
+    OCR1A = (uint16_t)due - (uint16_t)LEAD_TICKS;
+}
+
+ISR(TIMER1_COMPA_vect)
+{
+    if (state == IDLE)
+        return;
+    // A match of an old setting, or an edge more than a turn of the timer away: it will come again.
+    if ((int32_t)(due - clock_low()) > (int32_t)(2 * LEAD_TICKS))
+        return;
+    uint8_t value = high ? PORTB & (uint8_t)~OUTPUTS : PORTB | OUTPUTS;
+    if (write_at((uint16_t)due, value) && counts.late_edges != UINT16_MAX)
+        ++counts.late_edges;
+    high = !high;
+    if (high) {
+        if (pulse == 0) {
+            bool mark = current.kind == EVENT_MARK;
+            if (mark)
+                ++counts.marks;
+            else
+                ++counts.syncs;
+            uint32_t press_mask = (1UL << PRESS_BITS) - 1;
+            events_push(current.kind, mark ? current.payload : current.payload & press_mask, current.start);
+        }
+        due = rise + width_us(pulse) * TICKS_PER_US;
+    } else if (++pulse < PULSES_PER_TRAIN) {
+        rise += PULSE_PERIOD_US * TICKS_PER_US;
+        due = rise;
+    } else if (waiting) {
+        waiting = false;
+        current = next;
+        begin();
+        return;
+    } else {
+        state = IDLE;
+        return;
+    }
+    OCR1A = (uint16_t)due - (uint16_t)LEAD_TICKS;
+}
+
+// Bits `widths` of a train: pulse 1 is the payload's first bit, the last pulse its parity.
+static uint32_t widths_of(uint32_t payload)
+{
+    uint32_t widths = 0;
+    bool odd = false;
+    for (uint8_t k = 1; k <= PAYLOAD_BITS; ++k) {
+        if ((payload >> (PAYLOAD_BITS - k)) & 1) {
+            widths |= 1UL << k;
+            odd = !odd;
+        }
+    }
+    if (odd)
+        widths |= 1UL << (PULSES_PER_TRAIN - 1);
+    return widths;
+}
+
+// The earliest whole microsecond at which a train may begin.
+static uint64_t earliest(void)
+{
+    uint64_t t = clock_now() + START_LEAD_TICKS;
+    if (t < free_at)
+        t = free_at;
+    return (t + TICKS_PER_US - 1) & ~(uint64_t)(TICKS_PER_US - 1);
+}
+
+void train_setup(void)
+{
+    PORTB &= (uint8_t)~OUTPUTS;
+    DDRB |= OUTPUTS;
+    // Always on: without a train it finds nothing to do, once each turn of the timer.
+    TIMSK1 |= _BV(OCIE1A);
+}
+
+bool train_mark(uint32_t payload, uint64_t *start)
+{
+    struct train t = {.kind = EVENT_MARK, .payload = payload, .widths = widths_of(payload)};
+    bool taken = false;
+    ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
+    {
+        if (state == IDLE) {
+            current = t;
+            *start = current.start = earliest();
+            begin();
+            taken = true;
+        } else if (current.kind == EVENT_SYNC && !waiting) {
+            next = t;
+            *start = next.start = free_at;
+            waiting = true;
+            taken = true;
+        }
+    }
+    return taken;
+}
+
+bool train_sync(uint32_t count)
+{
+    uint32_t payload = (SYNC_CODE << PRESS_BITS) | (count & ((1UL << PRESS_BITS) - 1));
+    struct train t = {.kind = EVENT_SYNC, .payload = payload, .widths = widths_of(payload)};
+    bool taken = false;
+    ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
+    {
+        if (state == IDLE) {
+            current = t;
+            current.start = earliest();
+            begin();
+            taken = true;
+        }
+    }
+    return taken;
+}
+
+bool train_under_way(void)
+{
+    return state != IDLE;
+}
+
+uint8_t train_self_test(void)
+{
+    uint8_t flags = 0;
+    bool before = PINB & _BV(PIN_INPUT);
+    PORTB |= OUTPUTS;
+    _delay_us(100);
+    uint8_t up = PINB;
+    PORTB &= (uint8_t)~OUTPUTS;
+    _delay_us(100);
+    uint8_t down = PINB;
+    if ((up & OUTPUTS) == OUTPUTS)
+        flags |= SELF_TEST_ROSE;
+    if ((down & OUTPUTS) == 0)
+        flags |= SELF_TEST_FELL;
+    if (!before && (up & _BV(PIN_INPUT)) && !(down & _BV(PIN_INPUT)))
+        flags |= SELF_TEST_INPUT_FOLLOWED;
+    return flags;
+}
+
+void train_count(struct train_counts *out)
+{
+    ATOMIC_BLOCK(ATOMIC_RESTORESTATE) { *out = counts; }
+}

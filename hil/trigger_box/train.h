@@ -1,0 +1,37 @@
+// Trains of pulses on the outputs, in the code of crates/model/src/pulse.rs.
+#pragma once
+#include <stdbool.h>
+#include <stdint.h>
+
+#define START_WIDTH_US 300UL
+#define ONE_WIDTH_US 200UL
+#define ZERO_WIDTH_US 100UL
+#define PULSE_PERIOD_US 400UL
+#define PAYLOAD_BITS 20
+#define PULSES_PER_TRAIN (PAYLOAD_BITS + 2)
+#define TRAIN_US (PULSES_PER_TRAIN * PULSE_PERIOD_US)
+#define PRESS_BITS 17
+#define SYNC_CODE 6UL
+
+void train_setup(void);
+
+// Starts the train of a mark (kind above bit 17, press below) as soon as the line is free and sets `*start` to the
+// instant of its first rising edge. False while the train of another mark is under way or waits.
+bool train_mark(uint32_t payload, uint64_t *start);
+
+// Starts the sync train number `count` unless any train is under way.
+bool train_sync(uint32_t count);
+
+// Is a train under way, or waiting?
+bool train_under_way(void);
+
+// Raises and lowers the outputs once, 100 us long, without a train; flags of self_test_flag. The line must be free.
+uint8_t train_self_test(void);
+
+// Trains that started, and edges that came too late by more than a cycle, since reset.
+struct train_counts {
+    uint32_t marks;
+    uint32_t syncs;
+    uint16_t late_edges;
+};
+void train_count(struct train_counts *out);
