@@ -5,8 +5,8 @@ use std::path::Path;
 
 use skinrig_formats::Scanner;
 use skinrig_model::{
-    CameraId, DeviceIdentity, DeviceRole, HostDuration, HostTime, MotionCommand, PoseSample,
-    RawChunk, RunHeader, SentMark, Setting,
+    BoxReport, CameraId, DeviceIdentity, DeviceRole, HostDuration, HostTime, MotionCommand,
+    PoseSample, RawChunk, RunHeader, SentMark, Setting,
 };
 use skinrig_recorder::{ChunkMeta, DeviceRow, RecorderError, SessionReader};
 use skinrig_sim::replay::{Recording, RecordingError};
@@ -22,6 +22,7 @@ pub struct SessionRecording {
     devices: Vec<DeviceRow>,
     commands: VecDeque<(HostTime, MotionCommand)>,
     marks: VecDeque<SentMark>,
+    reports: VecDeque<(HostTime, BoxReport)>,
     chunks: [VecDeque<ChunkMeta>; 2],
     scanners: [Scanner; 2],
     poses_from: HostTime,
@@ -49,6 +50,7 @@ impl SessionRecording {
                 .map(|c| (c.t, c.command))
                 .collect(),
             marks: reader.marks_sent()?.into(),
+            reports: reader.box_reports()?.into(),
             chunks: [
                 reader.chunk_index(one)?.into(),
                 reader.chunk_index(two)?.into(),
@@ -99,6 +101,10 @@ impl Recording for SessionRecording {
 
     fn next_mark(&mut self) -> Result<Option<SentMark>, RecordingError> {
         Ok(self.marks.pop_front())
+    }
+
+    fn next_box_report(&mut self) -> Result<Option<(HostTime, BoxReport)>, RecordingError> {
+        Ok(self.reports.pop_front())
     }
 
     fn next_chunk(&mut self, camera: CameraId) -> Result<Option<RawChunk>, RecordingError> {

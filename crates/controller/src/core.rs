@@ -153,15 +153,30 @@ impl<'a> Core<'a> {
     pub(crate) fn observe(&mut self) -> Result<(), ControllerError> {
         let poses = self.observe_poses();
         let cameras = self.collect(Collect::Poll);
+        let line = self.observe_box();
         if self.ending {
-            if let Err(e) = cameras {
+            for e in [cameras, line].into_iter().filter_map(Result::err) {
                 self.journal.problem(e.to_string());
             }
             return poses;
         }
-        poses.and(cameras)?;
+        poses.and(cameras).and(line)?;
         self.queue_marks();
         self.send_marks()
+    }
+
+    /// Takes what the trigger box reported and emits it, also what came before it failed.
+    fn observe_box(&mut self) -> Result<(), ControllerError> {
+        let Some(trigger) = &mut self.trigger_box else {
+            return Ok(());
+        };
+        let mut reports = Vec::new();
+        let answer = trigger.poll(&mut reports);
+        if !reports.is_empty() {
+            let t = self.clock.now();
+            self.journal.emit(Record::BoxReports { t, reports })?;
+        }
+        Ok(answer?)
     }
 
     fn observe_poses(&mut self) -> Result<(), ControllerError> {

@@ -106,6 +106,7 @@ impl ProgressTracker {
                 p.marks_sent += 1;
                 self.reached(sent.t);
             }
+            Record::BoxReports { t, .. } => self.reached(*t),
             Record::Chunk(chunk) => self.chunk(chunk),
             Record::Outcome(outcome) => {
                 p.done += 1;

@@ -14,6 +14,7 @@ use crate::press::{PlannedPress, PressOutcome};
 use crate::pulse::SentMark;
 use crate::stream::{RawChunk, StreamFormat};
 use crate::time::HostTime;
+use crate::trigger_box::BoxReport;
 
 /// What a device is for in the rig.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -222,6 +223,13 @@ pub enum Record {
     Poses(Vec<PoseSample>),
     /// The trigger box sent a mark.
     MarkSent(SentMark),
+    /// What the trigger box reported on its own clock, in the order in which it came.
+    BoxReports {
+        /// When it was taken from the box.
+        t: HostTime,
+        /// The reports.
+        reports: Vec<BoxReport>,
+    },
     /// Camera bytes.
     Chunk(RawChunk),
     /// An attempt ended. Durable together with all chunks up to its end.

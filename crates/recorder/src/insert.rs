@@ -5,7 +5,8 @@ use std::time::Instant;
 
 use sha2::{Digest, Sha256};
 use skinrig_model::{
-    HostTime, PlannedPress, PoseSample, PressOutcome, PressVerdict, Record, RunEnd, RunHeader,
+    BoxReport, HostTime, PlannedPress, PoseSample, PressOutcome, PressVerdict, Record, RunEnd,
+    RunHeader,
 };
 use sqlx::sqlite::SqliteConnection;
 
@@ -153,6 +154,12 @@ impl Journal {
                 .bind(mark.uncertainty_ns)
                 .execute(&mut self.conn)
                 .await?;
+                Ok(())
+            }
+            Record::BoxReports { t, reports } => {
+                for report in reports {
+                    self.box_report(t, report).await?;
+                }
                 Ok(())
             }
             Record::Chunk(chunk) => {
@@ -359,6 +366,26 @@ impl Journal {
                 self.flush_poses().await?;
             }
         }
+        Ok(())
+    }
+
+    async fn box_report(&mut self, taken: HostTime, report: BoxReport) -> Result<(), Fault> {
+        let row = crate::box_row::BoxRow::of(taken, report)?;
+        sqlx::query(
+            "INSERT INTO box_report (taken_ns, what, box_us, sent_ns, received_ns, kind, press, count, rising)
+             VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)",
+        )
+        .bind(row.taken_ns)
+        .bind(row.what)
+        .bind(row.box_us)
+        .bind(row.sent_ns)
+        .bind(row.received_ns)
+        .bind(row.kind)
+        .bind(row.press)
+        .bind(row.count)
+        .bind(row.rising)
+        .execute(&mut self.conn)
+        .await?;
         Ok(())
     }
 

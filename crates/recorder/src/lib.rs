@@ -10,6 +10,7 @@
 //! [`Intent`]: skinrig_model::Record::Intent
 //! [`Outcome`]: skinrig_model::Record::Outcome
 
+mod box_row;
 pub mod catalogue;
 pub mod codec;
 pub mod error;

@@ -149,6 +149,12 @@ pub fn named<T: Copy>(
         })
 }
 
+/// The schema that the file was made with.
+pub async fn schema_version(conn: &mut SqliteConnection) -> Result<u32, Fault> {
+    let version = sqlx::query("PRAGMA user_version").fetch_one(conn).await?;
+    num(&version, "user_version")
+}
+
 /// Sizes and counts as the rows have them.
 pub async fn totals(conn: &mut SqliteConnection) -> Result<SessionTotals, Fault> {
     let mut totals = SessionTotals::default();

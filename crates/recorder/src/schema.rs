@@ -13,7 +13,7 @@ use crate::error::RecorderError;
 use crate::query::Fault;
 
 /// The schema version that this build writes, and the newest that it reads (`PRAGMA user_version`).
-pub const SCHEMA_VERSION: u32 = 1;
+pub const SCHEMA_VERSION: u32 = 2;
 
 /// `skrg` in ASCII (`PRAGMA application_id`).
 pub const APPLICATION_ID: u32 = u32::from_be_bytes(*b"skrg");
@@ -149,5 +149,47 @@ mod tests {
     #[test]
     fn the_version_counts_the_migrations() {
         assert_eq!(MIGRATOR.iter().count(), SCHEMA_VERSION as usize);
+    }
+
+    /// A sealed session of schema 1 is read and verified as before: the tables that came later are no part of it.
+    #[test]
+    fn sessions_of_the_first_schema_stay_sound() {
+        struct NoBytes;
+        impl crate::ChunkScanner for NoBytes {
+            fn scan(
+                &mut self,
+                _: skinrig_model::CameraId,
+                _: skinrig_model::StreamFormat,
+                _: &[u8],
+            ) -> (skinrig_model::ChunkFacts, Vec<skinrig_model::TriggerEdge>) {
+                Default::default()
+            }
+        }
+
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("old.session.sqlite");
+        let runtime = tokio::runtime::Builder::new_current_thread()
+            .build()
+            .unwrap();
+        let digests = runtime.block_on(async {
+            let mut conn = create(&path).await.unwrap();
+            for undo in [
+                "DROP TABLE box_report",
+                "DELETE FROM _sqlx_migrations WHERE version > 20261121000000",
+                "PRAGMA user_version = 1",
+                "PRAGMA journal_mode = DELETE",
+            ] {
+                sqlx::query(undo).execute(&mut conn).await.unwrap();
+            }
+            crate::seal::digest_tables(&mut conn).await.unwrap()
+        });
+        assert!(digests.iter().all(|d| d.name != "box_report"));
+        assert_eq!(digests.len(), 15);
+        let reader = crate::SessionReader::open(&path).unwrap();
+        assert_eq!(reader.box_reports().unwrap(), []);
+        let problems = crate::verify(&path, &mut NoBytes).unwrap().problems;
+        // Nothing but the header, which nobody wrote.
+        assert_eq!(problems.len(), 1, "{problems:?}");
+        assert!(problems[0].contains("the run's header"), "{problems:?}");
     }
 }

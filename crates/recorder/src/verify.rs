@@ -4,7 +4,8 @@ use std::path::Path;
 
 use sha2::{Digest, Sha256};
 use skinrig_model::{
-    CameraId, ChunkFacts, HostTime, PlannedPress, RunEnd, RunHeader, StreamFormat, TriggerEdge,
+    BoxReport, BoxTime, CameraId, ChunkFacts, HostTime, PlannedPress, RunEnd, RunHeader,
+    StreamFormat, TriggerEdge,
 };
 
 use crate::error::RecorderError;
@@ -303,8 +304,33 @@ fn check_journal(reader: &SessionReader, report: &mut VerifyReport) {
     }
     report.take(reader.commands());
     report.take(reader.marks_sent());
+    check_box_reports(reader, report);
     report.take(reader.notes());
     report.take(reader.interruptions());
+}
+
+/// The box's clock never goes back but by a reset. Answers and events take different ways through the box, so each is
+/// in order only among its like.
+fn check_box_reports(reader: &SessionReader, report: &mut VerifyReport) {
+    let mut last = [BoxTime::default(); 3];
+    for (taken, said) in report.take(reader.box_reports()).unwrap_or_default() {
+        let (like, at) = match said {
+            BoxReport::Exchange { at, .. } => (0, at),
+            BoxReport::Mark { at, .. } | BoxReport::Sync { at, .. } => (1, at),
+            BoxReport::Input { at, .. } => (2, at),
+            BoxReport::Reset { .. } => {
+                last = [BoxTime::default(); 3];
+                continue;
+            }
+        };
+        if at < last[like] {
+            report.add(format!(
+                "box report taken at {taken}: expected box times from {} µs without a reset, found {} µs",
+                last[like].us, at.us
+            ));
+        }
+        last[like] = at;
+    }
 }
 
 fn check_seal(reader: &SessionReader, report: &mut VerifyReport) {

@@ -9,13 +9,14 @@ use skinrig_model::{
     StreamFormat,
 };
 
-use crate::camera_clock::CameraClock;
 use crate::camera_stream::{Outgoing, Streaming};
 use crate::config::SimConfig;
+use crate::drifting::DriftingClock;
 use crate::faults::{Fault, When};
+use crate::line::LineEdge;
 use crate::random::{Purpose, Stream};
 use crate::scene::{GRID_NS, PixelModel};
-use crate::world::{LineEdge, Shared, World};
+use crate::world::{Shared, World};
 
 /// Bias names, ranges and defaults in mV (evk1.md section 2.9). The simulation stores them; they have no
 /// effect on its events.
@@ -50,7 +51,7 @@ pub struct SimCamera {
     make_pixels: PixelFactory,
     random: Stream,
     draw_clock: crate::config::CameraClockConfig,
-    clock: Option<CameraClock>,
+    clock: Option<DriftingClock>,
     settings: CameraSettings,
     starts: u64,
     streaming: Option<Streaming>,
@@ -186,8 +187,11 @@ impl SimCamera {
             let mut world = self.shared.world();
             world.tips_since(index, stream.grid, &mut stream.tips);
             let jitter = |random: &mut Stream| (random.unit() * self.jitter_ns as f64) as i64;
-            for edge in world.edges[index].drain(..) {
-                let t_ns = edge.t_ns + jitter(&mut self.random);
+            for edge in world.line.take_edges(index) {
+                let seen_ns = edge.t_ns + jitter(&mut self.random);
+                // Edges never overtake each other.
+                let before_ns = stream.edges.back().map_or(seen_ns, |e| e.t_ns);
+                let t_ns = seen_ns.max(before_ns);
                 stream.edges.push_back(LineEdge { t_ns, ..edge });
             }
             stream.grid = world.grid();
@@ -321,13 +325,18 @@ impl EventCamera for SimCamera {
         let start_ns = grid * GRID_NS;
         let clock = match self.clock {
             Some(clock) => clock,
-            None => CameraClock::draw(&self.draw_clock, &mut self.random, start_ns),
+            None => DriftingClock::draw(
+                self.draw_clock.max_origin_s,
+                self.draw_clock.max_drift_ppm,
+                &mut self.random,
+                start_ns,
+            ),
         };
         self.clock = Some(clock);
         self.streaming = Some(Streaming {
             grid,
             pixels: (self.make_pixels)(self.starts),
-            encoder: evt2::Encoder::new(clock.camera_us(start_ns)),
+            encoder: evt2::Encoder::new(clock.own_us(start_ns)),
             edges: VecDeque::new(),
             tips: Vec::new(),
             events: Vec::new(),

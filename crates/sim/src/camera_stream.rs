@@ -7,9 +7,9 @@ use skinrig_formats::{Scanner, evt2};
 use skinrig_model::{CameraId, CdEvent, HostTime, RawChunk, TriggerEdge};
 
 use crate::camera::TRIGGER_CHANNEL;
-use crate::camera_clock::CameraClock;
+use crate::drifting::DriftingClock;
+use crate::line::LineEdge;
 use crate::scene::{PixelEvent, PixelModel, TipSample};
-use crate::world::LineEdge;
 
 /// What exists only while streaming.
 pub(crate) struct Streaming {
@@ -45,7 +45,7 @@ impl Streaming {
         &mut self,
         from: TipSample,
         to: TipSample,
-        clock: CameraClock,
+        clock: DriftingClock,
         set: &CameraSettings,
     ) {
         self.events.clear();
@@ -67,7 +67,7 @@ impl Streaming {
                 continue;
             }
             let cd = CdEvent {
-                t_us: clock.camera_us(event.t_ns),
+                t_us: clock.own_us(event.t_ns),
                 x: event.x,
                 y: event.y,
                 polarity: event.polarity,
@@ -83,7 +83,7 @@ impl Streaming {
         }
         let reached = self
             .encoder
-            .advance_to(clock.camera_us(to.t_ns), &mut self.fresh);
+            .advance_to(clock.own_us(to.t_ns), &mut self.fresh);
         debug_assert!(reached.is_ok(), "time ran backwards: {reached:?}");
     }
 }
@@ -92,12 +92,12 @@ fn encode_edge(
     encoder: &mut evt2::Encoder,
     edge: LineEdge,
     triggered: bool,
-    clock: CameraClock,
+    clock: DriftingClock,
     out: &mut Vec<u8>,
 ) {
     if triggered {
         let edge = TriggerEdge {
-            t_us: clock.camera_us(edge.t_ns),
+            t_us: clock.own_us(edge.t_ns),
             channel: TRIGGER_CHANNEL,
             rising: edge.rising,
         };

@@ -36,12 +36,26 @@ impl Default for CameraClockConfig {
 }
 
 /// How the trigger box behaves (assumed).
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TriggerBoxConfig {
     /// The first edge rises this long after the request at least, ns.
     pub min_latency_ns: i64,
     /// And at most this long, ns.
     pub max_latency_ns: i64,
+    /// The drift of its clock is drawn from -max..=max, parts per million: a ceramic resonator's.
+    pub max_drift_ppm: f64,
+    /// Its time at the beginning is drawn from 0..max, s.
+    pub max_origin_s: f64,
+    /// It sends a sync train each such time on its own clock, ms; 0 for none.
+    pub sync_period_ms: u32,
+    /// The host asks it for its time this often, ms; 0 for never.
+    pub exchange_period_ms: u32,
+    /// A question or an answer is under way this long at least, µs.
+    pub min_delay_us: f64,
+    /// And on average this much longer, with an exponential distribution, µs.
+    pub mean_delay_us: f64,
+    /// Whether its input is closed while the tip touches the skin.
+    pub contact_input: bool,
 }
 
 impl Default for TriggerBoxConfig {
@@ -49,6 +63,13 @@ impl Default for TriggerBoxConfig {
         Self {
             min_latency_ns: 20_000,
             max_latency_ns: 60_000,
+            max_drift_ppm: 500.0,
+            max_origin_s: 1_000.0,
+            sync_period_ms: 1_000,
+            exchange_period_ms: 100,
+            min_delay_us: 150.0,
+            mean_delay_us: 100.0,
+            contact_input: true,
         }
     }
 }

@@ -47,14 +47,26 @@ pub enum Fault {
     /// A bias reads back with another value than written. Seen as
     /// [`skinrig_device::DeviceError::ReadBack`].
     CameraReadBack(CameraId),
-    /// A pulse of a train never reaches a camera. Seen as stray edges and a missing mark.
+    /// A pulse of a mark never reaches a camera. Seen as lost edges; the start pulse's loss as stray edges and a missing
+    /// mark.
     PulseLost {
         /// Which camera.
         camera: CameraId,
-        /// Which of the trains sent, from 0.
+        /// Which of the marks sent, from 0.
         train: u32,
         /// Which pulse of it, from 0.
         pulse: u32,
+    },
+    /// A camera's trigger input loses, doubles and invents edges, each with this share of the edges sent, in percent.
+    NoisyLine {
+        /// Which camera.
+        camera: CameraId,
+        /// Edges that never arrive.
+        lost_percent: u8,
+        /// Edges that arrive twice, within 10 µs.
+        doubled_percent: u8,
+        /// Edges that nobody sent, anywhere within a train.
+        spurious_percent: u8,
     },
     /// The trigger box answers no more. Seen as [`skinrig_device::DeviceError::Lost`].
     TriggerBoxLost(When),

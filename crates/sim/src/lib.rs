@@ -6,14 +6,15 @@
 //! polled. [`replay`] serves a recording through the same traits.
 
 pub mod camera;
-pub mod camera_clock;
 mod camera_stream;
 pub mod clock;
 pub mod columns;
 pub mod config;
+pub mod drifting;
 pub mod faults;
 pub mod geometric;
 pub mod indenter;
+pub mod line;
 pub mod motion;
 pub mod optical;
 pub mod random;

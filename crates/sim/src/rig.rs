@@ -142,6 +142,13 @@ pub fn describe(config: &SimConfig) -> String {
         "trigger_box": {
             "min_latency_ns": t.min_latency_ns,
             "max_latency_ns": t.max_latency_ns,
+            "max_drift_ppm": t.max_drift_ppm,
+            "max_origin_s": t.max_origin_s,
+            "sync_period_ms": t.sync_period_ms,
+            "exchange_period_ms": t.exchange_period_ms,
+            "min_delay_us": t.min_delay_us,
+            "mean_delay_us": t.mean_delay_us,
+            "contact_input": t.contact_input,
         },
         "faults": config.faults.iter().map(|f| format!("{f:?}")).collect::<Vec<_>>(),
     });

@@ -2,24 +2,27 @@
 
 use skinrig_device::{DeviceError, TriggerBox, TriggerCapabilities};
 use skinrig_model::{
-    BoxReport, CameraId, DeviceIdentity, DeviceRole, HostDuration, HostTime, Mark, PulseTrain,
+    BoxReport, BoxTime, DeviceIdentity, DeviceRole, HostDuration, HostTime, Mark, PulseTrain,
     SentMark,
 };
 
 use crate::config::{SimConfig, TriggerBoxConfig};
+use crate::drifting::DriftingClock;
 use crate::faults::{Fault, When};
 use crate::random::{Purpose, Stream};
-use crate::world::{LineEdge, Shared};
+use crate::world::Shared;
 
 /// A simulated trigger box.
 pub struct SimTriggerBox {
     shared: Shared,
     config: TriggerBoxConfig,
     serial: String,
-    random: Stream,
-    sent: u32,
-    busy_until: Option<HostTime>,
-    lost_pulses: Vec<(CameraId, u32, u32)>,
+    latencies: Stream,
+    delays: Stream,
+    /// When the host next asks for the time, ns.
+    next_exchange_ns: i64,
+    /// An exchange whose answer is still under way.
+    exchange: Option<(i64, BoxReport)>,
     lost: Option<When>,
 }
 
@@ -27,31 +30,50 @@ impl SimTriggerBox {
     /// The box of a rig.
     #[must_use]
     pub fn new(config: &SimConfig, shared: Shared) -> Self {
-        let mut lost_pulses = Vec::new();
-        let mut lost = None;
-        for fault in &config.faults {
-            match *fault {
-                Fault::PulseLost {
-                    camera,
-                    train,
-                    pulse,
-                } => {
-                    lost_pulses.push((camera, train, pulse));
-                }
-                Fault::TriggerBoxLost(when) => lost = Some(when),
-                _ => {}
-            }
-        }
+        let lost = config.faults.iter().find_map(|fault| match fault {
+            Fault::TriggerBoxLost(when) => Some(*when),
+            _ => None,
+        });
         Self {
             shared,
             config: config.trigger_box,
             serial: format!("sim-{:08x}-t", config.seed as u32),
-            random: Stream::new(config.seed, Purpose::TriggerBox, 0),
-            sent: 0,
-            busy_until: None,
-            lost_pulses,
+            latencies: Stream::new(config.seed, Purpose::TriggerBox, 0),
+            delays: Stream::new(config.seed, Purpose::TriggerBox, 2),
+            next_exchange_ns: 0,
+            exchange: None,
             lost,
         }
+    }
+
+    fn gone(&self) -> DeviceError {
+        DeviceError::Lost {
+            role: DeviceRole::TriggerBox,
+            serial: self.serial.clone(),
+            detail: "expected an answer, found none".to_owned(),
+        }
+    }
+
+    /// The next exchange of time, with the instant at which its answer reaches the host.
+    fn next_exchange(&mut self, clock: DriftingClock) -> Option<(i64, BoxReport)> {
+        if self.config.exchange_period_ms == 0 {
+            return None;
+        }
+        let (least, mean) = (self.config.min_delay_us, self.config.mean_delay_us);
+        let mut delay_ns = || ((least + mean * self.delays.exponential()) * 1_000.0) as i64;
+        let sent_ns = self.next_exchange_ns;
+        let read_ns = sent_ns + delay_ns();
+        let received_ns = read_ns + delay_ns();
+        self.next_exchange_ns =
+            received_ns.max(sent_ns + i64::from(self.config.exchange_period_ms) * 1_000_000);
+        let report = BoxReport::Exchange {
+            sent: HostTime(sent_ns),
+            received: HostTime(received_ns),
+            at: BoxTime {
+                us: clock.own_us(read_ns),
+            },
+        };
+        Some((received_ns, report))
     }
 }
 
@@ -75,13 +97,10 @@ impl TriggerBox for SimTriggerBox {
         let now = self.shared.now();
         let mut world = self.shared.world();
         if self.lost.is_some_and(|when| world.has_struck(when)) {
-            return Err(DeviceError::Lost {
-                role: DeviceRole::TriggerBox,
-                serial: self.serial.clone(),
-                detail: "expected an answer, found none".to_owned(),
-            });
+            return Err(self.gone());
         }
-        if let Some(until) = self.busy_until.filter(|&until| now < until) {
+        if let Some(until) = world.line.busy_until(now.0) {
+            let until = HostTime(until);
             return Err(DeviceError::State {
                 role: DeviceRole::TriggerBox,
                 serial: self.serial.clone(),
@@ -98,28 +117,9 @@ impl TriggerBox for SimTriggerBox {
             });
         };
         let (low, high) = (self.config.min_latency_ns, self.config.max_latency_ns);
-        let latency = low + (self.random.unit() * (high - low) as f64) as i64;
-        let rise = now.0 + latency;
-        for (k, (offset_us, width_us)) in train.pulses().enumerate() {
-            let up = rise + offset_us as i64 * 1_000;
-            let down = up + width_us as i64 * 1_000;
-            for camera in CameraId::ALL {
-                let lost = self.lost_pulses.contains(&(camera, self.sent, k as u32));
-                if !lost {
-                    let line = &mut world.edges[camera.index()];
-                    line.push_back(LineEdge {
-                        t_ns: up,
-                        rising: true,
-                    });
-                    line.push_back(LineEdge {
-                        t_ns: down,
-                        rising: false,
-                    });
-                }
-            }
-        }
-        self.sent += 1;
-        self.busy_until = Some(now + self.capabilities().train_duration);
+        let latency = low + (self.latencies.unit() * (high - low) as f64) as i64;
+        let until = now + self.capabilities().train_duration;
+        world.line.send(mark, train, now.0 + latency, until.0);
         // The host knows only that the edge rose between the shortest and the longest latency.
         let half = (high - low).div_euclid(2) + 1;
         Ok(SentMark {
@@ -129,7 +129,27 @@ impl TriggerBox for SimTriggerBox {
         })
     }
 
-    fn poll(&mut self, _reports: &mut Vec<BoxReport>) -> Result<(), DeviceError> {
-        Ok(())
+    fn poll(&mut self, reports: &mut Vec<BoxReport>) -> Result<(), DeviceError> {
+        let now = self.shared.now();
+        let shared = self.shared.clone();
+        let mut world = shared.world();
+        if self.lost.is_some_and(|when| world.has_struck(when)) {
+            return Err(self.gone());
+        }
+        let clock = world.line.clock();
+        // Both in the order in which they reach the host.
+        loop {
+            if self.exchange.is_none() && self.next_exchange_ns <= now.0 {
+                self.exchange = self.next_exchange(clock);
+            }
+            let before = self.exchange.map_or(now.0, |(t_ns, _)| t_ns.min(now.0));
+            if let Some((_, report)) = world.line.take_report(before) {
+                reports.push(report);
+            } else if let Some((_, report)) = self.exchange.take_if(|(t_ns, _)| *t_ns <= now.0) {
+                reports.push(report);
+            } else {
+                return Ok(());
+            }
+        }
     }
 }

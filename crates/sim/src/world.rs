@@ -13,19 +13,14 @@ use skinrig_model::{HostTime, Point3, RigidTransform, Robot, Skin};
 use crate::clock::SimClock;
 use crate::config::SimConfig;
 use crate::faults::{Fault, When};
+use crate::line::Line;
 use crate::motion::Motion;
 use crate::scene::{GRID_NS, TipSample};
 
-/// An edge on a camera's trigger input, on world time.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct LineEdge {
-    /// World time, ns.
-    pub t_ns: i64,
-    /// True for a rising edge.
-    pub rising: bool,
-}
+/// The tip has left the skin above this height, mm: measured at rest on the surface, it does not leave and touch again.
+const LEFT_MM: f64 = 0.05;
 
-/// What the tip and the trigger lines do.
+/// What the tip and the trigger line do.
 #[derive(Debug)]
 pub struct World {
     /// The robot.
@@ -39,8 +34,8 @@ pub struct World {
     tips_from: i64,
     /// Next grid index that each camera wants; `None` while it does not stream.
     wanted: [Option<i64>; 2],
-    /// Edges that the cameras have not taken yet.
-    pub edges: [VecDeque<LineEdge>; 2],
+    /// The trigger line.
+    pub line: Line,
     contacts: u32,
     contact_times: Vec<i64>,
     touching: bool,
@@ -66,7 +61,7 @@ impl World {
             tips: VecDeque::new(),
             tips_from: 0,
             wanted: [None; 2],
-            edges: [VecDeque::new(), VecDeque::new()],
+            line: Line::new(config),
             contacts: 0,
             contact_times: Vec::new(),
             touching: false,
@@ -89,6 +84,7 @@ impl World {
             self.motion.step();
             self.observe();
         }
+        self.line.advance(now.0);
     }
 
     fn apply_faults(&mut self) {
@@ -107,14 +103,21 @@ impl World {
         let t_ns = self.grid * GRID_NS;
         let position = self.skin_from_robot.apply(self.motion.tip());
         let rate = (self.last_z_mm - position.z_mm) / (GRID_NS as f64 * 1e-9);
-        self.last_z_mm = position.z_mm;
+        // When the straight path from the last grid point to this one went through a height.
+        let passed = |z_mm: f64| {
+            let ahead = (position.z_mm - z_mm) / (position.z_mm - self.last_z_mm);
+            t_ns - (ahead.clamp(0.0, 1.0) * GRID_NS as f64) as i64
+        };
         if position.z_mm < 0.0 && !self.touching {
             self.touching = true;
             self.contacts += 1;
             self.contact_times.push(t_ns);
-        } else if position.z_mm > 0.05 {
+            self.line.input(passed(0.0), true);
+        } else if position.z_mm > LEFT_MM && self.touching {
             self.touching = false;
+            self.line.input(passed(LEFT_MM), false);
         }
+        self.last_z_mm = position.z_mm;
         let (force_n, felt_n) = self.motion.force_n(-position.z_mm, rate);
         self.overloaded = force_n > self.force_limit_n;
         if self.overloaded && !self.rising {
@@ -210,7 +213,7 @@ impl World {
             self.tips_from = self.grid;
             self.tips.push_back(present);
         }
-        self.edges[index].clear();
+        self.line.take_edges(index).for_each(drop);
         self.grid
     }
 

@@ -142,6 +142,13 @@ fn every_fault_at_every_stage_ends_safely() {
             pulse,
         };
         cases.push((format!("pulse lost in press {press}"), lost));
+        let noisy = Fault::NoisyLine {
+            camera,
+            lost_percent: 20,
+            doubled_percent: 5,
+            spurious_percent: 5,
+        };
+        cases.push((format!("noisy trigger line {press}"), noisy));
     }
     for (stage, when) in instants(&plan, seed) {
         let name = |what: &str| format!("{what}, {stage}");
@@ -183,7 +190,10 @@ fn every_fault_at_every_stage_ends_safely() {
                 // Late, never elsewhere: a press is invalid, or a travel ends the run.
                 assert!(r.valid < r.planned || r.end == RunEnd::Completed, "{case}");
             }
-            Fault::CameraBytesLost { .. } | Fault::PulseLost { .. } | Fault::DeadPress { .. } => {
+            Fault::CameraBytesLost { .. }
+            | Fault::PulseLost { .. }
+            | Fault::NoisyLine { .. }
+            | Fault::DeadPress { .. } => {
                 assert_eq!(r.end, RunEnd::Completed, "{case}: {r:?}");
             }
         }

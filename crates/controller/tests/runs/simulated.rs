@@ -48,7 +48,7 @@ fn presses_on_the_simulated_rig_are_valid_and_reproducible() {
     };
     let records = run();
     let mut outcomes = 0;
-    let mut sent = Vec::new();
+    let (mut sent, mut told) = (Vec::new(), Vec::new());
     let mut edges = [Vec::new(), Vec::new()];
     let mut intents = Vec::new();
     for r in &records {
@@ -65,6 +65,12 @@ fn presses_on_the_simulated_rig_are_valid_and_reproducible() {
                 assert!(o.peak_force_n.is_some_and(|f| f > 0.5));
             }
             Record::MarkSent(s) => sent.push(s.mark),
+            Record::BoxReports { reports, .. } => {
+                told.extend(reports.iter().filter_map(|r| match r {
+                    BoxReport::Mark { mark, .. } => Some(*mark),
+                    _ => None,
+                }));
+            }
             Record::Chunk(c) => edges[c.camera.index()].extend_from_slice(&c.triggers),
             Record::Intent { t, .. } => intents.push(t.0),
             _ => {}
@@ -75,8 +81,9 @@ fn presses_on_the_simulated_rig_are_valid_and_reproducible() {
         [intents[1] - intents[0], intents[2] - intents[1]],
         [2000 * MS; 2]
     );
-    // Both cameras saw every mark.
+    // The box told of every mark, and both cameras saw it.
     assert_eq!(sent.len(), 9);
+    assert_eq!(told, sent);
     for edges in edges {
         let seen = pulse::decode_marks(&edges);
         assert_eq!(seen.stray_edges, 0);

@@ -1,14 +1,15 @@
 //! What happened: presses and their attempts, commands, marks, remarks, the end.
 
 use skinrig_model::{
-    HostTime, InterruptionKind, Mark, MarkKind, MotionCommand, PlannedPress, Point3, PressId,
-    PressOutcome, RunEnd, SentMark,
+    BoxReport, HostTime, InterruptionKind, Mark, MarkKind, MotionCommand, PlannedPress, Point3,
+    PressId, PressOutcome, RunEnd, SentMark,
 };
 
 use super::SessionReader;
+use crate::box_row::report_from;
 use crate::error::RecorderError;
 use crate::from_row::{attempt_from, planned_from};
-use crate::query::{Fault, int, named, num, opt_text, real, text};
+use crate::query::{self, Fault, int, named, num, opt_text, real, text};
 use crate::rows::{AttemptRow, CommandRow, InterruptionRow, NoteRow};
 
 impl SessionReader {
@@ -91,6 +92,19 @@ impl SessionReader {
                 uncertainty_ns: int(row, "uncertainty_ns")?,
             })
         })
+    }
+
+    /// What the trigger box reported on its own clock, in order, each with the instant at which it was taken. Nothing in
+    /// sessions from before it was recorded (schema 1).
+    ///
+    /// # Errors
+    /// When the file is damaged.
+    pub fn box_reports(&self) -> Result<Vec<(HostTime, BoxReport)>, RecorderError> {
+        const DOING: &str = "reading box reports";
+        if self.ask(DOING, query::schema_version)? < 2 {
+            return Ok(Vec::new());
+        }
+        self.all(DOING, "SELECT * FROM box_report ORDER BY id", report_from)
     }
 
     /// Everything that broke the normal course, in order.

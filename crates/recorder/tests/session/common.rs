@@ -144,6 +144,30 @@ pub fn outcome(attempt: AttemptId, t: i64, verdict: PressVerdict) -> PressOutcom
     }
 }
 
+/// One report of each kind; the reset comes first, where it separates nothing.
+fn box_reports(mark: Mark, t: HostTime, k: u64) -> Vec<BoxReport> {
+    let at = |us: u64| BoxTime {
+        us: 7_000_000 + 20_000 * k + us,
+    };
+    vec![
+        BoxReport::Reset { noticed: t },
+        BoxReport::Exchange {
+            sent: t,
+            received: t + HostDuration::from_millis(1),
+            at: at(400),
+        },
+        BoxReport::Mark { mark, at: at(500) },
+        BoxReport::Sync {
+            count: (1 << 17) - 1 - k as u32,
+            at: at(9_000),
+        },
+        BoxReport::Input {
+            rising: k.is_multiple_of(2),
+            at: at(9_500),
+        },
+    ]
+}
+
 /// All records of a run of `presses` presses of 20 ms each; the last but one needs two attempts, the last is missed.
 pub fn records(presses: u32) -> Vec<Record> {
     let mut out = vec![Record::Started(Box::new(header(presses)))];
@@ -196,6 +220,10 @@ pub fn records(presses: u32) -> Vec<Record> {
             t,
             uncertainty_ns: 50,
         }));
+        out.push(Record::BoxReports {
+            t,
+            reports: box_reports(mark, t, k),
+        });
         for camera in CameraId::ALL {
             let bytes = stream(ALIGNMENT_US + k * 20_000, 5 + 300 * (k % 2));
             let (facts, triggers) = scanner.scan(camera, StreamFormat::Evt2, &bytes);

@@ -19,6 +19,7 @@ fn read_all(path: &Path) {
         reader.devices(),
         reader.presses(),
         reader.marks_sent(),
+        reader.box_reports(),
     );
     let _ = (
         reader.commands(),

@@ -120,6 +120,16 @@ fn everything_comes_back() {
     assert_eq!(reader.devices().unwrap()[1].settings[0].name, "bias_fo");
     assert_eq!(reader.commands().unwrap().len(), 6);
     assert_eq!(reader.marks_sent().unwrap().len(), 6);
+    let reports: Vec<_> = expected
+        .iter()
+        .filter_map(|r| match r {
+            Record::BoxReports { t, reports } => Some(reports.iter().map(|said| (*t, *said))),
+            _ => None,
+        })
+        .flatten()
+        .collect();
+    assert_eq!(reports.len(), 30);
+    assert_eq!(reader.box_reports().unwrap(), reports);
     assert_eq!(reader.notes().unwrap()[0].text, "tip cleaned");
     assert_eq!(
         reader.interruptions().unwrap()[0].kind,

@@ -10,7 +10,7 @@
 //! brings about the same records.
 //!
 //! Poses, chunks and marks are handed over as recorded: poses with `t <= now`, chunks with `host_time <= now`,
-//! marks when asked for. At most one block of poses and one chunk per camera are held in memory.
+//! reports of the trigger box that had been taken by `now`, marks when asked for. At most one block of poses and one chunk per camera are held in memory.
 
 mod camera;
 mod indenter;

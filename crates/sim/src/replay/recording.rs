@@ -1,8 +1,8 @@
 //! What a recording must give to be replayed, in model types only.
 
 use skinrig_model::{
-    CameraId, DeviceIdentity, DeviceRole, HostTime, MotionCommand, PoseSample, RawChunk, SentMark,
-    Setting,
+    BoxReport, CameraId, DeviceIdentity, DeviceRole, HostTime, MotionCommand, PoseSample, RawChunk,
+    SentMark, Setting,
 };
 
 /// A recording could not be read.
@@ -35,6 +35,12 @@ pub trait Recording: Send {
     /// # Errors
     /// [`RecordingError`] when it cannot be read.
     fn next_mark(&mut self) -> Result<Option<SentMark>, RecordingError>;
+
+    /// The next report of the trigger box, with the instant at which it was taken, in that order.
+    ///
+    /// # Errors
+    /// [`RecordingError`] when it cannot be read.
+    fn next_box_report(&mut self) -> Result<Option<(HostTime, BoxReport)>, RecordingError>;
 
     /// The next chunk of `camera`, in stream order.
     ///

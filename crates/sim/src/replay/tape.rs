@@ -5,8 +5,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use skinrig_device::{Clock, DeviceError};
 use skinrig_model::{
-    CameraId, DeviceIdentity, DeviceRole, HostDuration, HostTime, MotionCommand, PoseSample,
-    RawChunk, RigidTransform, Robot, SentMark, Setting, Skin,
+    BoxReport, CameraId, DeviceIdentity, DeviceRole, HostDuration, HostTime, MotionCommand,
+    PoseSample, RawChunk, RigidTransform, Robot, SentMark, Setting, Skin,
 };
 
 use super::recording::{Recording, RecordingError};
@@ -26,6 +26,8 @@ pub struct Reader {
     last_pose: Option<HostTime>,
     mark: Option<SentMark>,
     marks_read: u64,
+    /// The next report of the trigger box, once it was looked for.
+    report: Option<Option<(HostTime, BoxReport)>>,
     chunks: [Option<RawChunk>; 2],
     chunks_read: [bool; 2],
     /// A read of the next command that failed; told at the next request.
@@ -55,6 +57,7 @@ impl Tape {
             last_pose: None,
             mark: None,
             marks_read: 0,
+            report: None,
             chunks: [None, None],
             chunks_read: [false; 2],
             failure: None,
@@ -224,6 +227,26 @@ impl Reader {
             Err(e) => {
                 self.mark = None;
                 self.failure = Some(e);
+            }
+        }
+    }
+
+    /// Appends what the trigger box reported up to the present.
+    pub(super) fn take_reports(&mut self, out: &mut Vec<BoxReport>) -> Result<(), DeviceError> {
+        loop {
+            let next = match self.report.take() {
+                Some(next) => next,
+                None => match self.recording.next_box_report() {
+                    Ok(next) => next,
+                    Err(e) => return Err(self.lost(DeviceRole::TriggerBox, &e)),
+                },
+            };
+            match next {
+                Some((t, report)) if t <= self.now => out.push(report),
+                later => {
+                    self.report = Some(later);
+                    return Ok(());
+                }
             }
         }
     }

@@ -73,7 +73,7 @@ impl TriggerBox for ReplayedTriggerBox {
         }
     }
 
-    fn poll(&mut self, _reports: &mut Vec<BoxReport>) -> Result<(), DeviceError> {
-        Ok(())
+    fn poll(&mut self, reports: &mut Vec<BoxReport>) -> Result<(), DeviceError> {
+        self.tape.lock().take_reports(reports)
     }
 }

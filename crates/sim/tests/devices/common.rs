@@ -38,6 +38,7 @@ pub struct Take {
     pub samples: Vec<RobotSample>,
     pub chunks: [Vec<RawChunk>; 2],
     pub marks: Vec<SentMark>,
+    pub reports: Vec<BoxReport>,
 }
 
 impl Take {
@@ -54,6 +55,9 @@ impl Take {
         rig.indenter.poll(&mut self.samples)?;
         for (camera, chunks) in rig.cameras.iter_mut().zip(&mut self.chunks) {
             camera.poll(chunks)?;
+        }
+        if let Some(trigger) = &mut rig.trigger_box {
+            trigger.poll(&mut self.reports)?;
         }
         Ok(())
     }
@@ -117,6 +121,7 @@ pub struct Log {
     pub commands: VecDeque<(HostTime, MotionCommand)>,
     pub poses: VecDeque<PoseSample>,
     pub marks: VecDeque<SentMark>,
+    pub reports: VecDeque<(HostTime, BoxReport)>,
     pub chunks: [VecDeque<RawChunk>; 2],
 }
 
@@ -139,6 +144,9 @@ impl Recording for Log {
     }
     fn next_mark(&mut self) -> Result<Option<SentMark>, RecordingError> {
         Ok(self.marks.pop_front())
+    }
+    fn next_box_report(&mut self) -> Result<Option<(HostTime, BoxReport)>, RecordingError> {
+        Ok(self.reports.pop_front())
     }
     fn next_chunk(&mut self, camera: CameraId) -> Result<Option<RawChunk>, RecordingError> {
         Ok(self.chunks[camera.index()].pop_front())
@@ -282,7 +290,12 @@ impl TriggerBox for Noted<Box<dyn TriggerBox>> {
     }
 
     fn poll(&mut self, reports: &mut Vec<BoxReport>) -> Result<(), DeviceError> {
-        self.inner.poll(reports)
+        let from = reports.len();
+        let answer = self.inner.poll(reports);
+        let now = self.clock.now();
+        let fresh = reports[from..].iter().map(|report| (now, *report));
+        self.log.lock().unwrap().reports.extend(fresh);
+        answer
     }
 }
 

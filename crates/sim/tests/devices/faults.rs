@@ -4,7 +4,8 @@ use crate::common::{LIMITS, Take, places, press_all, ready};
 use skinrig_device::DeviceError;
 use skinrig_formats::Decoder;
 use skinrig_model::{
-    CameraId, DeviceRole, HostTime, Polarity, RawChunk, SimLevel, StreamFormat, pulse::decode_marks,
+    BoxReport, CameraId, DeviceRole, HostTime, Polarity, RawChunk, SimLevel, StreamFormat,
+    pulse::{DecodedMarks, decode_marks},
 };
 use skinrig_sim::{Fault, SimConfig, When, simulated_rig};
 
@@ -150,6 +151,91 @@ fn a_lost_start_pulse_spoils_one_train_in_one_camera() {
 }
 
 #[test]
+fn a_noisy_line_spoils_no_name_and_only_one_camera() {
+    let fault = Fault::NoisyLine {
+        camera: CameraId::Two,
+        lost_percent: 3,
+        doubled_percent: 3,
+        spurious_percent: 3,
+    };
+    let mut rig = simulated_rig(&with(SimLevel::Kinematic, fault));
+    ready(&mut rig);
+    let mut take = press_all(&mut rig, &places(8), &[5_000]).unwrap();
+    take.stop(&mut rig);
+    let syncs: Vec<u32> = (0..12).collect();
+    let seen = CameraId::ALL.map(|camera| {
+        let (mut events, mut edges) = (Vec::new(), Vec::new());
+        Decoder::new(StreamFormat::Evt2).push_cd(&take.bytes(camera), &mut events, &mut edges);
+        decode_marks(&edges)
+    });
+    let [clean, noisy] = &seen;
+    assert_eq!((clean.stray_edges, clean.lost_edges), (0, 0));
+    assert_eq!(
+        clean.syncs.iter().map(|s| s.count).collect::<Vec<_>>(),
+        syncs
+    );
+    assert_eq!(clean.marks.len(), 8);
+    assert!(noisy.stray_edges > 20 && noisy.lost_edges > 10, "{noisy:?}");
+    let marks = |seen: &DecodedMarks| seen.marks.iter().map(|m| m.mark).collect::<Vec<_>>();
+    assert!(marks(noisy).iter().all(|m| marks(clean).contains(m)));
+    assert!(noisy.syncs.iter().all(|s| syncs.contains(&s.count)));
+    assert!(noisy.marks.len() + noisy.syncs.len() >= 10, "{noisy:?}");
+}
+
+#[test]
+fn the_box_tells_its_clock_what_it_sent_and_what_touched() {
+    let mut config = SimConfig::new(4, SimLevel::Kinematic);
+    config.trigger_box.max_drift_ppm = 500.0;
+    let mut rig = simulated_rig(&config);
+    ready(&mut rig);
+    let take = press_all(&mut rig, &places(2), &[5_000]).unwrap();
+    let mut ties = Vec::new();
+    let (mut marks, mut syncs, mut inputs) = (Vec::new(), Vec::new(), Vec::new());
+    for report in &take.reports {
+        match *report {
+            BoxReport::Exchange { sent, received, at } => ties.push((sent.0, received.0, at.us)),
+            BoxReport::Mark { mark, at } => marks.push((mark, at.us)),
+            BoxReport::Sync { count, at } => syncs.push((count, at.us)),
+            BoxReport::Input { rising, at } => inputs.push((rising, at.us)),
+            BoxReport::Reset { .. } => panic!("no reset was planned"),
+        }
+    }
+    // Nearly three seconds: an exchange each 0.1 s, each wide enough for two delays.
+    assert!((28..=30).contains(&ties.len()), "{}", ties.len());
+    assert!(
+        ties.iter()
+            .all(|(sent, received, _)| received - sent >= 300_000)
+    );
+    assert_eq!(
+        marks.iter().map(|m| m.0).collect::<Vec<_>>(),
+        take.marks.iter().map(|m| m.mark).collect::<Vec<_>>()
+    );
+    assert_eq!(syncs.iter().map(|s| s.0).collect::<Vec<_>>(), [0, 1, 2]);
+    assert!(
+        syncs
+            .windows(2)
+            .all(|w| (w[1].1 - w[0].1).abs_diff(1_000_000) < 20_000),
+        "{syncs:?}"
+    );
+    assert_eq!(
+        inputs.iter().map(|i| i.0).collect::<Vec<_>>(),
+        [true, false, true, false]
+    );
+    // The marks' box times lie where the exchanges about them put the host's times.
+    for (sent, (_, at)) in take.marks.iter().zip(&marks) {
+        let before = ties.iter().rev().find(|(_, _, us)| us <= at).copied();
+        if let Some((low, high, us)) = before {
+            let since_ns = (at - us) as i64 * 1_000;
+            let slack = sent.uncertainty_ns + since_ns / 1_000 + 2_000;
+            assert!(
+                (low + since_ns - slack..=high + since_ns + slack).contains(&sent.t.0),
+                "{sent:?}"
+            );
+        }
+    }
+}
+
+#[test]
 fn trigger_box_lost() {
     let error = failed(&with(
         SimLevel::Kinematic,
@@ -204,7 +290,7 @@ fn dead_press_gives_background_only() {
     let presses = |camera: CameraId| -> Vec<usize> {
         let (mut events, mut edges) = (Vec::new(), Vec::new());
         Decoder::new(StreamFormat::Evt2).push_cd(&take.bytes(camera), &mut events, &mut edges);
-        let zero = edges[0].t_us;
+        let zero = decode_marks(&edges).marks[0].t_us;
         (0..3u64)
             .map(|n| {
                 let from = zero + n * 1_500_000 + 100_000;

@@ -46,6 +46,8 @@ fn the_same_requests_give_the_same_records() {
     again.poll(&mut rig).unwrap();
     again.stop(&mut rig);
     assert_eq!(first.marks, again.marks);
+    assert!(!first.reports.is_empty());
+    assert_eq!(first.reports, again.reports);
     assert_eq!(first.chunks, again.chunks);
     assert_eq!(first.samples.len(), again.samples.len());
     for (a, b) in first.samples.iter().zip(&again.samples) {

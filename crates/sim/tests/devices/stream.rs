@@ -82,7 +82,7 @@ fn presses_show_where_and_when_they_should() {
     for camera in CameraId::ALL {
         let (events, triggers) = decode(&take, camera);
         // The mark rose at the press's command at 0.6 s; the press takes 0.25 s, the release begins at 1 s.
-        let zero = triggers[0].t_us;
+        let zero = decode_marks(&triggers).marks[0].t_us;
         let phase = |from_ms: u64, to_ms: u64| -> Vec<CdEvent> {
             let inside = |e: &&CdEvent| {
                 (zero + from_ms * 1_000..zero + to_ms * 1_000).contains(&e.t_us)

@@ -1,0 +1,55 @@
+//! The own clock of a simulated camera or trigger box: an offset and a constant drift against world time.
+
+use crate::random::Stream;
+
+/// World time (ns) to a device's own time (µs), in integers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct DriftingClock {
+    /// The device's time at `epoch_ns`, ns.
+    origin_ns: i64,
+    /// World time at which the clock began to count from its origin, ns.
+    epoch_ns: i64,
+    /// Parts per billion by which it is fast.
+    drift_ppb: i64,
+}
+
+impl DriftingClock {
+    /// Draws an origin of 0..`max_origin_s` at world time `epoch_ns`, and a drift of at most `max_drift_ppm` either way.
+    pub fn draw(max_origin_s: f64, max_drift_ppm: f64, random: &mut Stream, epoch_ns: i64) -> Self {
+        let origin_s = random.between(0.0, max_origin_s);
+        let drift_ppm = random.between(-max_drift_ppm, max_drift_ppm);
+        Self {
+            origin_ns: (origin_s * 1e9) as i64,
+            epoch_ns,
+            drift_ppb: (drift_ppm * 1e3) as i64,
+        }
+    }
+
+    /// The device's time at world time `t_ns`, µs.
+    #[must_use]
+    pub const fn own_us(&self, t_ns: i64) -> u64 {
+        let passed = t_ns - self.epoch_ns;
+        let ns = self.origin_ns + passed + self.gained_ns(passed);
+        if ns < 0 { 0 } else { ns as u64 / 1_000 }
+    }
+
+    /// What the clock gains on world time in `passed` ns.
+    const fn gained_ns(&self, passed: i64) -> i64 {
+        // Whole and broken seconds apart, so that no product leaves 64 bits in any run.
+        let (whole, rest) = (passed / 1_000_000_000, passed % 1_000_000_000);
+        whole * self.drift_ppb + rest * self.drift_ppb / 1_000_000_000
+    }
+
+    /// How much world time a span of the device's time takes, ns; for spans short enough that the drift's square does
+    /// not count.
+    #[must_use]
+    pub const fn world_ns(&self, own_ns: i64) -> i64 {
+        own_ns - self.gained_ns(own_ns)
+    }
+
+    /// Parts per billion by which the clock is fast.
+    #[must_use]
+    pub const fn drift_ppb(&self) -> i64 {
+        self.drift_ppb
+    }
+}

@@ -1,0 +1,216 @@
+//! The trigger line of a simulated rig: trains on the inputs of both cameras, marks and periodic ones, what goes wrong on
+//! the way, and what the box tells of them on its own clock.
+
+use std::collections::VecDeque;
+
+use skinrig_model::{BoxReport, BoxTime, CameraId, Mark, PulseTrain};
+
+use crate::config::SimConfig;
+use crate::drifting::DriftingClock;
+use crate::faults::Fault;
+use crate::random::{Purpose, Stream};
+
+/// An edge on a camera's trigger input, on world time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct LineEdge {
+    /// World time, ns.
+    pub t_ns: i64,
+    /// True for a rising edge.
+    pub rising: bool,
+}
+
+/// A doubled edge follows the first within this, ns: a contact that bounces.
+const BOUNCE_NS: f64 = 10_000.0;
+/// A report reaches the host this long after what it tells, ns.
+const REPORT_NS: i64 = 300_000;
+
+/// Shares of the edges of one camera, in percent.
+#[derive(Debug, Clone, Copy, Default)]
+struct Noise {
+    lost: f64,
+    doubled: f64,
+    spurious: f64,
+}
+
+/// The line.
+#[derive(Debug)]
+pub struct Line {
+    clock: DriftingClock,
+    /// World time between two periodic trains, ns; 0 for none.
+    sync_ns: i64,
+    next_sync_ns: i64,
+    syncs: u32,
+    marks: u32,
+    /// The line is taken until then, world time, ns.
+    busy_until_ns: i64,
+    lost_pulses: Vec<(CameraId, u32, u32)>,
+    noise: [Noise; 2],
+    random: [Stream; 2],
+    /// Edges that the cameras have not taken yet.
+    edges: [VecDeque<LineEdge>; 2],
+    /// Reports with the world time at which they reach the host, in order.
+    reports: VecDeque<(i64, BoxReport)>,
+    input: bool,
+}
+
+impl Line {
+    /// The line of a rig, at world time 0.
+    #[must_use]
+    pub fn new(config: &SimConfig) -> Self {
+        let set = &config.trigger_box;
+        let random = |index: u64| Stream::new(config.seed, Purpose::TriggerBox, index);
+        let clock = DriftingClock::draw(set.max_origin_s, set.max_drift_ppm, &mut random(1), 0);
+        let sync_ns = clock.world_ns(i64::from(set.sync_period_ms) * 1_000_000);
+        let mut lost_pulses = Vec::new();
+        let mut noise = [Noise::default(); 2];
+        for fault in &config.faults {
+            match *fault {
+                Fault::PulseLost {
+                    camera,
+                    train,
+                    pulse,
+                } => lost_pulses.push((camera, train, pulse)),
+                Fault::NoisyLine {
+                    camera,
+                    lost_percent,
+                    doubled_percent,
+                    spurious_percent,
+                } => {
+                    noise[camera.index()] = Noise {
+                        lost: f64::from(lost_percent),
+                        doubled: f64::from(doubled_percent),
+                        spurious: f64::from(spurious_percent),
+                    };
+                }
+                _ => {}
+            }
+        }
+        Self {
+            clock,
+            sync_ns,
+            next_sync_ns: sync_ns / 2,
+            syncs: 0,
+            marks: 0,
+            busy_until_ns: 0,
+            lost_pulses,
+            noise,
+            random: [random(3), random(4)],
+            edges: [VecDeque::new(), VecDeque::new()],
+            reports: VecDeque::new(),
+            input: set.contact_input,
+        }
+    }
+
+    /// The box's clock.
+    #[must_use]
+    pub const fn clock(&self) -> DriftingClock {
+        self.clock
+    }
+
+    /// Sends the periodic trains that are due by `now_ns`; one that finds the line taken waits until it is free.
+    pub fn advance(&mut self, now_ns: i64) {
+        while self.sync_ns > 0 {
+            let start_ns = self.next_sync_ns.max(self.busy_until_ns);
+            if start_ns > now_ns {
+                return;
+            }
+            self.next_sync_ns += self.sync_ns;
+            let train = PulseTrain::sync(self.syncs);
+            let report = |at| BoxReport::Sync {
+                count: self.syncs,
+                at,
+            };
+            let report = report(self.time(start_ns));
+            self.syncs = (self.syncs + 1) & skinrig_model::pulse::MAX_MARKED_PRESS;
+            self.tell(start_ns, report);
+            self.put(train, start_ns, None);
+            self.busy_until_ns = start_ns + PulseTrain::DURATION_US as i64 * 1_000;
+        }
+    }
+
+    /// Until when the line is taken, when it is at world time `now_ns`.
+    #[must_use]
+    pub fn busy_until(&self, now_ns: i64) -> Option<i64> {
+        (now_ns < self.busy_until_ns).then_some(self.busy_until_ns)
+    }
+
+    /// Sends the train of a mark whose first edge rises at `rise_ns`; the line is taken until `until_ns`.
+    pub fn send(&mut self, mark: Mark, train: PulseTrain, rise_ns: i64, until_ns: i64) {
+        let at = self.time(rise_ns);
+        self.tell(rise_ns, BoxReport::Mark { mark, at });
+        self.put(train, rise_ns, Some(self.marks));
+        self.marks += 1;
+        self.busy_until_ns = until_ns;
+    }
+
+    /// The contact input changed at `t_ns`.
+    pub fn input(&mut self, t_ns: i64, rising: bool) {
+        if self.input {
+            let at = self.time(t_ns);
+            self.tell(t_ns, BoxReport::Input { rising, at });
+        }
+    }
+
+    /// The next report that has reached the host by `now_ns`, with the instant at which it did.
+    pub fn take_report(&mut self, now_ns: i64) -> Option<(i64, BoxReport)> {
+        self.reports.pop_front_if(|(t_ns, _)| *t_ns <= now_ns)
+    }
+
+    /// Takes the edges on the input of camera `index`, in time order.
+    pub fn take_edges(&mut self, index: usize) -> impl Iterator<Item = LineEdge> {
+        self.edges[index].drain(..)
+    }
+
+    fn time(&self, t_ns: i64) -> BoxTime {
+        BoxTime {
+            us: self.clock.own_us(t_ns),
+        }
+    }
+
+    fn tell(&mut self, t_ns: i64, report: BoxReport) {
+        let reaches = t_ns + REPORT_NS;
+        let at = self.reports.partition_point(|(t, _)| *t <= reaches);
+        self.reports.insert(at, (reaches, report));
+    }
+
+    /// Puts the edges of a train on both inputs, `mark` being its number among the marks.
+    fn put(&mut self, train: PulseTrain, rise_ns: i64, mark: Option<u32>) {
+        for camera in CameraId::ALL {
+            let i = camera.index();
+            let (noise, random) = (self.noise[i], &mut self.random[i]);
+            let mut strikes = |percent: f64| percent > 0.0 && random.unit() * 100.0 < percent;
+            let mut seen = Vec::new();
+            let mut extra = Vec::new();
+            for (k, (offset_us, rising)) in (0u32..).zip(train.edges()) {
+                let pulse = k / 2;
+                let t_ns = rise_ns + self.clock.world_ns(offset_us as i64 * 1_000);
+                let edge = LineEdge { t_ns, rising };
+                let gone = strikes(noise.lost)
+                    || mark.is_some_and(|n| self.lost_pulses.contains(&(camera, n, pulse)));
+                if !gone {
+                    seen.push(edge);
+                }
+                if strikes(noise.doubled) {
+                    extra.push((edge, true));
+                }
+                if strikes(noise.spurious) {
+                    extra.push((edge, false));
+                }
+            }
+            for (edge, doubled) in extra {
+                let span_ns = PulseTrain::DURATION_US as f64 * 1_000.0;
+                seen.push(if doubled {
+                    let t_ns = edge.t_ns + 1 + (random.unit() * BOUNCE_NS) as i64;
+                    LineEdge { t_ns, ..edge }
+                } else {
+                    LineEdge {
+                        t_ns: rise_ns + (random.unit() * span_ns) as i64,
+                        rising: random.unit() < 0.5,
+                    }
+                });
+            }
+            seen.sort_by_key(|edge| edge.t_ns);
+            self.edges[i].extend(seen);
+        }
+    }
+}
