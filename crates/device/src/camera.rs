@@ -114,4 +114,9 @@ pub trait EventCamera: Send {
     /// # Errors
     /// [`DeviceError::Lost`]; chunks already appended stay valid.
     fn stop(&mut self, chunks: &mut Vec<RawChunk>) -> Result<(), DeviceError>;
+
+    /// Appends, in sentences, what happened to the stream since the last call that its bytes do not say: bytes without a
+    /// time that were let go at the start, jumps of the camera's time base, its own overflow counter. A camera that
+    /// notices nothing of the kind has none.
+    fn take_notes(&mut self, _notes: &mut Vec<String>) {}
 }

@@ -1,0 +1,116 @@
+//! Reading and writing registers: every field is changed by reading, modifying and writing, and every write is read back.
+
+use crate::error::{Evk1Error, UsbError};
+use crate::registers::{Field, Register, request};
+use crate::usb::Transport;
+
+/// The registers of one camera. It borrows the transport, so nothing comes between a read and its write.
+pub struct Registers<'a> {
+    transport: &'a mut dyn Transport,
+    exceptions: &'a [u32],
+}
+
+impl<'a> Registers<'a> {
+    /// The registers behind `transport`. Writes to the addresses `exceptions` need not read back.
+    pub fn new(transport: &'a mut dyn Transport, exceptions: &'a [u32]) -> Self {
+        Self {
+            transport,
+            exceptions,
+        }
+    }
+
+    /// The transport itself, for what is no register.
+    pub fn transport(&mut self) -> &mut dyn Transport {
+        self.transport
+    }
+
+    /// Reads a register.
+    ///
+    /// # Errors
+    /// [`Evk1Error::Usb`], [`Evk1Error::Status`].
+    pub fn read(&mut self, register: Register) -> Result<u32, Evk1Error> {
+        let (value, index) = halves(register.address);
+        let doing = || format!("reading {} ({:#06x})", register.name, register.address);
+        let mut answer = [0; 8];
+        let found = self
+            .transport
+            .control_in(request::READ_REGISTER, value, index, &mut answer)
+            .map_err(|e| e.during(doing()))?;
+        if found != answer.len() {
+            let expected = answer.len();
+            return Err(UsbError::Short { expected, found }.during(doing()));
+        }
+        let [status, _, _, _, a, b, c, d] = answer;
+        if status != request::READ_OK {
+            return Err(Evk1Error::Status {
+                name: register.name,
+                address: register.address,
+                status,
+            });
+        }
+        Ok(u32::from_be_bytes([a, b, c, d]))
+    }
+
+    /// Reads a field.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn get(&mut self, field: Field) -> Result<u32, Evk1Error> {
+        Ok(field.of(self.read(field.register)?))
+    }
+
+    /// Writes a whole register without reading it first, and reads it back.
+    ///
+    /// # Errors
+    /// As [`Self::read`]; [`Evk1Error::ReadBack`] when a stable bit differs.
+    pub fn write(&mut self, register: Register, word: u32) -> Result<(), Evk1Error> {
+        self.write_blind(register, word)?;
+        if register.stable == 0 || self.exceptions.contains(&register.address) {
+            return Ok(());
+        }
+        let found = self.read(register)?;
+        if (found ^ word) & register.stable != 0 {
+            return Err(Evk1Error::read_back(register, word, found));
+        }
+        Ok(())
+    }
+
+    /// Sets a field and leaves the register's other bits as they are; reads back.
+    ///
+    /// # Errors
+    /// As [`Self::write`].
+    pub fn set(&mut self, field: Field, value: u32) -> Result<(), Evk1Error> {
+        let word = self.read(field.register)?;
+        self.write(field.register, field.put(word, value))
+    }
+
+    /// Like [`Self::set`], without reading back: for a part that may be without power or clock.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn set_blind(&mut self, field: Field, value: u32) -> Result<(), Evk1Error> {
+        let word = self.read(field.register)?;
+        self.write_blind(field.register, field.put(word, value))
+    }
+
+    /// Writes a whole register and does not look at the result.
+    ///
+    /// # Errors
+    /// [`Evk1Error::Usb`].
+    pub fn write_blind(&mut self, register: Register, word: u32) -> Result<(), Evk1Error> {
+        let (value, index) = halves(register.address);
+        self.transport
+            .control_out(request::WRITE_REGISTER, value, index, &word.to_be_bytes())
+            .map_err(|e| {
+                e.during(format!(
+                    "writing {} ({:#06x})",
+                    register.name, register.address
+                ))
+            })
+    }
+}
+
+/// wValue and wIndex of an address.
+fn halves(address: u32) -> (u16, u16) {
+    (address as u16, (address >> 16) as u16)
+}

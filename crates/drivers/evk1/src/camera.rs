@@ -1,0 +1,394 @@
+//! An EVK1 as an event camera.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use skinrig_device::{
+    CameraCapabilities, CameraSettings, Clock, DeviceError, EventCamera, RealClock, SyncMode,
+};
+use skinrig_model::{
+    CameraId, DeviceIdentity, DeviceRole, HostDuration, RawChunk, SENSOR_HEIGHT, SENSOR_WIDTH,
+    Setting, StreamFormat,
+};
+
+use crate::access::Registers;
+use crate::biases::{BIASES, DIFF};
+use crate::chunks::Chunker;
+use crate::config::Evk1Config;
+use crate::error::{Evk1Error, UsbError};
+use crate::identify::{Identity, identify, open_serial};
+use crate::inbox::{Inbox, Taken};
+use crate::registers::{CHIP_ID, OVERFLOW_HITCOUNT, TEMPERATURE};
+use crate::report::StreamReport;
+use crate::settings::{Checked, expect_equal};
+use crate::triggers::{self, CHANNELS, TriggerOut};
+use crate::usb::Transport;
+use crate::{sequences, sync};
+
+/// A Prophesee EVK1 Gen3.1, initialised. It is powered down when it is dropped.
+pub struct Evk1 {
+    camera: CameraId,
+    identity: Identity,
+    config: Evk1Config,
+    transport: Box<dyn Transport>,
+    clock: Box<dyn Clock>,
+    settings: Option<Checked>,
+    stream: Option<Stream>,
+    chunker: Chunker,
+    report: StreamReport,
+    notes: Vec<String>,
+    gone: bool,
+    closed: bool,
+}
+
+/// What exists only while streaming.
+struct Stream {
+    inbox: Arc<Inbox>,
+    overflow_hits: u16,
+}
+
+impl Evk1 {
+    /// Opens the camera with this serial number (8 hexadecimal digits) through libusb. What it sends is stamped on
+    /// `clock`.
+    ///
+    /// # Errors
+    /// [`Evk1Error::NotFound`] says what is there instead; otherwise as [`Self::open`].
+    pub fn open_serial(
+        serial: &str,
+        camera: CameraId,
+        config: Evk1Config,
+        clock: RealClock,
+    ) -> Result<Self, Evk1Error> {
+        config.check()?;
+        let usb = open_serial(serial, clock)?;
+        Self::open(Box::new(usb), camera, config, Box::new(clock))
+    }
+
+    /// Identifies and initialises the camera behind `transport`. Waits, such as the half second of a start, are taken
+    /// on `clock`.
+    ///
+    /// # Errors
+    /// [`Evk1Error::NotEvk1`] before anything was written; [`Evk1Error::Refused`] for a configuration that does not go
+    /// together; [`Evk1Error::NotBooted`], [`Evk1Error::ReadBack`], [`Evk1Error::Usb`].
+    pub fn open(
+        mut transport: Box<dyn Transport>,
+        camera: CameraId,
+        config: Evk1Config,
+        mut clock: Box<dyn Clock>,
+    ) -> Result<Self, Evk1Error> {
+        config.check()?;
+        let identity = identify(transport.as_mut(), clock.as_mut())?;
+        // What an earlier program left in the buffers would come first, with times of its own.
+        let reset = transport.reset();
+        reset.map_err(|e| e.during("resetting the camera on the bus"))?;
+        let mut registers = Registers::new(transport.as_mut(), &config.read_back_exceptions);
+        registers.read(CHIP_ID)?;
+        sequences::initialise(&mut registers, identity.fpga_version)?;
+        Ok(Self {
+            camera,
+            identity,
+            config,
+            transport,
+            clock,
+            settings: None,
+            stream: None,
+            chunker: Chunker::new(camera),
+            report: StreamReport::default(),
+            notes: Vec::new(),
+            gone: false,
+            closed: false,
+        })
+    }
+
+    /// What happened to the stream that runs, or to the last one.
+    #[must_use]
+    pub fn report(&self) -> &StreamReport {
+        &self.report
+    }
+
+    /// True while the stream carries a time that counts; a slave's does not until its master's clock arrives.
+    #[must_use]
+    pub fn time_runs(&self) -> bool {
+        self.stream.is_some() && self.chunker.time_runs()
+    }
+
+    /// Switches the trigger output on, or off. With input channel 6 enabled the camera sees its own pulses, without a
+    /// wire.
+    ///
+    /// # Errors
+    /// [`Evk1Error::Refused`] on a master, whose output line carries the sync clock, before FPGA version 3.0.0, and for
+    /// pulses out of range; [`Evk1Error::Usb`], [`Evk1Error::ReadBack`].
+    pub fn set_trigger_out(&mut self, pulses: Option<TriggerOut>) -> Result<(), Evk1Error> {
+        if let Some(pulses) = pulses {
+            pulses.check()?;
+            let mode = self.settings.as_ref().map(Checked::sync);
+            sync::check(mode.unwrap_or_default(), true)?;
+        }
+        if self.identity.fpga_version < sequences::TRIGGER_OUT_SINCE {
+            if pulses.is_none() {
+                return Ok(()); // There is none to switch off.
+            }
+            return Err(Evk1Error::refused(
+                "FPGA version 3.0.0 or later for a trigger output",
+                self.identity.firmware(),
+            ));
+        }
+        triggers::write_out(&mut self.registers(), pulses)
+    }
+
+    /// Temperature of the board, °C.
+    ///
+    /// # Errors
+    /// [`Evk1Error::Usb`].
+    pub fn temperature_c(&mut self) -> Result<f64, Evk1Error> {
+        Ok(f64::from(self.registers().get(TEMPERATURE)?) / 4096.0)
+    }
+
+    /// Stops, powers the camera down, empties its buffers and gives it free. Bytes of a running stream are let go.
+    ///
+    /// # Errors
+    /// [`Evk1Error::Usb`], [`Evk1Error::ReadBack`]; the camera is given free all the same.
+    pub fn close(mut self) -> Result<(), Evk1Error> {
+        self.shut()
+    }
+
+    fn shut(&mut self) -> Result<(), Evk1Error> {
+        if std::mem::replace(&mut self.closed, true) {
+            return Ok(());
+        }
+        let streaming = self.stream.take().is_some();
+        let back = self.transport.stop_stream();
+        if self.gone {
+            return Ok(());
+        }
+        back.map_err(|e| e.during("stopping the stream"))?;
+        let mut registers = self.registers();
+        if streaming {
+            sequences::stop(&mut registers)?;
+        }
+        sequences::close(&mut registers)
+    }
+
+    fn registers(&mut self) -> Registers<'_> {
+        Registers::new(self.transport.as_mut(), &self.config.read_back_exceptions)
+    }
+
+    /// The error as the rig sees it; remembers a camera that is gone.
+    fn fault(&mut self, error: Evk1Error) -> DeviceError {
+        let cause = |e: &Evk1Error| match e {
+            Evk1Error::Usb { cause, .. } => Some(cause.clone()),
+            _ => None,
+        };
+        self.gone |= cause(&error) == Some(UsbError::Gone);
+        let role = DeviceRole::of_camera(self.camera);
+        let serial = self.identity.serial.clone();
+        match error {
+            Evk1Error::ReadBack {
+                name,
+                address,
+                expected,
+                found,
+            } => DeviceError::ReadBack {
+                role,
+                serial,
+                name: format!("{name} ({address:#06x})"),
+                expected: format!("{expected:#010x}"),
+                found: format!("{found:#010x}"),
+            },
+            Evk1Error::Setting {
+                name,
+                expected,
+                found,
+            } => DeviceError::ReadBack {
+                role,
+                serial,
+                name,
+                expected,
+                found,
+            },
+            Evk1Error::Refused { expected, found } => DeviceError::Refused {
+                role,
+                serial,
+                expected,
+                found,
+            },
+            Evk1Error::State { expected, found } => DeviceError::State {
+                role,
+                serial,
+                expected: expected.to_owned(),
+                found: found.to_owned(),
+            },
+            other => DeviceError::Lost {
+                role,
+                serial,
+                detail: other.to_string(),
+            },
+        }
+    }
+
+    fn expect_stopped(&self) -> Result<(), Evk1Error> {
+        match self.stream {
+            None => Ok(()),
+            Some(_) => Err(Evk1Error::State {
+                expected: "stopped",
+                found: "streaming",
+            }),
+        }
+    }
+
+    fn try_configure(&mut self, settings: &CameraSettings) -> Result<Vec<Setting>, Evk1Error> {
+        self.expect_stopped()?;
+        let checked = Checked::new(settings)?;
+        let mut registers = self.registers();
+        checked.write(&mut registers)?;
+        let read = checked.read_back(&mut registers)?;
+        self.settings = Some(checked);
+        if self.config.read_back_exceptions.is_empty() {
+            expect_equal(&read)?;
+        }
+        Ok(read)
+    }
+
+    fn try_start(&mut self) -> Result<(), Evk1Error> {
+        self.expect_stopped()?;
+        let (channels, sync) = match &self.settings {
+            Some(s) => (s.trigger_channels().to_vec(), s.sync()),
+            None => (Vec::new(), SyncMode::default()),
+        };
+        let mut registers = self.registers();
+        if !channels.is_empty() {
+            // By the public driver's contract they are off after a stop.
+            triggers::write(&mut registers, &channels)?;
+        }
+        let overflow_hits = registers.read(OVERFLOW_HITCOUNT)? as u16;
+        let inbox = Arc::new(Inbox::new(
+            self.config.chunk_bytes,
+            self.config.backlog_bytes,
+        ));
+        self.transport
+            .start_stream(Arc::clone(&inbox), &self.config)
+            .map_err(|e| e.during("queueing transfers"))?;
+        self.chunker.start(sync == SyncMode::Slave);
+        self.report = StreamReport::default();
+        let clock = &mut self.clock;
+        let mut wait = |span: Duration| {
+            let span = i64::try_from(span.as_nanos()).unwrap_or(i64::MAX);
+            let end = clock.now() + HostDuration(span);
+            clock.wait_until(end);
+        };
+        let exceptions = &self.config.read_back_exceptions;
+        let mut registers = Registers::new(self.transport.as_mut(), exceptions);
+        if let Err(error) = sequences::start(&mut registers, &mut wait) {
+            // The error that led here says more than one of the way back.
+            let _ = self.transport.stop_stream();
+            return Err(error);
+        }
+        self.stream = Some(Stream {
+            inbox,
+            overflow_hits,
+        });
+        Ok(())
+    }
+
+    /// Turns what was taken out of the inbox into chunks, and then tells what ended the stream.
+    fn hand_over(&mut self, taken: Taken, chunks: &mut Vec<RawChunk>) -> Result<(), Evk1Error> {
+        for block in taken.blocks {
+            self.chunker.take(block, &mut self.report, chunks);
+        }
+        match taken.error {
+            Some(error) => Err(error.during("receiving events")),
+            None => Ok(()),
+        }
+    }
+
+    fn try_stop(&mut self, chunks: &mut Vec<RawChunk>) -> Result<(), Evk1Error> {
+        let Some(stream) = self.stream.take() else {
+            return Ok(());
+        };
+        let back = self.transport.stop_stream();
+        let received = self.hand_over(stream.inbox.finish(), chunks);
+        let answered = match &received {
+            Err(Evk1Error::Usb {
+                cause: UsbError::Gone,
+                ..
+            }) => Ok(()),
+            _ => self.stop_device(stream.overflow_hits),
+        };
+        self.notes.extend(self.report.notes());
+        received?;
+        back.map_err(|e| e.during("stopping the stream"))?;
+        answered
+    }
+
+    fn stop_device(&mut self, overflow_hits: u16) -> Result<(), Evk1Error> {
+        let mut registers = self.registers();
+        sequences::stop(&mut registers)?;
+        let after = registers.read(OVERFLOW_HITCOUNT)? as u16;
+        self.report.overflow_hits = Some((overflow_hits, after));
+        Ok(())
+    }
+}
+
+impl EventCamera for Evk1 {
+    fn camera(&self) -> CameraId {
+        self.camera
+    }
+
+    fn identity(&self) -> DeviceIdentity {
+        DeviceIdentity {
+            model: "Prophesee EVK1 Gen3.1".to_owned(),
+            serial: self.identity.serial.clone(),
+            firmware: self.identity.firmware(),
+        }
+    }
+
+    fn capabilities(&self) -> CameraCapabilities {
+        let settable = BIASES.iter().filter(|b| b.name != DIFF);
+        CameraCapabilities {
+            width: SENSOR_WIDTH,
+            height: SENSOR_HEIGHT,
+            format: StreamFormat::Evt2,
+            trigger_channels: CHANNELS.to_vec(),
+            biases: settable.map(|b| b.name.to_owned()).collect(),
+        }
+    }
+
+    fn configure(&mut self, settings: &CameraSettings) -> Result<Vec<Setting>, DeviceError> {
+        self.try_configure(settings).map_err(|e| self.fault(e))
+    }
+
+    fn start(&mut self) -> Result<(), DeviceError> {
+        self.try_start().map_err(|e| self.fault(e))
+    }
+
+    fn poll(&mut self, chunks: &mut Vec<RawChunk>) -> Result<(), DeviceError> {
+        let Some(stream) = &self.stream else {
+            return Ok(());
+        };
+        let taken = stream.inbox.take_full();
+        self.hand_over(taken, chunks).map_err(|e| self.fault(e))
+    }
+
+    fn flush(&mut self, chunks: &mut Vec<RawChunk>) -> Result<(), DeviceError> {
+        let Some(stream) = &self.stream else {
+            return Ok(());
+        };
+        let taken = stream.inbox.take_all();
+        self.hand_over(taken, chunks).map_err(|e| self.fault(e))
+    }
+
+    fn stop(&mut self, chunks: &mut Vec<RawChunk>) -> Result<(), DeviceError> {
+        self.try_stop(chunks).map_err(|e| self.fault(e))
+    }
+
+    fn take_notes(&mut self, notes: &mut Vec<String>) {
+        notes.append(&mut self.notes);
+    }
+}
+
+impl Drop for Evk1 {
+    fn drop(&mut self) {
+        // Nobody is left to hear what went wrong; `close` tells.
+        let _ = self.shut();
+    }
+}

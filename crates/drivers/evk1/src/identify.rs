@@ -1,0 +1,271 @@
+//! Which of the devices on the bus are EVK1 Gen3.1 cameras. Other cameras share their USB IDs and must not receive
+//! EVK1 requests, so the descriptors are read first.
+
+use std::time::Duration;
+
+use skinrig_device::{Clock, RealClock};
+use skinrig_model::HostDuration;
+
+use crate::access::Registers;
+use crate::error::{Evk1Error, UsbError};
+use crate::registers::{ATIS_CONTROL, FPGA_VERSION, SERIAL_MSB, request};
+use crate::usb::{Access, LibUsb, Transport, bus};
+
+/// What to do when a user may not open the camera.
+pub const UDEV_STEP: &str = "write `SUBSYSTEM==\"usb\", ATTR{idVendor}==\"04b4\", MODE=\"0666\"` to \
+     /etc/udev/rules.d/88-evk1.rules, run `udevadm control --reload`, plug the camera in again";
+
+/// The FPGA loads its configuration within this time.
+const BOOT_LIMIT: HostDuration = HostDuration::from_millis(10_000);
+/// Between two looks at whether it has.
+const BOOT_LOOK: HostDuration = HostDuration::from_millis(20);
+
+/// Who a camera says it is.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Identity {
+    /// 8 lower-case hexadecimal digits.
+    pub serial: String,
+    /// FPGA version: major in bits 23:16, minor in 15:8, micro in 7:0.
+    pub fpga_version: u32,
+    /// Version of the FX3's firmware, laid out likewise.
+    pub fx3_version: u32,
+}
+
+impl Identity {
+    /// Both versions, for people and for comparison with what a rig expects.
+    #[must_use]
+    pub fn firmware(&self) -> String {
+        format!(
+            "FPGA {}, FX3 {}",
+            dotted(self.fpga_version),
+            dotted(self.fx3_version)
+        )
+    }
+}
+
+fn dotted(version: u32) -> String {
+    let [_, major, minor, micro] = version.to_be_bytes();
+    format!("{major}.{minor}.{micro}")
+}
+
+/// A device that may be an EVK1.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Found {
+    /// Where it is plugged in, and how fast.
+    pub place: String,
+    /// What came of asking it.
+    pub state: FoundState,
+}
+
+/// What came of asking a device.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum FoundState {
+    /// An EVK1 Gen3.1 that can be opened.
+    Ready(Identity),
+    /// Held by another program; not asked.
+    Busy,
+    /// May not be opened by this user; not asked.
+    NoPermission,
+    /// Another camera that shares the USB IDs, or an EVK1 that cannot stream.
+    NotEvk1(String),
+    /// It did not answer as it should.
+    Faulty(String),
+}
+
+impl Found {
+    /// What to do next, if there is anything to do.
+    #[must_use]
+    pub fn next_step(&self) -> Option<String> {
+        match &self.state {
+            FoundState::Ready(_) | FoundState::NotEvk1(_) => None,
+            FoundState::Busy => Some(
+                "end the program that uses the camera (another skinrig, a viewer), or unplug it and plug it in again"
+                    .to_owned(),
+            ),
+            FoundState::NoPermission => Some(UDEV_STEP.to_owned()),
+            FoundState::Faulty(_) => {
+                Some("unplug the camera, wait 5 s, plug it in again".to_owned())
+            }
+        }
+    }
+}
+
+/// Every device on the bus with the USB IDs of an EVK1, asked as far as it may be asked. Nothing is changed on them.
+///
+/// # Errors
+/// [`UsbError::NoUsb`] on a machine without USB.
+pub fn enumerate() -> Result<Vec<Found>, UsbError> {
+    let clock = RealClock::start();
+    let mut all = Vec::new();
+    for slot in bus()? {
+        let state = match slot.open(clock) {
+            Ok(Access::Open(mut usb)) => state_of(identify(&mut usb, &mut clock.clone())),
+            Ok(Access::Treuzell) => FoundState::NotEvk1(TREUZELL.to_owned()),
+            Err(e) => state_of(Err(e.during("opening"))),
+        };
+        all.push(Found {
+            place: slot.place(),
+            state,
+        });
+    }
+    Ok(all)
+}
+
+const TREUZELL: &str = "a Treuzell camera (EVK3, EVK4 or alike: interface subclass 0x19), which shares its USB IDs with the EVK1";
+
+fn state_of(answer: Result<Identity, Evk1Error>) -> FoundState {
+    match answer {
+        Ok(identity) => FoundState::Ready(identity),
+        Err(Evk1Error::Usb {
+            cause: UsbError::Busy,
+            ..
+        }) => FoundState::Busy,
+        Err(Evk1Error::Usb {
+            cause: UsbError::NoPermission,
+            ..
+        }) => FoundState::NoPermission,
+        Err(Evk1Error::NotEvk1 { found, .. }) => FoundState::NotEvk1(found),
+        Err(e) => FoundState::Faulty(e.to_string()),
+    }
+}
+
+/// The camera with this serial number, claimed; others are left as they are.
+///
+/// # Errors
+/// [`Evk1Error::NotFound`] says what is there instead; [`Evk1Error::Usb`] without USB.
+pub(crate) fn open_serial(serial: &str, clock: RealClock) -> Result<LibUsb, Evk1Error> {
+    let mut others = Vec::new();
+    for slot in bus().map_err(|e| e.during("listing USB devices"))? {
+        let seen = match slot.open(clock) {
+            Ok(Access::Open(mut usb)) => match identify(&mut usb, &mut clock.clone()) {
+                Ok(identity) if identity.serial == serial => return Ok(usb),
+                Ok(identity) => format!("an EVK1 with serial {}", identity.serial),
+                Err(e) => e.to_string(),
+            },
+            Ok(Access::Treuzell) => TREUZELL.to_owned(),
+            Err(e) => e.to_string(),
+        };
+        others.push(format!("{} ({seen})", slot.place()));
+    }
+    Err(Evk1Error::NotFound {
+        serial: serial.to_owned(),
+        found: if others.is_empty() {
+            "no device with the USB IDs of an EVK1: check cable and power".to_owned()
+        } else {
+            others.join("; ")
+        },
+    })
+}
+
+/// Asks a claimed device who it is, in the order of OpenEB 3.1.2, up to and including the system ID. Nothing is
+/// written.
+///
+/// # Errors
+/// [`Evk1Error::NotEvk1`], [`Evk1Error::NotBooted`], [`Evk1Error::Usb`].
+pub fn identify(
+    transport: &mut dyn Transport,
+    clock: &mut dyn Clock,
+) -> Result<Identity, Evk1Error> {
+    let place = transport.place();
+    let not_evk1 = |expected: &str, found: String| Evk1Error::NotEvk1 {
+        place: place.clone(),
+        expected: expected.to_owned(),
+        found,
+    };
+    match ask16(
+        transport,
+        request::BOARD_VERSION,
+        "asking for the board version",
+    ) {
+        Ok(request::BOARD_EVK1) => {}
+        Ok(other) => {
+            return Err(not_evk1(
+                "board version 2",
+                format!("board version {other}"),
+            ));
+        }
+        Err(Evk1Error::Usb {
+            cause: UsbError::Stall,
+            ..
+        }) => {
+            return Err(not_evk1(
+                "board version 2",
+                "a device that knows no board version".to_owned(),
+            ));
+        }
+        Err(e) => return Err(e),
+    }
+    await_fpga(transport, clock)?;
+    let mut registers = Registers::new(transport, &[]);
+    registers.read(ATIS_CONTROL)?; // The first read after power-up is not to be relied on.
+    let serial = registers.read(SERIAL_MSB)?;
+    let system = ask16(transport, request::SYSTEM_ID, "asking for the system ID")?;
+    if system != request::SYSTEM_GEN31 {
+        let what = match system {
+            request::SYSTEM_GOLDEN => {
+                "the rescue image of the FPGA: the camera's flash needs the maker's update"
+                    .to_owned()
+            }
+            0x14 => "an EVK1 Gen2".to_owned(),
+            0x15 => "an EVK1 Gen3.0".to_owned(),
+            0x1a => "an EVK1 Gen4".to_owned(),
+            _ => "a system that is not known".to_owned(),
+        };
+        return Err(not_evk1("system ID 0x1c", format!("{system:#04x}, {what}")));
+    }
+    let mut answer = [0; 8];
+    ask(
+        transport,
+        request::FX3_VERSION,
+        &mut answer,
+        "asking for the FX3 version",
+    )?;
+    let [a, b, c, d, ..] = answer;
+    let fx3_version = u32::from_le_bytes([a, b, c, d]);
+    let fpga_version = Registers::new(transport, &[]).read(FPGA_VERSION)?;
+    let identity = Identity {
+        serial: format!("{serial:08x}"),
+        fpga_version,
+        fx3_version,
+    };
+    Ok(identity)
+}
+
+fn await_fpga(transport: &mut dyn Transport, clock: &mut dyn Clock) -> Result<(), Evk1Error> {
+    let end = clock.now() + BOOT_LIMIT;
+    while ask16(
+        transport,
+        request::FPGA_BOOT_STATE,
+        "asking whether the FPGA is configured",
+    )? == 0
+    {
+        let now = clock.now();
+        if now >= end {
+            let limit_s = Duration::from_nanos(BOOT_LIMIT.0.unsigned_abs()).as_secs();
+            return Err(Evk1Error::NotBooted { limit_s });
+        }
+        clock.wait_until(now + BOOT_LOOK);
+    }
+    Ok(())
+}
+
+fn ask16(transport: &mut dyn Transport, code: u8, doing: &str) -> Result<u16, Evk1Error> {
+    let mut answer = [0; 4];
+    ask(transport, code, &mut answer, doing)?;
+    let [_, _, low, high] = answer;
+    Ok(u16::from_le_bytes([low, high]))
+}
+
+fn ask(
+    transport: &mut dyn Transport,
+    code: u8,
+    answer: &mut [u8],
+    doing: &str,
+) -> Result<(), Evk1Error> {
+    let expected = answer.len();
+    match transport.control_in(code, 0, 0, answer) {
+        Ok(found) if found == expected => Ok(()),
+        Ok(found) => Err(UsbError::Short { expected, found }.during(doing)),
+        Err(e) => Err(e.during(doing)),
+    }
+}

@@ -1,0 +1,81 @@
+//! What happened to a stream that its bytes do not say.
+
+use skinrig_model::HostDuration;
+
+use crate::inbox::Loss;
+use crate::time_base::TimeJump;
+
+/// How many jumps and losses are kept one by one; all are counted.
+const KEPT: usize = 16;
+
+/// What happened to the bytes between one start and the stop that followed.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct StreamReport {
+    /// Bytes at the start that had no time: before the first TIME_HIGH word, and, on a slave, before its time advanced.
+    pub discarded_bytes: u64,
+    /// Bytes lost since, which `lost_before` of the chunks says as well.
+    pub lost_bytes: u64,
+    /// How often bytes were lost.
+    pub loss_count: u64,
+    /// Host time over which they were lost, together.
+    pub lost_time: HostDuration,
+    /// The first losses.
+    pub losses: Vec<Loss>,
+    /// How often the time base jumped by more than one count, or back: the camera itself has lost something.
+    pub jump_count: u64,
+    /// The first jumps.
+    pub jumps: Vec<TimeJump>,
+    /// OVERFLOW_HITCOUNT at start and at stop, as read; its meaning is not public. `None` while streaming, and when the
+    /// camera was gone.
+    pub overflow_hits: Option<(u16, u16)>,
+}
+
+impl StreamReport {
+    pub(crate) fn add_loss(&mut self, loss: Loss) {
+        self.lost_bytes += loss.bytes;
+        self.loss_count += 1;
+        self.lost_time = self.lost_time + (loss.until - loss.since);
+        if self.losses.len() < KEPT {
+            self.losses.push(loss);
+        }
+    }
+
+    pub(crate) fn add_jump(&mut self, jump: TimeJump) {
+        self.jump_count += 1;
+        if self.jumps.len() < KEPT {
+            self.jumps.push(jump);
+        }
+    }
+
+    /// The report in sentences; none when nothing happened.
+    #[must_use]
+    pub fn notes(&self) -> Vec<String> {
+        let mut notes = Vec::new();
+        if self.discarded_bytes > 0 {
+            notes.push(format!(
+                "{} bytes without a time were discarded at the start of the stream",
+                self.discarded_bytes
+            ));
+        }
+        if self.loss_count > 0 {
+            notes.push(format!(
+                "{} bytes were lost on the host in {} gaps of {} together",
+                self.lost_bytes, self.loss_count, self.lost_time
+            ));
+        }
+        if let Some(first) = self.jumps.first() {
+            notes.push(format!(
+                "the time base jumped {} times, first from {} to {} µs at {}: the camera lost events or its time",
+                self.jump_count, first.from_us, first.to_us, first.arrived
+            ));
+        }
+        if let Some((before, after)) = self.overflow_hits
+            && before != after
+        {
+            notes.push(format!(
+                "the camera's overflow counter went from {before} to {after}"
+            ));
+        }
+        notes
+    }
+}

@@ -1,0 +1,168 @@
+//! The time base of an EVT2 stream: when it begins to count, and where it jumps.
+
+use skinrig_model::HostTime;
+
+use crate::inbox::WORD;
+
+/// Words looked at together in search of a rare one.
+const GROUP: usize = 16;
+/// Values of TIME_HIGH.
+const RANGE: u32 = 1 << 28;
+/// µs of one count of TIME_HIGH.
+const COUNT_US: u64 = 64;
+
+/// The counter of a TIME_HIGH word; `None` for other words.
+fn time_high(word: [u8; WORD]) -> Option<u32> {
+    let w = u32::from_le_bytes(word);
+    (w >> 28 == 8).then_some(w & (RANGE - 1))
+}
+
+/// Holds back what has no time yet.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Gate {
+    /// Up to the first TIME_HIGH word: at a start, and after a loss, where the words that follow would carry a time
+    /// from before it.
+    AwaitTime,
+    /// Up to the first TIME_HIGH word that differs from the first one. A Gen3.1 slave streams at once, with a time that
+    /// stands still at 0 until the master's clock arrives.
+    AwaitAdvance {
+        /// The counter that stands still.
+        standing: Option<u32>,
+    },
+    /// Everything passes.
+    Open,
+}
+
+impl Gate {
+    /// Returns how many of the leading bytes are held back, and opens when time has come.
+    pub fn pass(&mut self, bytes: &[u8]) -> usize {
+        if *self == Self::Open {
+            return 0;
+        }
+        for (n, word) in bytes.as_chunks::<WORD>().0.iter().enumerate() {
+            let Some(high) = time_high(*word) else {
+                continue;
+            };
+            match self {
+                Self::AwaitAdvance { standing: None } => {
+                    *self = Self::AwaitAdvance {
+                        standing: Some(high),
+                    };
+                }
+                Self::AwaitAdvance { standing } if *standing == Some(high) => {}
+                _ => {
+                    *self = Self::Open;
+                    return n * WORD;
+                }
+            }
+        }
+        bytes.len()
+    }
+}
+
+/// A step of the time base that is more than one count, or back.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct TimeJump {
+    /// Time base before the step, µs, as sent (34 bits).
+    pub from_us: u64,
+    /// Time base after it, µs, as sent.
+    pub to_us: u64,
+    /// When its bytes had arrived.
+    pub arrived: HostTime,
+}
+
+impl TimeJump {
+    /// True for a step back that is no wrap.
+    #[must_use]
+    pub const fn backwards(self) -> bool {
+        let range_us = RANGE as u64 * COUNT_US;
+        (self.to_us.wrapping_sub(self.from_us)) % range_us > range_us / 2
+    }
+}
+
+/// Follows the time base: it counts in steps of 0 or 1.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Watch {
+    last: Option<u32>,
+}
+
+impl Watch {
+    /// Forgets what came before: at a start, and after a loss.
+    pub fn reset(&mut self) {
+        self.last = None;
+    }
+
+    /// Looks at whole words, which had arrived at `arrived`, and hands over the jumps.
+    pub fn look(&mut self, bytes: &[u8], arrived: HostTime, mut on_jump: impl FnMut(TimeJump)) {
+        let (words, _) = bytes.as_chunks::<WORD>();
+        for group in words.chunks(GROUP) {
+            let any = group.iter().fold(0, |any, w| any | u32::from_le_bytes(*w));
+            if any >> 31 == 0 {
+                continue;
+            }
+            for high in group.iter().filter_map(|w| time_high(*w)) {
+                if let Some(last) = self.last
+                    && high.wrapping_sub(last) % RANGE > 1
+                {
+                    on_jump(TimeJump {
+                        from_us: u64::from(last) * COUNT_US,
+                        to_us: u64::from(high) * COUNT_US,
+                        arrived,
+                    });
+                }
+                self.last = Some(high);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn bytes(words: &[u32]) -> Vec<u8> {
+        words.iter().flat_map(|w| w.to_le_bytes()).collect()
+    }
+
+    fn high(count: u32) -> u32 {
+        0x8000_0000 | count
+    }
+
+    const CD: u32 = 0x1240_5014;
+
+    #[test]
+    fn words_before_the_first_time_are_held_back() {
+        let mut gate = Gate::AwaitTime;
+        assert_eq!(gate.pass(&bytes(&[CD, 0xa240_0001])), 8);
+        assert_eq!(gate.pass(&bytes(&[CD, high(0), CD])), 4);
+        assert_eq!(gate.pass(&bytes(&[CD])), 0);
+    }
+
+    #[test]
+    fn a_slave_is_held_back_until_its_time_advances() {
+        let mut gate = Gate::AwaitAdvance { standing: None };
+        assert_eq!(gate.pass(&bytes(&[CD, high(0), CD, high(0)])), 16);
+        assert_eq!(gate.pass(&bytes(&[high(0), CD, high(1), CD])), 8);
+        assert_eq!(gate, Gate::Open);
+    }
+
+    #[test]
+    fn jumps_are_told_from_progress_and_wraps() {
+        let mut watch = Watch::default();
+        let mut jumps = Vec::new();
+        let mut stream = vec![high(RANGE - 1), high(RANGE - 1), high(0), high(1)];
+        stream.extend([CD; 40]);
+        stream.extend([high(3), high(2), high(3)]);
+        // The result must not depend on how the stream is cut.
+        for word in stream {
+            watch.look(&bytes(&[word]), HostTime(7), |j| jumps.push(j));
+        }
+        let us: Vec<_> = jumps
+            .iter()
+            .map(|j| (j.from_us, j.to_us, j.backwards()))
+            .collect();
+        assert_eq!(us, [(64, 192, false), (192, 128, true)]);
+        watch.reset();
+        watch.look(&bytes(&[high(100)]), HostTime(8), |j| panic!("{j:?}"));
+    }
+}

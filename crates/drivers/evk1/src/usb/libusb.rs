@@ -1,0 +1,214 @@
+//! Cameras through libusb. Each camera has a context of its own, and nothing touches libusb's global one, which panics
+//! on a machine without USB.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use rusb::{Context, Device, DeviceHandle, Speed, UsbContext};
+use skinrig_device::RealClock;
+
+use super::Transport;
+use super::transfers::Transfers;
+use crate::config::Evk1Config;
+use crate::error::UsbError;
+use crate::inbox::Inbox;
+use crate::registers::{EVENT_ENDPOINT, INTERFACE, TREUZELL_SUBCLASS, USB_IDS};
+
+/// Longest wait for a control request.
+const CONTROL_LIMIT: Duration = Duration::from_secs(1);
+/// Vendor request to the device, IN and OUT.
+const VENDOR_IN: u8 = 0xc0;
+const VENDOR_OUT: u8 = 0x40;
+
+impl From<rusb::Error> for UsbError {
+    fn from(error: rusb::Error) -> Self {
+        match error {
+            rusb::Error::NoDevice | rusb::Error::NotFound => Self::Gone,
+            rusb::Error::Busy => Self::Busy,
+            rusb::Error::Access => Self::NoPermission,
+            rusb::Error::Pipe => Self::Stall,
+            rusb::Error::Timeout => Self::Timeout,
+            other => Self::Other(other.to_string()),
+        }
+    }
+}
+
+/// A device on the bus whose USB IDs an EVK1 may have.
+pub struct Slot {
+    context: Context,
+    device: Device<Context>,
+    ids: (u16, u16),
+}
+
+/// What opening a slot led to.
+pub enum Access {
+    /// Open and claimed; nothing was asked yet.
+    Open(LibUsb),
+    /// By its descriptors a Treuzell camera, which was left alone.
+    Treuzell,
+}
+
+/// All devices on the bus whose USB IDs an EVK1 may have.
+///
+/// # Errors
+/// [`UsbError::NoUsb`] when libusb finds no bus.
+pub fn bus() -> Result<Vec<Slot>, UsbError> {
+    let context = Context::new().map_err(|e| UsbError::NoUsb(e.to_string()))?;
+    let devices = context.devices()?;
+    let mut slots = Vec::new();
+    for device in devices.iter() {
+        // A device that leaves the bus meanwhile is none.
+        let Ok(descriptor) = device.device_descriptor() else {
+            continue;
+        };
+        let ids = (descriptor.vendor_id(), descriptor.product_id());
+        if USB_IDS.contains(&ids) {
+            slots.push(Slot {
+                context: context.clone(),
+                device,
+                ids,
+            });
+        }
+    }
+    Ok(slots)
+}
+
+impl Slot {
+    /// Where the device is plugged in, what it says it is, and how fast it is.
+    #[must_use]
+    pub fn place(&self) -> String {
+        let speed = match self.device.speed() {
+            Speed::Super | Speed::SuperPlus => "USB 3",
+            Speed::Unknown => "unknown speed",
+            _ => "slower than USB 3: use a USB 3 port and cable",
+        };
+        format!(
+            "USB bus {} device {}, {:04x}:{:04x}, {speed}",
+            self.device.bus_number(),
+            self.device.address(),
+            self.ids.0,
+            self.ids.1
+        )
+    }
+
+    /// True when the descriptors are those of a Treuzell camera.
+    fn treuzell(&self) -> Result<bool, UsbError> {
+        let descriptor = self
+            .device
+            .active_config_descriptor()
+            .or_else(|_| self.device.config_descriptor(0))?;
+        Ok(descriptor
+            .interfaces()
+            .flat_map(|i| i.descriptors())
+            .any(|d| d.sub_class_code() == TREUZELL_SUBCLASS))
+    }
+
+    /// Reads the descriptors, and opens and claims the device if they may be those of an EVK1. What arrives on it is
+    /// stamped on `clock`.
+    ///
+    /// # Errors
+    /// [`UsbError::Busy`], [`UsbError::NoPermission`], and whatever else libusb says.
+    pub fn open(&self, clock: RealClock) -> Result<Access, UsbError> {
+        if self.treuzell()? {
+            return Ok(Access::Treuzell);
+        }
+        let handle = self.device.open()?;
+        // Not every system can tell.
+        if handle.kernel_driver_active(INTERFACE).unwrap_or(false) {
+            handle.detach_kernel_driver(INTERFACE)?;
+        }
+        handle.claim_interface(INTERFACE)?;
+        Ok(Access::Open(LibUsb {
+            context: self.context.clone(),
+            handle: Arc::new(handle),
+            clock,
+            place: self.place(),
+            stream: None,
+            stalled: false,
+        }))
+    }
+}
+
+/// A claimed device.
+pub struct LibUsb {
+    context: Context,
+    handle: Arc<DeviceHandle<Context>>,
+    clock: RealClock,
+    place: String,
+    stream: Option<Transfers>,
+    stalled: bool,
+}
+
+impl Transport for LibUsb {
+    fn control_in(
+        &mut self,
+        request: u8,
+        value: u16,
+        index: u16,
+        answer: &mut [u8],
+    ) -> Result<usize, UsbError> {
+        let limit = CONTROL_LIMIT;
+        Ok(self
+            .handle
+            .read_control(VENDOR_IN, request, value, index, answer, limit)?)
+    }
+
+    fn control_out(
+        &mut self,
+        request: u8,
+        value: u16,
+        index: u16,
+        data: &[u8],
+    ) -> Result<(), UsbError> {
+        let limit = CONTROL_LIMIT;
+        let found = self
+            .handle
+            .write_control(VENDOR_OUT, request, value, index, data, limit)?;
+        if found == data.len() {
+            Ok(())
+        } else {
+            let expected = data.len();
+            Err(UsbError::Short { expected, found })
+        }
+    }
+
+    fn reset(&mut self) -> Result<(), UsbError> {
+        Ok(self.handle.reset()?)
+    }
+
+    fn clear_halt(&mut self) -> Result<(), UsbError> {
+        Ok(self.handle.clear_halt(EVENT_ENDPOINT)?)
+    }
+
+    fn read_events(&mut self, buffer: &mut [u8], limit: Duration) -> Result<usize, UsbError> {
+        match self.handle.read_bulk(EVENT_ENDPOINT, buffer, limit) {
+            Err(rusb::Error::Timeout) => Ok(0),
+            other => Ok(other?),
+        }
+    }
+
+    fn start_stream(&mut self, inbox: Arc<Inbox>, config: &Evk1Config) -> Result<(), UsbError> {
+        self.stop_stream()?;
+        if std::mem::take(&mut self.stalled) {
+            self.clear_halt()?;
+        }
+        let (context, handle) = (self.context.clone(), Arc::clone(&self.handle));
+        self.stream = Some(Transfers::start(
+            context, handle, inbox, self.clock, config,
+        )?);
+        Ok(())
+    }
+
+    fn stop_stream(&mut self) -> Result<(), UsbError> {
+        let Some(mut stream) = self.stream.take() else {
+            return Ok(());
+        };
+        let stopped = stream.stop();
+        self.stalled = stream.stalled();
+        stopped
+    }
+
+    fn place(&self) -> String {
+        self.place.clone()
+    }
+}

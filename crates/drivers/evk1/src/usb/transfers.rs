@@ -1,0 +1,332 @@
+//! Asynchronous bulk transfers: always queued, never waited for.
+//!
+//! An event thread runs libusb's event loop. The completion callback stamps the arrival, copies the bytes into the
+//! inbox's growing block (a chunk is then handed on without another copy), and submits the transfer again at once with
+//! its own buffer. The inbox never makes it wait, so the pipe keeps moving whatever the rest of the program does.
+
+#![expect(
+    unsafe_code,
+    reason = "rusb has no asynchronous interface: libusb's is called here and nowhere else"
+)]
+
+use std::ffi::c_void;
+use std::ptr::NonNull;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use rusb::constants::{
+    LIBUSB_TRANSFER_CANCELLED, LIBUSB_TRANSFER_COMPLETED, LIBUSB_TRANSFER_NO_DEVICE,
+    LIBUSB_TRANSFER_OVERFLOW, LIBUSB_TRANSFER_STALL, LIBUSB_TRANSFER_TIMED_OUT,
+};
+use rusb::ffi::{
+    libusb_alloc_transfer, libusb_cancel_transfer, libusb_fill_bulk_transfer, libusb_free_transfer,
+    libusb_submit_transfer, libusb_transfer,
+};
+use rusb::{Context, DeviceHandle, UsbContext};
+use skinrig_device::RealClock;
+
+use crate::config::Evk1Config;
+use crate::error::UsbError;
+use crate::inbox::Inbox;
+use crate::registers::EVENT_ENDPOINT;
+
+/// Longest wait for cancelled transfers, and for the event thread.
+const STOP_LIMIT: Duration = Duration::from_secs(1);
+/// The event loop looks up at least this often.
+const LOOK_UP: Duration = Duration::from_millis(100);
+
+/// What the callbacks share with the owner of the stream.
+struct Shared {
+    inbox: Arc<Inbox>,
+    clock: RealClock,
+    flight: Mutex<Flight>,
+    /// Told when a transfer is not submitted again, and when the event thread ends.
+    landed: Condvar,
+    /// The event thread shall end although transfers are under way.
+    abandoned: AtomicBool,
+}
+
+#[derive(Default)]
+struct Flight {
+    /// Transfers under way.
+    count: usize,
+    /// Nothing is submitted any more.
+    ending: bool,
+    stalled: bool,
+    thread_ended: bool,
+}
+
+impl Shared {
+    fn flight(&self) -> MutexGuard<'_, Flight> {
+        self.flight.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Waits until `done` or the time limit, and returns the state then.
+    fn wait(&self, done: impl Fn(&Flight) -> bool) -> MutexGuard<'_, Flight> {
+        self.landed
+            .wait_timeout_while(self.flight(), STOP_LIMIT, |f| !done(f))
+            .unwrap_or_else(PoisonError::into_inner)
+            .0
+    }
+}
+
+/// One transfer with the memory that it writes to.
+struct Job {
+    transfer: NonNull<libusb_transfer>,
+    buffer: NonNull<[u8]>,
+    /// What `user_data` of the transfer points to.
+    shared: *const Shared,
+}
+
+// SAFETY: the transfer and its buffer belong to this job alone; libusb lets any thread submit, cancel and free a
+// transfer, and what `shared` points to is Sync.
+unsafe impl Send for Job {}
+
+impl Job {
+    fn new(
+        handle: &DeviceHandle<Context>,
+        shared: &Arc<Shared>,
+        config: &Evk1Config,
+    ) -> Result<Self, UsbError> {
+        // SAFETY: allocates a transfer without isochronous packets, or returns null.
+        let transfer = NonNull::new(unsafe { libusb_alloc_transfer(0) })
+            .ok_or_else(|| UsbError::Other("no memory for a transfer".to_owned()))?;
+        let buffer = Box::into_raw(vec![0_u8; config.transfer_bytes].into_boxed_slice());
+        // SAFETY: a pointer that comes from a box is not null.
+        let buffer = unsafe { NonNull::new_unchecked(buffer) };
+        let shared = Arc::into_raw(Arc::clone(shared));
+        // `Evk1Config::check` holds both numbers far below the limits of these types.
+        let length = config.transfer_bytes as i32;
+        let timeout_ms = config.transfer_timeout.as_millis() as u32;
+        // SAFETY: the transfer was just allocated and is not submitted; the buffer has `length` bytes; both, and what
+        // `user_data` points to, live until `Drop`, which runs only while the transfer is not under way.
+        unsafe {
+            libusb_fill_bulk_transfer(
+                transfer.as_ptr(),
+                handle.as_raw(),
+                EVENT_ENDPOINT,
+                buffer.cast().as_ptr(),
+                length,
+                completed,
+                shared.cast_mut().cast::<c_void>(),
+                timeout_ms,
+            );
+        }
+        Ok(Self {
+            transfer,
+            buffer,
+            shared,
+        })
+    }
+}
+
+impl Drop for Job {
+    fn drop(&mut self) {
+        // SAFETY: jobs are dropped only while their transfer is not under way (`Transfers::stop` forgets the others),
+        // so libusb and the callback use none of this any more; each pointer was made by its counterpart in `new`.
+        unsafe {
+            libusb_free_transfer(self.transfer.as_ptr());
+            drop(Box::from_raw(self.buffer.as_ptr()));
+            drop(Arc::from_raw(self.shared));
+        }
+    }
+}
+
+/// Called by libusb whenever a transfer comes back, on whichever thread handles events.
+extern "system" fn completed(transfer: *mut libusb_transfer) {
+    // SAFETY: libusb hands over a transfer that `Job::new` filled: its `user_data` is a `Shared` that the job keeps
+    // alive, and the job outlives the transfer's flight.
+    let shared = unsafe { &*(*transfer).user_data.cast::<Shared>().cast_const() };
+    let arrived = shared.clock.now();
+    // SAFETY: the transfer is not under way now, so its first `actual_length` bytes are initialised and nobody writes to
+    // them until it is submitted again below.
+    let (status, bytes) = unsafe {
+        let length = usize::try_from((*transfer).actual_length).unwrap_or(0);
+        let bytes = std::slice::from_raw_parts((*transfer).buffer.cast_const(), length);
+        ((*transfer).status, bytes)
+    };
+    // Also a transfer that timed out or was cancelled can hold bytes.
+    shared.inbox.push(bytes, arrived);
+    let outcome = match status {
+        LIBUSB_TRANSFER_COMPLETED | LIBUSB_TRANSFER_TIMED_OUT => Ok(true),
+        LIBUSB_TRANSFER_CANCELLED => Ok(false),
+        LIBUSB_TRANSFER_NO_DEVICE => Err(UsbError::Gone),
+        LIBUSB_TRANSFER_STALL => Err(UsbError::Stall),
+        LIBUSB_TRANSFER_OVERFLOW => Err(UsbError::Other(
+            "the device sent more than a transfer holds".to_owned(),
+        )),
+        other => Err(UsbError::Other(format!(
+            "a transfer failed (libusb status {other})"
+        ))),
+    };
+    let mut flight = shared.flight();
+    let outcome = outcome.and_then(|again| match again && !flight.ending {
+        true => submit(transfer),
+        false => Ok(false),
+    });
+    match outcome {
+        Ok(true) => return,
+        Ok(false) => {}
+        Err(error) => {
+            flight.stalled |= error == UsbError::Stall;
+            shared.inbox.fail(error);
+        }
+    }
+    flight.ending = true;
+    flight.count -= 1;
+    shared.landed.notify_all();
+}
+
+/// Submits a transfer that is filled and not under way; true when it is on its way.
+fn submit(transfer: *mut libusb_transfer) -> Result<bool, UsbError> {
+    // SAFETY: both callers hold the flight's lock and a transfer that `Job::new` filled and that is not under way.
+    match unsafe { libusb_submit_transfer(transfer) } {
+        0 => Ok(true),
+        code => Err(submit_error(code)),
+    }
+}
+
+fn submit_error(code: i32) -> UsbError {
+    match code {
+        rusb::constants::LIBUSB_ERROR_NO_DEVICE => UsbError::Gone,
+        rusb::constants::LIBUSB_ERROR_NO_MEM => UsbError::Other(
+            "no memory for transfers in the kernel: raise /sys/module/usbcore/parameters/usbfs_memory_mb".to_owned(),
+        ),
+        other => UsbError::Other(format!("submitting a transfer failed (libusb error {other})")),
+    }
+}
+
+/// The transfers of a running stream and the thread that serves them.
+pub(super) struct Transfers {
+    jobs: Vec<Job>,
+    shared: Arc<Shared>,
+    context: Context,
+    handle: Arc<DeviceHandle<Context>>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Transfers {
+    /// Queues all transfers.
+    pub fn start(
+        context: Context,
+        handle: Arc<DeviceHandle<Context>>,
+        inbox: Arc<Inbox>,
+        clock: RealClock,
+        config: &Evk1Config,
+    ) -> Result<Self, UsbError> {
+        let shared = Arc::new(Shared {
+            inbox,
+            clock,
+            flight: Mutex::default(),
+            landed: Condvar::new(),
+            abandoned: AtomicBool::new(false),
+        });
+        let jobs = (0..config.transfers)
+            .map(|_| Job::new(&handle, &shared, config))
+            .collect::<Result<Vec<_>, _>>()?;
+        let thread = {
+            let (context, shared) = (context.clone(), Arc::clone(&shared));
+            std::thread::Builder::new()
+                .name("evk1-usb".to_owned())
+                .spawn(move || serve(&context, &shared))
+                .map_err(|e| UsbError::Other(format!("starting the event thread: {e}")))?
+        };
+        let mut stream = Self {
+            jobs,
+            shared,
+            context,
+            handle,
+            thread: Some(thread),
+        };
+        match stream.submit_all() {
+            Ok(()) => Ok(stream),
+            Err(error) => stream.stop().and(Err(error)),
+        }
+    }
+
+    fn submit_all(&self) -> Result<(), UsbError> {
+        for job in &self.jobs {
+            let mut flight = self.shared.flight();
+            if flight.ending {
+                break; // One came back with an error, which the inbox has.
+            }
+            submit(job.transfer.as_ptr())?;
+            flight.count += 1;
+        }
+        Ok(())
+    }
+
+    /// True when the endpoint stalled.
+    pub fn stalled(&self) -> bool {
+        self.shared.flight().stalled
+    }
+
+    /// Cancels the transfers and waits for them. Those that do not come back are never freed.
+    pub fn stop(&mut self) -> Result<(), UsbError> {
+        let Some(thread) = self.thread.take() else {
+            return Ok(());
+        };
+        self.shared.flight().ending = true;
+        for job in &self.jobs {
+            // SAFETY: the transfer is allocated. One that is not under way gives an error, which says nothing new.
+            unsafe { libusb_cancel_transfer(job.transfer.as_ptr()) };
+        }
+        let left = self.shared.wait(|f| f.count == 0).count;
+        self.shared.abandoned.store(left > 0, Ordering::Release);
+        self.context.interrupt_handle_events();
+        let ended = self.shared.wait(|f| f.thread_ended).thread_ended;
+        if ended {
+            // A panic of it, which nothing in it should cause, has ended the stream by now.
+            let _ = thread.join();
+        }
+        if left > 0 || !ended {
+            // libusb or the kernel may still write to the buffers.
+            std::mem::forget(std::mem::take(&mut self.jobs));
+            std::mem::forget((Arc::clone(&self.handle), self.context.clone()));
+            return Err(UsbError::Stuck {
+                limit_ms: STOP_LIMIT.as_millis() as u64,
+                left,
+            });
+        }
+        Ok(())
+    }
+}
+
+impl Drop for Transfers {
+    fn drop(&mut self) {
+        // The jobs must not be freed under way; what else went wrong has nobody left to hear it.
+        let _ = self.stop();
+    }
+}
+
+/// The event thread: runs until the last transfer is back.
+fn serve(context: &Context, shared: &Shared) {
+    /// Tells that the thread ends, in whichever way.
+    struct End<'a>(&'a Shared);
+    impl Drop for End<'_> {
+        fn drop(&mut self) {
+            let mut flight = self.0.flight();
+            flight.ending = true;
+            flight.thread_ended = true;
+            self.0.landed.notify_all();
+        }
+    }
+    let _end = End(shared);
+    loop {
+        match context.handle_events(Some(LOOK_UP)) {
+            Ok(()) | Err(rusb::Error::Interrupted) => {}
+            Err(e) => {
+                shared
+                    .inbox
+                    .fail(UsbError::Other(format!("handling USB events: {e}")));
+                return;
+            }
+        }
+        let flight = shared.flight();
+        if (flight.ending && flight.count == 0) || shared.abandoned.load(Ordering::Acquire) {
+            return;
+        }
+    }
+}

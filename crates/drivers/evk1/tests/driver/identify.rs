@@ -1,0 +1,54 @@
+//! What is not an EVK1 Gen3.1 that can stream is refused by name, before anything is written.
+
+use skinrig_evk1::registers::request;
+use skinrig_evk1::{Evk1Config, UsbError};
+
+use super::model::Bench;
+
+fn refusal(spoil: impl FnOnce(&Bench)) -> String {
+    let bench = Bench::new();
+    spoil(&bench);
+    let error = bench.open().err().expect("an error");
+    assert_eq!(bench.writes(), [], "nothing may be written");
+    error.to_string()
+}
+
+fn answering(code: u8, word: u16) -> String {
+    refusal(|bench| {
+        bench.model().faults.answers.insert(code, word);
+    })
+}
+
+#[test]
+fn other_devices_are_refused_by_name() {
+    let found = [
+        answering(request::BOARD_VERSION, 3),
+        answering(request::FPGA_BOOT_STATE, 0),
+        answering(request::SYSTEM_ID, 0x11),
+        answering(request::SYSTEM_ID, 0x1a),
+        answering(request::SYSTEM_ID, 0x31),
+        refusal(|b| b.model().faults.read_status = Some(0x12)),
+        refusal(|b| b.model().faults.error = Some(UsbError::Gone)),
+    ];
+    insta::assert_snapshot!(found.join("\n"), @r"
+model: not an EVK1 Gen3.1: expected board version 2, found board version 3
+expected the FPGA to be configured within 10 s, found it still booting: power the camera off and on
+model: not an EVK1 Gen3.1: expected system ID 0x1c, found 0x11, the rescue image of the FPGA: the camera's flash needs the maker's update
+model: not an EVK1 Gen3.1: expected system ID 0x1c, found 0x1a, an EVK1 Gen4
+model: not an EVK1 Gen3.1: expected system ID 0x1c, found 0x31, a system that is not known
+reading ATIS_CONTROL (0x0000): expected status 0x40, found 0x12
+asking for the board version: the device is gone from the bus: check cable and power
+");
+}
+
+#[test]
+fn a_configuration_that_does_not_go_together_is_refused() {
+    let config = Evk1Config {
+        chunk_bytes: 1 << 16,
+        ..Evk1Config::default()
+    };
+    let error = Bench::new().open_with(config).err().expect("an error");
+    insta::assert_snapshot!(error, @r"
+expected chunk_bytes from transfer_bytes to 64 MiB, found 65536
+");
+}

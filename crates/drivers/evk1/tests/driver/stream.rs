@@ -1,0 +1,294 @@
+//! The stream: what has no time is held back, what is lost is counted, what breaks is named.
+
+use proptest::prelude::*;
+use skinrig_device::{CameraSettings, Clock, DeviceError, EventCamera, NoiseFilter, SyncMode};
+use skinrig_evk1::inbox::{Block, Inbox, Taken};
+use skinrig_evk1::registers as r;
+use skinrig_evk1::{Evk1Config, UsbError};
+use skinrig_model::{HostTime, RawChunk};
+
+use super::model::Bench;
+
+fn bytes(words: &[u32]) -> Vec<u8> {
+    words.iter().flat_map(|w| w.to_le_bytes()).collect()
+}
+
+fn all_bytes(chunks: &[RawChunk]) -> usize {
+    chunks.iter().map(|c| c.bytes.len()).sum()
+}
+
+#[test]
+fn a_slave_sends_nothing_until_its_clock_arrives_and_counts_what_it_held_back() {
+    let bench = Bench::new();
+    let mut camera = bench.open().unwrap();
+    let settings = CameraSettings {
+        sync: SyncMode::Slave,
+        ..CameraSettings::default()
+    };
+    camera.configure(&settings).unwrap();
+    camera.start().unwrap();
+    let mut chunks = Vec::new();
+    bench.pass(50);
+    camera.flush(&mut chunks).unwrap();
+    assert_eq!(chunks, []);
+    assert!(!camera.time_runs());
+    let held_back = camera.report().discarded_bytes;
+    assert!(held_back > 4000, "{held_back}");
+    bench.model().sync_clock = true;
+    bench.pass(50);
+    camera.flush(&mut chunks).unwrap();
+    assert!(camera.time_runs());
+    assert_eq!(chunks.len(), 1);
+    assert_eq!(chunks[0].lost_before, 0);
+    assert_eq!(chunks[0].facts.first_us, Some(64));
+    assert!(chunks[0].facts.cd_events > 900);
+    camera.stop(&mut chunks).unwrap();
+    let mut notes = Vec::new();
+    camera.take_notes(&mut notes);
+    assert!(notes[0].contains("without a time"), "{notes:?}");
+}
+
+#[test]
+fn pixels_are_silent_for_half_a_second_and_the_filter_gets_its_setting_back() {
+    let bench = Bench::new();
+    let mut camera = bench.open().unwrap();
+    let settings = CameraSettings {
+        noise_filter: Some(NoiseFilter {
+            min_rate_ev_s: 1_000_000,
+        }),
+        ..CameraSettings::default()
+    };
+    camera.configure(&settings).unwrap();
+    let before = bench.model().word(r::NFL_THRESH);
+    assert_eq!(r::NFL_EVT_THRESH.of(before), 1023);
+    camera.start().unwrap();
+    let mut chunks = Vec::new();
+    camera.flush(&mut chunks).unwrap();
+    assert!(all_bytes(&chunks) > 100_000, "the time base runs meanwhile");
+    assert!(chunks.iter().all(|c| c.facts.cd_events == 0));
+    assert_eq!(bench.model().word(r::NFL_THRESH), before);
+    assert_eq!(bench.model().get(r::NFL_EN), 1);
+}
+
+#[test]
+fn a_driver_that_lags_loses_whole_words_and_says_how_many() {
+    let bench = Bench::new();
+    let config = Evk1Config {
+        chunk_bytes: 128 << 10,
+        backlog_bytes: 256 << 10,
+        ..Evk1Config::default()
+    };
+    let mut camera = bench.open_with(config).unwrap();
+    camera.start().unwrap();
+    let mut chunks = Vec::new();
+    camera.flush(&mut chunks).unwrap();
+    let sent_before = all_bytes(&chunks);
+    // 20 events and 64 TIME_HIGH words every 1.024 ms: 0.33 MB in a second, more than may wait.
+    bench.pass(2000);
+    camera.flush(&mut chunks).unwrap();
+    bench.pass(10);
+    camera.flush(&mut chunks).unwrap();
+    camera.stop(&mut chunks).unwrap();
+    let lost: u64 = chunks.iter().map(|c| c.lost_before).sum();
+    assert_eq!(lost, camera.report().lost_bytes);
+    assert!(lost > 300_000, "{lost}");
+    assert_eq!(camera.report().loss_count, 1);
+    assert!(camera.report().lost_time.as_secs_f64() > 1.0);
+    // After the gap the first word is a TIME_HIGH, so no event carries a time from before it.
+    let gap = chunks.iter().position(|c| c.lost_before > 0).unwrap();
+    let after = chunks[gap..].iter().find(|c| !c.bytes.is_empty()).unwrap();
+    assert_eq!(after.bytes[3] >> 4, 8);
+    assert!(sent_before > 0);
+    assert_eq!(
+        camera.report().jump_count,
+        0,
+        "a gap on the host is no jump of the camera"
+    );
+}
+
+#[test]
+fn a_camera_that_leaves_is_named_after_what_it_sent() {
+    for (error, gone) in [(UsbError::Gone, true), (UsbError::Stall, false)] {
+        let bench = Bench::new();
+        let mut camera = bench.open().unwrap();
+        camera.start().unwrap();
+        bench.pass(30);
+        let mut chunks = Vec::new();
+        bench.model().faults.error = Some(error);
+        bench.pass(2);
+        let lost = camera.poll(&mut chunks).unwrap_err();
+        assert!(matches!(lost, DeviceError::Lost { .. }), "{lost}");
+        assert!(
+            lost.to_string()
+                .contains("camera 1 00001621: lost: receiving events"),
+            "{lost}"
+        );
+        assert!(
+            all_bytes(&chunks) > 0,
+            "what came before must be handed over"
+        );
+        camera.stop(&mut chunks).unwrap_err();
+        camera.stop(&mut chunks).unwrap();
+        if gone {
+            camera.start().unwrap_err();
+        } else {
+            bench.model().faults.error = None;
+            camera.start().unwrap();
+        }
+    }
+}
+
+#[test]
+fn jumps_of_the_time_base_are_reported() {
+    let bench = Bench::new();
+    let mut camera = bench.open().unwrap();
+    camera.start().unwrap();
+    let mut chunks = Vec::new();
+    camera.flush(&mut chunks).unwrap();
+    let last = chunks.last().unwrap().facts.last_us.unwrap();
+    let high = 0x8000_0000 | (last / 64) as u32;
+    // One lost TIME_HIGH period is ordinary; two are not; nor is going back.
+    bench
+        .model()
+        .send(&bytes(&[high + 1, high + 3, high + 2, high + 2]));
+    camera.stop(&mut chunks).unwrap();
+    assert_eq!(camera.report().jump_count, 2);
+    assert!(!camera.report().jumps[0].backwards());
+    assert!(camera.report().jumps[1].backwards());
+    let mut notes = Vec::new();
+    camera.take_notes(&mut notes);
+    assert!(
+        notes.iter().any(|n| n.contains("time base jumped 2 times")),
+        "{notes:?}"
+    );
+    notes.clear();
+    camera.take_notes(&mut notes);
+    assert!(notes.is_empty(), "told once");
+}
+
+#[test]
+fn the_overflow_counter_is_read_around_the_stream() {
+    let bench = Bench::new();
+    let mut camera = bench.open().unwrap();
+    bench
+        .model()
+        .registers
+        .insert(r::OVERFLOW_HITCOUNT.address, 7);
+    camera.start().unwrap();
+    bench
+        .model()
+        .registers
+        .insert(r::OVERFLOW_HITCOUNT.address, 9);
+    camera.stop(&mut Vec::new()).unwrap();
+    assert_eq!(camera.report().overflow_hits, Some((7, 9)));
+    assert!(camera.report().notes()[0].contains("from 7 to 9"));
+}
+
+#[test]
+fn words_cut_between_packets_and_at_the_end_are_kept_whole() {
+    let bench = Bench::new();
+    let mut camera = bench.open().unwrap();
+    camera.start().unwrap();
+    let mut chunks = Vec::new();
+    camera.flush(&mut chunks).unwrap();
+    let now = bench.now();
+    let event = bytes(&[0x1240_5014]);
+    bench.model().send(&event[..1]);
+    camera.flush(&mut chunks).unwrap();
+    bench.model().send(&event[1..3]);
+    bench.model().send(&event[3..]);
+    bench.model().send(&event[..2]);
+    camera.stop(&mut chunks).unwrap();
+    let [.., whole, torn] = chunks.as_slice() else {
+        panic!("{chunks:?}");
+    };
+    assert_eq!((&whole.bytes, whole.facts.cd_events), (&event, 1));
+    assert_eq!(
+        (torn.bytes.len(), torn.lost_before, torn.host_time),
+        (0, 2, now)
+    );
+}
+
+/// What goes in and out of an inbox.
+#[derive(Debug, Clone)]
+enum Op {
+    Push(usize),
+    TakeFull,
+    TakeAll,
+}
+
+fn ops() -> impl Strategy<Value = Vec<Op>> {
+    let op = prop_oneof![
+        6 => (1..300_usize).prop_map(Op::Push),
+        1 => Just(Op::TakeFull),
+        1 => Just(Op::TakeAll),
+    ];
+    prop::collection::vec(op, 1..200)
+}
+
+proptest! {
+    /// A stream of numbered words, cut anywhere and taken at any time: every word that comes out is whole and in its
+    /// place, and the gaps are exactly what is told as lost.
+    #[test]
+    fn an_inbox_loses_whole_words_in_order_and_counts_them(ops in ops()) {
+        const CHUNK: usize = 400;
+        const BACKLOG: usize = 2000;
+        let inbox = Inbox::new(CHUNK, BACKLOG);
+        let (mut sent, mut at, mut waiting) = (0_usize, 0, 0);
+        let mut got: Vec<Block> = Vec::new();
+        for op in ops {
+            let taken = match op {
+                Op::Push(n) => {
+                    at += 1;
+                    let stream: Vec<u8> =
+                        (sent..sent + n).map(|k| (k as u32 / 4).to_le_bytes()[k % 4]).collect();
+                    inbox.push(&stream, HostTime(at));
+                    sent += n;
+                    continue;
+                }
+                Op::TakeFull => inbox.take_full(),
+                Op::TakeAll => inbox.take_all(),
+            };
+            got.extend(taken.blocks);
+        }
+        let Taken { blocks, error } = inbox.finish();
+        got.extend(blocks);
+        prop_assert_eq!(error, None);
+        let (mut place, mut last) = (0_u64, HostTime(0));
+        for block in &got {
+            if let Some(loss) = block.lost_before {
+                place += loss.bytes;
+                prop_assert!(loss.since <= loss.until && loss.until <= block.arrived);
+            }
+            prop_assert!(last <= block.arrived && block.arrived <= HostTime(at));
+            last = block.arrived;
+            prop_assert_eq!(block.bytes.len() % 4, 0);
+            prop_assert!(block.bytes.len() <= CHUNK + 3);
+            waiting += block.bytes.len();
+            for word in block.bytes.chunks_exact(4) {
+                prop_assert_eq!(place % 4, 0);
+                let number = u32::from_le_bytes(word.try_into().unwrap());
+                prop_assert_eq!(u64::from(number), place / 4);
+                place += 4;
+            }
+        }
+        prop_assert_eq!(place, sent as u64);
+        prop_assert!(waiting <= sent);
+    }
+
+    /// Nothing is lost while no more waits than the backlog allows.
+    #[test]
+    fn an_inbox_that_is_emptied_in_time_loses_nothing(cuts in prop::collection::vec(1..500_usize, 1..100)) {
+        let inbox = Inbox::new(600, 1200);
+        let mut kept = 0;
+        for (k, n) in cuts.iter().enumerate() {
+            inbox.push(&vec![0; *n], HostTime(k as i64));
+            for block in inbox.take_all().blocks {
+                prop_assert_eq!(block.lost_before, None);
+                kept += block.bytes.len();
+            }
+        }
+        let sent: usize = cuts.iter().sum();
+        prop_assert_eq!(kept, sent - sent % 4);
+    }
+}
