@@ -103,6 +103,16 @@ impl StatusVector {
         Self::default()
     }
 
+    /// A vector that holds `words` (at most [`STATUS_CAPACITY`]), the others absent.
+    #[must_use]
+    pub fn from_words(words: &[i32]) -> Self {
+        let mut vector = Self::new();
+        for (place, word) in vector.words.iter_mut().zip(words) {
+            *place = *word;
+        }
+        vector
+    }
+
     /// Where `dhdGetStatus` writes; good for [`STATUS_CAPACITY`] words.
     pub fn as_mut_ptr(&mut self) -> *mut i32 {
         self.words.as_mut_ptr()

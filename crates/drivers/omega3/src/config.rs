@@ -91,9 +91,11 @@ pub struct Envelope {
     pub max_speed_mm_s: f64,
     /// Largest force, N; an omega.3 exerts 12.
     pub max_force_n: f64,
-    /// Tip force per unit of motor ratio, N. Naively the full 12 N; the true factor depends on the pose and is to be
-    /// measured with a scale.
+    /// Tip force per unit of motor ratio, N. Naively the full 12 N; the true factor depends on the pose: take the
+    /// largest force divided by its ratio that a scale showed anywhere in the workspace.
     pub n_per_ratio: f64,
+    /// Largest motor ratio, whatever force a run allows.
+    pub max_ratio: f64,
     /// Share of the motor ratio that gravity compensation takes; 0 until measured.
     pub gravity_ratio: f64,
     /// Smallest motor ratio with which the arm still carries itself; to be measured.
@@ -109,6 +111,7 @@ impl Default for Envelope {
             max_speed_mm_s: 50.0,
             max_force_n: 12.0,
             n_per_ratio: 12.0,
+            max_ratio: 1.0,
             gravity_ratio: 0.0,
             least_ratio: 0.05,
         }
@@ -116,17 +119,10 @@ impl Default for Envelope {
 }
 
 impl Envelope {
-    /// Motor ratio that caps the tip at `force_n`: `gravity_ratio + force_n / n_per_ratio`.
+    /// Motor ratio that caps the tip at `force_n`: `gravity_ratio + force_n / n_per_ratio`, at most `max_ratio`.
     #[must_use]
     pub fn ratio_of(&self, force_n: f64) -> f64 {
-        self.gravity_ratio + force_n / self.n_per_ratio
-    }
-
-    /// Largest force whose motor ratio is at most 1, N.
-    #[must_use]
-    pub fn strongest_n(&self) -> f64 {
-        self.max_force_n
-            .min((1.0 - self.gravity_ratio) * self.n_per_ratio)
+        (self.gravity_ratio + force_n / self.n_per_ratio).min(self.max_ratio)
     }
 }
 
@@ -319,7 +315,8 @@ impl OmegaConfig {
         };
         within("envelope.max_force_n", e.max_force_n, 0.0, DEVICE_MAX_N)?;
         within("envelope.gravity_ratio", e.gravity_ratio, 0.0, 0.9)?;
-        within("envelope.least_ratio", e.least_ratio, 0.0, 1.0)?;
+        within("envelope.max_ratio", e.max_ratio, 0.0, 1.0)?;
+        within("envelope.least_ratio", e.least_ratio, 0.0, e.max_ratio)?;
         within("motion.cycle_hz", m.cycle_hz, 1000.0, 4000.0)?;
         within("motion.parked_hz", m.parked_hz, 20.0, 1000.0)?;
         within("motion.filter_headroom", m.filter_headroom, 1.0, 10.0)?;
@@ -407,7 +404,8 @@ mod tests {
     fn the_defaults_are_sound_and_nonsense_is_named() {
         assert_eq!(OmegaConfig::default().check(), Ok(()));
         type Spoil = fn(&mut OmegaConfig);
-        let spoilt: [(&str, Spoil); 9] = [
+        let spoilt: [(&str, Spoil); 10] = [
+            ("envelope.least_ratio", |c| c.envelope.max_ratio = 0.01),
             ("envelope.min_mm", |c| c.envelope.min_mm[2] = f64::NAN),
             ("envelope.max_force_n", |c| c.envelope.max_force_n = 13.0),
             ("envelope.max_speed_mm_s", |c| {
@@ -439,6 +437,6 @@ mod tests {
             ..Envelope::default()
         };
         assert!((envelope.ratio_of(2.0) - 0.3).abs() < 1e-12);
-        assert!((envelope.ratio_of(envelope.strongest_n()) - 1.0).abs() < 1e-12);
+        assert!((envelope.ratio_of(12.0) - 1.0).abs() < 1e-12);
     }
 }

@@ -64,7 +64,6 @@ impl Omega {
             clock,
             Arc::clone(&stream),
         )?;
-        let e = &config.envelope;
         Ok(Self {
             owner,
             stream,
@@ -73,14 +72,7 @@ impl Omega {
                 serial: opened.serial,
                 firmware: format!("{}, {words}", opened.firmware),
             },
-            capabilities: IndenterCapabilities {
-                workspace_min_mm: e.min_mm,
-                workspace_max_mm: e.max_mm,
-                max_speed_mm_s: e.max_speed_mm_s,
-                max_force_n: e.strongest_n(),
-                pose_rate_hz: config.motion.cycle_hz / 2.0,
-                reports_force: true,
-            },
+            capabilities: capabilities(&config),
             config,
             remarks: opened.remarks,
         })
@@ -93,6 +85,41 @@ impl Omega {
     }
 }
 
+/// What a robot of this configuration can do.
+pub(crate) fn capabilities(config: &OmegaConfig) -> IndenterCapabilities {
+    let e = &config.envelope;
+    IndenterCapabilities {
+        workspace_min_mm: e.min_mm,
+        workspace_max_mm: e.max_mm,
+        max_speed_mm_s: e.max_speed_mm_s,
+        max_force_n: e.max_force_n,
+        pose_rate_hz: config.motion.cycle_hz / 2.0,
+        reports_force: true,
+    }
+}
+
+/// Checks the limits of a run.
+pub(crate) fn check_wanted(
+    serial: &str,
+    config: &OmegaConfig,
+    wanted: &MotionLimits,
+) -> Result<(), DeviceError> {
+    limits::check_limits(serial, &capabilities(config), wanted)?;
+    let e = &config.envelope;
+    if e.ratio_of(wanted.max_force_n) < e.least_ratio {
+        let least_n = (e.least_ratio - e.gravity_ratio) * e.n_per_ratio;
+        let expected = format!(
+            "max_force_n of at least {least_n:.2}, below which the arm may not carry itself"
+        );
+        return Err(limits::refused(
+            serial,
+            expected,
+            wanted.max_force_n.to_string(),
+        ));
+    }
+    Ok(())
+}
+
 impl Indenter for Omega {
     fn identity(&self) -> DeviceIdentity {
         self.identity.clone()
@@ -103,20 +130,7 @@ impl Indenter for Omega {
     }
 
     fn configure(&mut self, wanted: &MotionLimits) -> Result<Vec<Setting>, DeviceError> {
-        let serial = &self.identity.serial;
-        limits::check_limits(serial, &self.capabilities, wanted)?;
-        let envelope = &self.config.envelope;
-        let ratio = envelope.ratio_of(wanted.max_force_n);
-        if ratio < envelope.least_ratio {
-            let least_n = (envelope.least_ratio - envelope.gravity_ratio) * envelope.n_per_ratio;
-            return Err(limits::refused(
-                serial,
-                format!(
-                    "max_force_n of at least {least_n:.2}, below which the arm may not carry itself"
-                ),
-                wanted.max_force_n.to_string(),
-            ));
-        }
+        check_wanted(&self.identity.serial, &self.config, wanted)?;
         self.owner.configure(*wanted)
     }
 

@@ -33,3 +33,6 @@ pub mod trajectory;
 pub use config::OmegaConfig;
 pub use error::OmegaError;
 pub use indenter::Omega;
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,158 @@
+//! The open procedure: each obstacle is named with its next step, nothing moves, and the device is closed again.
+
+use skinrig_drd_abi::ErrorCode;
+
+use super::scripted::Scripted;
+use crate::OmegaConfig;
+use crate::config::{Initialise, SupervisorCommand, Watchdog};
+use crate::enumerate;
+use crate::open::open;
+
+/// What is wrong, and words that the error must hold.
+type Obstacle = (fn(&Scripted), &'static [&'static str]);
+
+#[test]
+fn every_obstacle_is_named_and_leaves_a_braked_closed_robot() {
+    let obstacles: [Obstacle; 14] = [
+        (|s| s.with(|s| s.devices = 0), &["no device", "plug"]),
+        (
+            |s| s.fail("drdOpenID", ErrorCode::DEVICE_IN_USE),
+            &["busy", "end the other program"],
+        ),
+        (
+            |s| s.fail("drdOpenID", ErrorCode::NO_DRIVER_FOUND),
+            &["not permitted", "udev"],
+        ),
+        (|s| s.with(|s| s.serial = 78), &["serial 77", "serial 78"]),
+        (|s| s.with(|s| s.type_number = 60), &["type 33", "type 60"]),
+        (
+            |s| s.with(|s| s.type_number = 110),
+            &["type 110", "rig file"],
+        ),
+        (
+            |s| s.fail("dhdCheckControllerMemory", ErrorCode::CONFIGURATION),
+            &["configuration is damaged", "serviced"],
+        ),
+        (|s| s.with(|s| s.supported = false), &["regulate"]),
+        (
+            |s| s.with(|s| _ = s.status.insert(0, 0)),
+            &["power", "switch the robot on"],
+        ),
+        (|s| s.with(|s| _ = s.status.insert(9, 1)), &["reports one"]),
+        (
+            |s| s.with(|s| s.ignore.push("device_angle_deg")),
+            &["device_angle_deg", "found 0.5"],
+        ),
+        (
+            |s| s.with(|s| s.ignore.push("watchdog")),
+            &["watchdog_125us", "expected 80", "found 3"],
+        ),
+        (
+            |s| s.fail("dhdSetWatchdog", ErrorCode::NOT_AVAILABLE),
+            &["watchdog", "supervisor"],
+        ),
+        (
+            |s| s.with(|s| s.initialised = false),
+            &["initialised since power-up", "sample_is_off"],
+        ),
+    ];
+    let config = OmegaConfig {
+        serial: Some(77),
+        ..OmegaConfig::default()
+    };
+    for (spoil, words) in obstacles {
+        let sdk = Scripted::default();
+        spoil(&sdk);
+        let error = open(&sdk, &config).unwrap_err().to_string();
+        for word in words {
+            assert!(error.contains(word), "{word} is not in {error}");
+        }
+        let log = sdk.log();
+        for forbidden in ["drdStart", "drdAutoInit", "drdTrackPos"] {
+            assert!(!log.iter().any(|c| c == forbidden), "{log:?}");
+        }
+        let opened = log.iter().filter(|c| *c == "drdOpenID").count();
+        let closed = log.iter().filter(|c| *c == "drdClose").count();
+        let refused = usize::from(error.contains("busy") || error.contains("not permitted"));
+        assert_eq!(opened, closed + refused, "{log:?}");
+    }
+}
+
+#[test]
+fn the_robot_is_chosen_by_its_serial_and_the_others_are_released() {
+    let sdk = Scripted::default();
+    sdk.with(|s| s.devices = 3);
+    let config = OmegaConfig {
+        serial: Some(78),
+        ..OmegaConfig::default()
+    };
+    let opened = open(&sdk, &config).unwrap();
+    assert_eq!((opened.id, opened.serial.as_str()), (1, "78"));
+    assert_eq!(sdk.log()[..3], ["drdOpenID", "drdClose", "drdOpenID"]);
+    // Several robots and no serial: it must be named.
+    let error = open(&sdk, &OmegaConfig::default()).unwrap_err().to_string();
+    assert!(error.contains("name the serial"), "{error}");
+}
+
+#[test]
+fn initialisation_needs_word_that_the_sample_is_off_and_ends_braked() {
+    let sdk = Scripted::default();
+    sdk.with(|s| s.initialised = false);
+    let config = OmegaConfig {
+        initialise: Initialise::SampleIsOff,
+        ..OmegaConfig::default()
+    };
+    let opened = open(&sdk, &config).unwrap();
+    let log = sdk.log();
+    assert_eq!(log[log.len() - 2..], ["drdAutoInit", "drdStop"]);
+    assert!(
+        opened
+            .remarks
+            .iter()
+            .any(|r| r.contains("initialised itself"))
+    );
+}
+
+#[test]
+fn without_a_watchdog_a_supervisor_is_enough() {
+    let sdk = Scripted::default();
+    sdk.fail("dhdSetWatchdog", ErrorCode::NOT_IMPLEMENTED);
+    let config = OmegaConfig {
+        watchdog: Watchdog::ArmMilliseconds(5.0),
+        supervisor: Some(SupervisorCommand {
+            program: "supervisor".into(),
+            arguments: Vec::new(),
+        }),
+        ..OmegaConfig::default()
+    };
+    let opened = open(&sdk, &config).unwrap();
+    assert!(
+        opened
+            .remarks
+            .iter()
+            .any(|r| r.contains("only the supervisor"))
+    );
+}
+
+#[test]
+fn a_list_names_what_is_busy_or_forbidden_and_touches_no_motor() {
+    let sdk = Scripted::default();
+    sdk.with(|s| s.devices = 2);
+    let all = enumerate::list(&sdk).unwrap();
+    assert_eq!(all[1].to_string(), "scripted, serial 78: free");
+    assert_eq!(all[1].next_step(), None);
+    for (code, word) in [
+        (ErrorCode::DEVICE_IN_USE, "busy"),
+        (ErrorCode::NO_DRIVER_FOUND, "not permitted"),
+    ] {
+        sdk.fail("drdOpenID", code);
+        let all = enumerate::list(&sdk).unwrap();
+        assert!(all[0].to_string().contains(word), "{}", all[0]);
+        assert!(all[0].next_step().is_some());
+    }
+    let log = sdk.log();
+    assert!(
+        log.iter().all(|c| c == "drdOpenID" || c == "drdClose"),
+        "{log:?}"
+    );
+}

@@ -1,0 +1,283 @@
+//! A library of a few lines: an arm that is where it is told to be, and calls that fail on demand.
+
+use std::collections::BTreeMap;
+use std::sync::Mutex;
+
+use skinrig_drd_abi::{DeviceId, ErrorCode, SdkVersion, StatusField, StatusVector};
+
+use crate::sdk::{Answer, CallError, Generator, Pace, Quantity, Reading, Sdk};
+
+/// One scripted device and its library.
+#[derive(Debug)]
+pub struct Scripted {
+    pub script: Mutex<Script>,
+}
+
+/// What it is like. Tests change it at any time.
+#[derive(Debug, Clone)]
+pub struct Script {
+    pub log: Vec<String>,
+    /// Calls that fail: name to code and how often (`u32::MAX`: always).
+    pub fail: BTreeMap<&'static str, (i32, u32)>,
+    /// Quantities and parameters that keep their value, by their call.
+    pub ignore: Vec<&'static str>,
+    pub devices: i8,
+    pub type_number: i32,
+    pub serial: u16,
+    pub supported: bool,
+    pub initialised: bool,
+    pub filtering: bool,
+    pub running: bool,
+    pub live: bool,
+    pub cause: i32,
+    pub position_m: [f64; 3],
+    pub target_m: [f64; 3],
+    pub follows: bool,
+    pub cached: bool,
+    pub force_n: [f64; 3],
+    pub khz: f64,
+    pub watchdog: u8,
+    pub values: BTreeMap<&'static str, f64>,
+    pub paces: [Pace; 2],
+    pub status: BTreeMap<usize, i32>,
+}
+
+impl Default for Scripted {
+    fn default() -> Self {
+        let fast = Pace {
+            acceleration_m_s2: 1.0,
+            speed_m_s: 1.0,
+            jerk_m_s3: 1.0,
+        };
+        let script = Script {
+            log: Vec::new(),
+            fail: BTreeMap::new(),
+            ignore: Vec::new(),
+            devices: 1,
+            type_number: 33,
+            serial: 77,
+            supported: true,
+            initialised: true,
+            filtering: false,
+            running: false,
+            live: false,
+            cause: 0,
+            position_m: [0.02, 0.0, 0.01],
+            target_m: [0.02, 0.0, 0.01],
+            follows: true,
+            cached: false,
+            force_n: [0.0, 0.0, 0.2],
+            khz: 4.0,
+            watchdog: 3,
+            values: BTreeMap::new(),
+            paces: [fast; 2],
+            status: BTreeMap::new(),
+        };
+        Self {
+            script: Mutex::new(script),
+        }
+    }
+}
+
+impl Scripted {
+    /// Changes the script.
+    pub fn with<T>(&self, change: impl FnOnce(&mut Script) -> T) -> T {
+        change(&mut self.script.lock().unwrap())
+    }
+
+    /// The calls so far that do more than read.
+    pub fn log(&self) -> Vec<String> {
+        self.with(|s| s.log.clone())
+    }
+
+    /// Lets a call fail for ever.
+    pub fn fail(&self, call: &'static str, code: ErrorCode) {
+        self.with(|s| s.fail.insert(call, (code.0, u32::MAX)));
+    }
+
+    fn act<T>(&self, call: &'static str, effect: impl FnOnce(&mut Script) -> T) -> Answer<T> {
+        self.with(|s| s.log.push(call.to_owned()));
+        self.read(call, effect)
+    }
+
+    fn read<T>(&self, call: &'static str, look: impl FnOnce(&mut Script) -> T) -> Answer<T> {
+        self.with(|s| {
+            if let Some((code, left)) = s.fail.get_mut(call)
+                && *left > 0
+            {
+                *left -= u32::from(*left < u32::MAX);
+                return Err(CallError {
+                    call,
+                    code: ErrorCode(*code),
+                    text: String::new(),
+                });
+            }
+            Ok(look(s))
+        })
+    }
+}
+
+const fn power_off(s: &mut Script) {
+    s.running = false;
+    s.live = false;
+}
+
+impl Sdk for Scripted {
+    fn version(&self) -> SdkVersion {
+        SdkVersion::ADVISED
+    }
+    fn device_count(&self) -> Answer<i8> {
+        self.read("dhdGetDeviceCount", |s| s.devices)
+    }
+    fn open(&self, index: i8) -> Answer<DeviceId> {
+        self.act("drdOpenID", |_| index)
+    }
+    fn close(&self, _: DeviceId) -> Answer<()> {
+        self.act("drdClose", |_| ())
+    }
+    fn system_type(&self, _: DeviceId) -> Answer<i32> {
+        self.read("dhdGetSystemType", |s| s.type_number)
+    }
+    fn system_name(&self, _: DeviceId) -> Option<String> {
+        Some("scripted".to_owned())
+    }
+    fn serial(&self, id: DeviceId) -> Answer<u16> {
+        // Further devices have the following serial numbers.
+        self.read("dhdGetSerialNumber", |s| s.serial + id as u16)
+    }
+    fn firmware(&self, _: DeviceId) -> Answer<f64> {
+        self.read("dhdGetVersion", |_| 3.0)
+    }
+    fn com_mode(&self, _: DeviceId) -> Answer<i32> {
+        self.read("dhdGetComMode", |_| 1)
+    }
+    fn check_memory(&self, _: DeviceId) -> Option<Answer<()>> {
+        Some(self.read("dhdCheckControllerMemory", |_| ()))
+    }
+    fn status(&self, _: DeviceId) -> Answer<StatusVector> {
+        self.read("dhdGetStatus", |s| {
+            let mut words = [0_i32; 17];
+            words[StatusField::Power as usize] = 1;
+            words[StatusField::Reset as usize] = i32::from(!s.initialised);
+            words[StatusField::Force as usize] = i32::from(s.live);
+            words[StatusField::Gravity as usize] = 1;
+            words[StatusField::Redundancy as usize] = -1;
+            words[StatusField::ForceOffCause as usize] = s.cause;
+            for (place, word) in &s.status {
+                words[*place] = *word;
+            }
+            StatusVector::from_words(&words)
+        })
+    }
+    fn is_supported(&self, _: DeviceId) -> bool {
+        self.with(|s| s.supported)
+    }
+    fn is_initialized(&self, _: DeviceId) -> bool {
+        self.with(|s| s.initialised)
+    }
+    fn auto_init(&self, _: DeviceId) -> Answer<()> {
+        self.act("drdAutoInit", |s| s.initialised = true)
+    }
+    fn set(&self, _: DeviceId, quantity: Quantity, value: f64) -> Option<Answer<()>> {
+        let name = quantity.name();
+        Some(self.act(name, |s| {
+            if !s.ignore.contains(&name) {
+                s.values.insert(name, value);
+            }
+        }))
+    }
+    fn get(&self, _: DeviceId, quantity: Quantity) -> Option<Answer<f64>> {
+        Some(self.read("get", |s| *s.values.get(quantity.name()).unwrap_or(&0.5)))
+    }
+    fn compensate_gravity(&self, _: DeviceId) -> Answer<()> {
+        self.act("dhdSetGravityCompensation", |_| ())
+    }
+    fn enable_expert_mode(&self) -> Answer<()> {
+        self.act("dhdEnableExpertMode", |_| ())
+    }
+    fn watchdog(&self, _: DeviceId) -> Answer<u8> {
+        self.read("dhdGetWatchdog", |s| s.watchdog)
+    }
+    fn set_watchdog(&self, _: DeviceId, units: u8) -> Answer<()> {
+        self.act("dhdSetWatchdog", |s| {
+            if !s.ignore.contains(&"watchdog") {
+                s.watchdog = units;
+            }
+        })
+    }
+    fn velocity_threshold(&self, _: DeviceId) -> Answer<u32> {
+        self.read("dhdGetVelocityThreshold", |_| 40)
+    }
+    fn start(&self, _: DeviceId) -> Answer<()> {
+        self.act("drdStart", |s| {
+            s.running = true;
+            s.live = true;
+            s.target_m = s.position_m;
+            // The worst case: a start forgets everything.
+            s.values.clear();
+        })
+    }
+    fn stop(&self, _: DeviceId) -> Answer<()> {
+        self.act("drdStop", power_off)
+    }
+    fn is_running(&self, _: DeviceId) -> bool {
+        self.with(|s| s.running)
+    }
+    fn control_khz(&self, _: DeviceId) -> Answer<f64> {
+        self.read("drdGetCtrlFreq", |s| s.khz)
+    }
+    fn regulate_position(&self, _: DeviceId) -> Answer<()> {
+        self.act("drdRegulatePos", |_| ())
+    }
+    fn enable_filter(&self, _: DeviceId) -> Answer<()> {
+        self.act("drdEnableFilter", |s| {
+            s.filtering = !s.ignore.contains(&"filter");
+        })
+    }
+    fn is_filtering(&self, _: DeviceId) -> bool {
+        self.with(|s| s.filtering)
+    }
+    fn set_pace(&self, _: DeviceId, generator: Generator, pace: Pace) -> Answer<()> {
+        self.act(generator.name(), |s| {
+            if !s.ignore.contains(&generator.name()) {
+                s.paces[generator as usize] = pace;
+            }
+        })
+    }
+    fn pace(&self, _: DeviceId, generator: Generator) -> Answer<Pace> {
+        self.read("pace", |s| s.paces[generator as usize])
+    }
+    fn track(&self, _: DeviceId, target_m: [f64; 3]) -> Answer<()> {
+        self.read("drdTrackPos", |s| {
+            assert!(s.running, "a target without regulation");
+            if s.log.last().is_none_or(|call| call != "drdTrackPos") {
+                s.log.push("drdTrackPos".to_owned());
+            }
+            s.target_m = target_m;
+            if s.follows && s.live {
+                s.position_m = target_m;
+            }
+        })
+    }
+    fn regulated_position(&self, _: DeviceId) -> Answer<Reading> {
+        self.read("drdGetPositionAndOrientation", |s| Reading {
+            position_m: s.position_m,
+            cached: s.cached,
+        })
+    }
+    fn position(&self, _: DeviceId) -> Answer<Reading> {
+        self.read("dhdGetPosition", |s| Reading {
+            position_m: s.position_m,
+            cached: s.cached,
+        })
+    }
+    fn force(&self, _: DeviceId) -> Answer<[f64; 3]> {
+        self.read("dhdGetForce", |s| s.force_n)
+    }
+    fn emergency_stop(&self, _: DeviceId) -> Answer<()> {
+        self.act("dhdStop", power_off)
+    }
+    fn force_off(&self, _: DeviceId) -> Answer<()> {
+        self.act("dhdEnableForce", power_off)
+    }
+}
