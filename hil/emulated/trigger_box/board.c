@@ -213,7 +213,7 @@ static void give_bytes(void)
 
 static struct client {
     int fd;
-    bool wants_edges;
+    bool wants_edges, wants_times;
     char in[256];
     size_t in_length;
     char out[65536];
@@ -257,6 +257,14 @@ static void tell_edge(int pin, int level)
     for (struct client *c = clients; c < clients + MAX_CLIENTS; ++c)
         if (c->fd >= 0 && c->wants_edges)
             tell(c, "edge %llu %d %d\n", (unsigned long long)avr->cycle, pin, level);
+}
+
+// No later edge comes before this cycle.
+static void tell_time(avr_cycle_count_t cycle)
+{
+    for (struct client *c = clients; c < clients + MAX_CLIENTS; ++c)
+        if (c->fd >= 0 && c->wants_times)
+            tell(c, "at %llu\n", (unsigned long long)cycle);
 }
 
 // ---------------------------------------------------------------------------------------------------------- pins
@@ -345,6 +353,8 @@ static void obey(struct client *c, char *line)
     char word[16];
     if (!strcmp(line, "subscribe")) {
         c->wants_edges = true;
+    } else if (!strcmp(line, "times")) {
+        c->wants_times = true;
     } else if (!strcmp(line, "clock")) {
         tell(c, "clock %lld %.17g %s\n", (long long)start_ns, cycles_per_ns, free_running ? "free" : "paced");
         return;
@@ -447,8 +457,10 @@ static avr_cycle_count_t look_around(avr_t *a, avr_cycle_count_t when, void *par
     }
     take_bytes();
     give_bytes();
-    if (++slices % CONTROL_SLICES == 0)
+    if (++slices % CONTROL_SLICES == 0) {
         listen_to_clients();
+        tell_time(a->cycle);
+    }
     for (struct client *c = clients; c < clients + MAX_CLIENTS; ++c)
         if (c->fd >= 0 && c->out_length)
             flush_client(c);
@@ -559,6 +571,11 @@ int main(int argc, char **argv)
         if (!powered) {
             sleep_until(host_ns() + 1000000);
             listen_to_clients();
+            if (!free_running)
+                tell_time(cycle_at(host_ns()));
+            for (struct client *c = clients; c < clients + MAX_CLIENTS; ++c)
+                if (c->fd >= 0 && c->out_length)
+                    flush_client(c);
             continue;
         }
         if (wanted_reset) {

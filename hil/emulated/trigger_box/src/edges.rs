@@ -31,13 +31,25 @@ pub struct Edge {
     pub high: bool,
 }
 
-impl Edge {
+/// What a board tells.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Told {
+    /// A pin changed its level.
+    Edge(Edge),
+    /// The board is in this cycle: no later edge comes before it. Only told by [`EdgeStream::follow`].
+    At(u64),
+}
+
+impl Told {
     fn parse(line: &str) -> Option<Self> {
+        if let Some(cycle) = line.strip_prefix("at ") {
+            return cycle.parse().ok().map(Self::At);
+        }
         let mut words = line.strip_prefix("edge ")?.split(' ');
         let cycle = words.next()?.parse().ok()?;
         let pin = words.next()?.parse().ok()?;
         let high = words.next()? == "1";
-        Some(Self { cycle, pin, high })
+        Some(Self::Edge(Edge { cycle, pin, high }))
     }
 }
 
@@ -88,7 +100,7 @@ impl BoardClock {
 
 /// All edges of a board since this stream was opened. A thread takes them from the socket, so the board never waits.
 pub struct EdgeStream {
-    edges: Receiver<Edge>,
+    told: Receiver<Told>,
     socket: UnixStream,
     clock: BoardClock,
 }
@@ -99,9 +111,21 @@ impl EdgeStream {
     /// # Errors
     /// When the board is not there or does not answer.
     pub fn open(socket: &Path) -> io::Result<Self> {
+        Self::with(socket, "clock\nsubscribe\n")
+    }
+
+    /// As [`EdgeStream::open`]; [`EdgeStream::told`] then also gives the board's time every millisecond.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn follow(socket: &Path) -> io::Result<Self> {
+        Self::with(socket, "clock\nsubscribe\ntimes\n")
+    }
+
+    fn with(socket: &Path, orders: &str) -> io::Result<Self> {
         let mut stream = UnixStream::connect(socket)?;
         stream.set_read_timeout(Some(Duration::from_secs(20)))?;
-        stream.write_all(b"clock\nsubscribe\n")?;
+        stream.write_all(orders.as_bytes())?;
         let mut lines = BufReader::new(stream.try_clone()?);
         let bad =
             |line: &str| io::Error::new(io::ErrorKind::InvalidData, format!("board said {line:?}"));
@@ -114,21 +138,21 @@ impl EdgeStream {
             return Err(bad(&line));
         }
         stream.set_read_timeout(None)?;
-        let (sender, edges) = channel();
+        let (sender, told) = channel();
         thread::Builder::new()
             .name("emulated edges".to_owned())
             .spawn(move || {
                 for line in lines.lines() {
                     let Ok(line) = line else { return };
-                    if let Some(edge) = Edge::parse(&line)
-                        && sender.send(edge).is_err()
+                    if let Some(told) = Told::parse(&line)
+                        && sender.send(told).is_err()
                     {
                         return;
                     }
                 }
             })?;
         Ok(Self {
-            edges,
+            told,
             socket: stream,
             clock,
         })
@@ -145,8 +169,22 @@ impl EdgeStream {
     /// # Errors
     /// When the board is gone.
     pub fn next(&mut self, patience: Duration) -> io::Result<Option<Edge>> {
-        match self.edges.recv_timeout(patience) {
-            Ok(edge) => Ok(Some(edge)),
+        loop {
+            match self.told(patience)? {
+                Some(Told::Edge(edge)) => return Ok(Some(edge)),
+                Some(Told::At(_)) => {}
+                None => return Ok(None),
+            }
+        }
+    }
+
+    /// What the board tells next, waiting for `patience` at most; `None` when it told nothing.
+    ///
+    /// # Errors
+    /// When the board is gone.
+    pub fn told(&mut self, patience: Duration) -> io::Result<Option<Told>> {
+        match self.told.recv_timeout(patience) {
+            Ok(told) => Ok(Some(told)),
             Err(RecvTimeoutError::Timeout) => Ok(None),
             Err(RecvTimeoutError::Disconnected) => Err(io::ErrorKind::UnexpectedEof.into()),
         }

@@ -11,5 +11,6 @@ mod edges;
 pub use board::{BoardOptions, EmulatedBox, NoiseDone, NoisePerMillion, ResetCause};
 pub use build::{Built, Unavailable, build};
 pub use edges::{
-    BoardClock, CAMERA_1, CAMERA_2, CYCLES_PER_US, Edge, EdgeStream, INPUT, SPARE, trigger_edges,
+    BoardClock, CAMERA_1, CAMERA_2, CYCLES_PER_US, Edge, EdgeStream, INPUT, SPARE, Told,
+    trigger_edges,
 };
