@@ -1,0 +1,70 @@
+//! Calibration and the sweep of the end stops: the library moves the arm by itself.
+//!
+//! Which way the vendor's library takes is not documented; this one goes through the centre of the
+//! workspace, and the sweep to its ends along each axis, samples in the way or not.
+
+use super::regulation::Regulation;
+use super::trajectory::Limits;
+use super::vector::Vector;
+use super::world::World;
+use crate::config::Fault;
+
+/// How fast it moves.
+const LIMITS: Limits = Limits {
+    amax: 2.0,
+    vmax: 0.1,
+    jerk: 50.0,
+};
+
+/// A calibration or a sweep under way.
+#[derive(Debug)]
+pub struct Initialisation {
+    /// Places to go to, last first.
+    way: Vec<Vector>,
+    /// Time to wait at the end, s.
+    wait_s: f64,
+}
+
+impl World {
+    /// Begins a calibration, or also a sweep.
+    pub fn begin_initialisation(&mut self, sweep: bool) {
+        let mut way = vec![self.config.reach_centre_m];
+        if sweep {
+            for axis in 0..3 {
+                for end in [-1.0, 1.0] {
+                    let mut direction = [0.0; 3];
+                    direction[axis] = end;
+                    way.push(self.inside(direction));
+                }
+            }
+        }
+        self.initialisation = Some(Initialisation {
+            way,
+            wait_s: self.config.auto_init_s,
+        });
+        self.start_regulation();
+    }
+
+    /// Goes on with it for `dt` seconds.
+    pub fn initialise(&mut self, dt: f64) {
+        let (Some(initialisation), Some(regulation)) =
+            (&mut self.initialisation, &mut self.regulation)
+        else {
+            return;
+        };
+        if self.faults.is(|f| matches!(f, Fault::AutoInitHangs)) || regulation.moving() {
+            return;
+        }
+        if let Some(next) = initialisation.way.pop() {
+            let mut settings = self.settings.clone();
+            settings.moves = LIMITS;
+            Regulation::move_to(regulation, next, &settings);
+            return;
+        }
+        initialisation.wait_s -= dt;
+        if initialisation.wait_s <= 0.0 {
+            self.initialisation = None;
+            self.initialised = true;
+        }
+    }
+}
