@@ -189,6 +189,7 @@ pub fn input() -> SessionInput {
                 }),
                 measured_at: Some(at),
                 measured_depth_mm: Some(2.0),
+                touched_mm: None,
                 peak_force_n: None,
                 scheduled: false,
             };

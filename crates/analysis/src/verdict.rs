@@ -362,6 +362,7 @@ mod tests {
             }),
             measured_at: Some(Point2::new(10.0, 2.0)),
             measured_depth_mm: None,
+            touched_mm: None,
             peak_force_n: None,
             scheduled: false,
         };

@@ -82,6 +82,7 @@ fn schedule(positions: &str) -> SessionInput {
                 }),
                 measured_at: Some(at),
                 measured_depth_mm: Some(2.0),
+                touched_mm: None,
                 peak_force_n: None,
                 scheduled: true,
             };

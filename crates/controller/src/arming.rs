@@ -1,7 +1,7 @@
 //! Arming: open, configure, read back, start, and know where the robot is.
 
 use skinrig_device::{CameraCapabilities, SyncMode};
-use skinrig_model::{CameraId, DeviceRole, Record};
+use skinrig_model::{CameraId, DeviceRole, Record, RunHeader};
 use skinrig_protocol::plan::Step;
 
 use crate::core::Core;
@@ -17,11 +17,38 @@ impl Core<'_> {
             return Err(ControllerError::Internal("armed twice".to_owned()).into());
         };
         self.journal.emit(Record::Started(header.clone()))?;
-        preflight::check_plan(self.plan, &header)?;
+        if let Some(preflight) = &self.preflight {
+            self.checks.extend_from_slice(&preflight.made);
+        }
+        let ready = self.shielded(|core| core.prepare(&header));
+        self.conclude_preflight(ready)?;
+        self.indenter.arm()?;
+        self.await_pose()?;
+        if self.machine.state() == State::Retracting {
+            return Err(Halt::Stopped); // the operator did not want it to begin
+        }
+        match self.machine.fire(Event::ArmingDone) {
+            Action::Refuse => Err(internal("arming", self.machine.state())),
+            _ => Ok(()),
+        }
+    }
+
+    /// Everything short of power: devices configured and read back, cameras streaming and checked.
+    fn prepare(&mut self, header: &RunHeader) -> Result<(), Halt> {
+        preflight::check_plan(self.plan, header)?;
         if header.robot_from_skin != self.robot_from_skin {
             return Err(rig_error("header", "the rig's place of the skin", "another").into());
         }
         let can = self.indenter.capabilities();
+        let touches = |s: &Step| matches!(s, Step::Press(p) if !p.surface.is_known());
+        if !can.reports_force && self.plan.steps.iter().any(touches) {
+            return Err(rig_error(
+                "indenter",
+                "forces, because the plan finds the surface by touch",
+                "a robot without; write `press: {surface: known}`",
+            )
+            .into());
+        }
         let (limits, remarks) = preflight::motion_limits(self.plan, &self.robot_from_skin, &can)?;
         for text in remarks {
             let t = self.now();
@@ -29,6 +56,7 @@ impl Core<'_> {
         }
         let settings = self.indenter.configure(&limits)?;
         let identity = self.indenter.identity();
+        self.check_device(DeviceRole::Indenter, &identity, &settings);
         self.journal.emit(Record::Device {
             role: DeviceRole::Indenter,
             identity,
@@ -41,15 +69,7 @@ impl Core<'_> {
         for camera in self.start_order() {
             self.cameras[camera.index()].start()?;
         }
-        self.indenter.arm()?;
-        self.await_pose()?;
-        if self.machine.state() == State::Retracting {
-            return Err(Halt::Stopped); // the operator did not want it to begin
-        }
-        match self.machine.fire(Event::ArmingDone) {
-            Action::Refuse => Err(internal("arming", self.machine.state())),
-            _ => Ok(()),
-        }
+        self.check_streams()
     }
 
     /// Cameras that follow another's time base wait for it, so they start first.
@@ -76,8 +96,10 @@ impl Core<'_> {
         }
         let settings = device.configure(&self.camera_settings[camera.index()])?;
         let identity = device.identity();
+        let role = DeviceRole::of_camera(camera);
+        self.check_device(role, &identity, &settings);
         self.journal.emit(Record::Device {
-            role: DeviceRole::of_camera(camera),
+            role,
             identity,
             settings,
         })
@@ -92,6 +114,7 @@ impl Core<'_> {
         match &self.trigger_box {
             Some(device) => {
                 let identity = device.identity();
+                self.check_device(DeviceRole::TriggerBox, &identity, &[]);
                 self.journal.emit(Record::Device {
                     role: DeviceRole::TriggerBox,
                     identity,

@@ -5,10 +5,11 @@ use std::collections::VecDeque;
 use skinrig_device::{CameraSettings, Clock, DeviceError, EventCamera, Rig, TriggerBox};
 use skinrig_model::{
     AttemptId, CameraId, HostDuration, HostTime, InterruptionKind, Mark, MarkKind, MotionCommand,
-    Point3, PoseSample, RawChunk, Record, RigidTransform, Robot, RunHeader, Skin,
+    Point3, PoseSample, PreflightCheck, RawChunk, Record, RigidTransform, Robot, RunHeader, Skin,
 };
 use skinrig_protocol::plan::Plan;
 
+use crate::checks::{Preflight, Watch};
 use crate::control::{ControlHandle, Request};
 use crate::error::{ControllerError, Halt};
 use crate::guard::GuardedIndenter;
@@ -18,11 +19,13 @@ use crate::run::RunReport;
 use crate::settings::ControllerSettings;
 use crate::sink::RecordSink;
 use crate::states::{Event, Machine};
+use crate::touch::TouchDetector;
 
 /// A press under way.
 pub(crate) struct OpenPress {
     pub(crate) attempt: AttemptId,
     pub(crate) tracker: Option<PressTracker>,
+    pub(crate) touch: Option<TouchDetector>,
     pub(crate) marks: Vec<MarkKind>,
     pub(crate) lost: [u64; 2],
     pub(crate) bytes: [u64; 2],
@@ -47,6 +50,11 @@ pub(crate) struct Core<'a> {
     pub(crate) begin: HostTime,
     pub(crate) open: Option<OpenPress>,
     pub(crate) settling: Option<Settling>,
+    /// What to check before arming; nothing when absent.
+    pub(crate) preflight: Option<Preflight>,
+    pub(crate) checks: Vec<PreflightCheck>,
+    /// While the cameras are checked: what they deliver.
+    pub(crate) watch: Option<Watch>,
     /// While ending: cameras and limits no longer stop anything.
     pub(crate) ending: bool,
     marks: VecDeque<Mark>,
@@ -98,6 +106,9 @@ impl<'a> Core<'a> {
             begin: HostTime::ZERO,
             open: None,
             settling: None,
+            preflight: None,
+            checks: Vec::new(),
+            watch: None,
             ending: false,
             marks: VecDeque::new(),
             marks_since: HostTime::ZERO,
@@ -193,6 +204,9 @@ impl<'a> Core<'a> {
             if let Some(tracker) = self.open.as_mut().and_then(|o| o.tracker.as_mut()) {
                 tracker.feed(sample);
             }
+            if let Some(touch) = self.open.as_mut().and_then(|o| o.touch.as_mut()) {
+                touch.feed(sample);
+            }
             if let Some(settling) = &mut self.settling {
                 settling.feed(sample);
             }
@@ -277,6 +291,9 @@ impl<'a> Core<'a> {
                 open.lost[i] += chunk.lost_before;
                 open.bytes[i] += chunk.bytes.len() as u64;
             }
+            if let Some(watch) = &mut self.watch {
+                watch.see(&chunk);
+            }
             let emitted = self.journal.emit(Record::Chunk(chunk));
             answer = answer.and(emitted);
         }
@@ -330,6 +347,11 @@ impl<'a> Core<'a> {
             }
             Err(e) => Err(e.into()),
         }
+    }
+
+    /// The trigger line is taken until `t`.
+    pub(crate) const fn hold_line(&mut self, t: HostTime) {
+        self.line_free_at = t;
     }
 
     /// True when no mark waits and none is on the line.

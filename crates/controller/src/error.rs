@@ -99,6 +99,12 @@ pub enum ControllerError {
         /// What there is.
         found: String,
     },
+    /// A check before the run failed; nothing was powered.
+    #[error("preflight: {} failed: {}", count(.failed), .failed.join("; "))]
+    Preflight {
+        /// Each failed check: name, expected, found, next step. Not empty.
+        failed: Vec<String>,
+    },
     /// The pose stream stopped, runs backwards or holds values that are no numbers.
     #[error("pose stream: expected {expected}, found {found}")]
     PoseStream {
@@ -154,6 +160,14 @@ pub enum ControllerError {
     /// The code itself failed, or the run was dropped before its end.
     #[error("internal error: {0}")]
     Internal(String),
+}
+
+/// `1 check` or `2 checks`.
+fn count(failed: &[String]) -> String {
+    match failed.len() {
+        1 => "1 check".to_owned(),
+        n => format!("{n} checks"),
+    }
 }
 
 /// `(x, y, z) mm` to the micrometre.

@@ -28,6 +28,7 @@
 //! same commands, moments and verdicts.
 
 mod arming;
+pub mod checks;
 pub mod control;
 mod core;
 mod ending;
@@ -43,11 +44,13 @@ pub mod settings;
 pub mod sink;
 pub mod states;
 mod steps;
+mod touch;
 
+pub use checks::{ExpectedDevice, Loopback, Preflight};
 pub use control::ControlHandle;
 pub use error::{ControllerError, GuardError};
 pub use guard::GuardedIndenter;
 pub use progress::{Progress, ProgressTracker};
-pub use run::{Armed, Finished, Planned, Run, RunReport, Running, execute};
+pub use run::{Armed, Finished, Planned, Run, RunReport, Running, execute, execute_checked};
 pub use settings::ControllerSettings;
 pub use sink::{RecordSink, SinkFault};

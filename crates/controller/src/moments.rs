@@ -75,6 +75,10 @@ pub struct PressTracker {
     at: Point2,
     depth_mm: f64,
     limits: RunLimits,
+    /// True while the surface is to be told by its touch.
+    searching: bool,
+    /// Height of the touched surface, mm.
+    touched_mm: Option<f64>,
     down: Settling,
     depth: Option<Settling>,
     up: Option<Settling>,
@@ -110,6 +114,8 @@ impl PressTracker {
             at,
             depth_mm,
             limits: *limits,
+            searching: false,
+            touched_mm: None,
             down: Settling::new(at.at_height(0.0), limits, down_from),
             depth: None,
             up: None,
@@ -131,6 +137,34 @@ impl PressTracker {
         }
     }
 
+    /// The surface is where it is [`touched`](Self::touched), not at z = 0.
+    pub const fn search_surface(&mut self) {
+        self.searching = true;
+    }
+
+    /// The surface was touched, as `sample` tells: the contact, and the height from which the depth counts.
+    pub const fn touched(&mut self, sample: &PoseSample) {
+        self.contact = Some(sample.t);
+        self.touched_mm = Some(sample.measured.z_mm);
+    }
+
+    /// Height of the surface, touched or known, mm.
+    #[must_use]
+    pub fn surface_mm(&self) -> f64 {
+        self.touched_mm.unwrap_or(0.0)
+    }
+
+    /// Height of the touched surface, mm.
+    #[must_use]
+    pub const fn touched_mm(&self) -> Option<f64> {
+        self.touched_mm
+    }
+
+    /// Where the tip is at depth.
+    fn bottom(&self) -> Point3<Skin> {
+        self.at.at_height(self.surface_mm() - self.depth_mm)
+    }
+
     /// Takes the next sample.
     pub fn feed(&mut self, s: &PoseSample) {
         if s.force_n.is_finite() {
@@ -139,12 +173,14 @@ impl PressTracker {
         }
         let rising = self.up_from.is_some_and(|t| s.t > t);
         if let Some(p) = self.previous {
-            let (from, to) = (p.measured.z_mm, s.measured.z_mm);
-            if s.t > self.down_from && self.contact.is_none() && from > 0.0 && to <= 0.0 {
-                self.contact = Some(crossing(&p, s));
+            let surface_mm = self.surface_mm();
+            let (from, to) = (p.measured.z_mm - surface_mm, s.measured.z_mm - surface_mm);
+            let known = !self.searching && s.t > self.down_from;
+            if known && self.contact.is_none() && from > 0.0 && to <= 0.0 {
+                self.contact = Some(crossing(&p, s, surface_mm));
             }
             if rising && self.release.is_none() && from <= 0.0 && to > 0.0 {
-                self.release = Some(crossing(&p, s));
+                self.release = Some(crossing(&p, s, surface_mm));
             }
         }
         if s.t > self.down_from && self.approach.is_none() && !rising {
@@ -174,7 +210,7 @@ impl PressTracker {
         }
         self.hold_samples += 1;
         self.hold_set_point_mm = Some(s.commanded.z_mm);
-        let off = m.distance_mm(self.at.at_height(-self.depth_mm));
+        let off = m.distance_mm(self.bottom());
         if self.worst.is_none_or(|(worst, _)| off > worst) {
             self.worst = Some((off, m));
         }
@@ -194,7 +230,7 @@ impl PressTracker {
 
     /// The motion from the surface to depth was commanded at `t`.
     pub fn indent_from(&mut self, t: HostTime) {
-        let target = self.at.at_height(-self.depth_mm);
+        let target = self.bottom();
         self.depth = Some(Settling::new(target, &self.limits, t));
     }
 
@@ -304,7 +340,7 @@ impl PressTracker {
             Some((off, at)) if off > self.limits.position_tolerance_mm => Err(format!(
                 "hold: expected within {} mm of {}, found {}",
                 self.limits.position_tolerance_mm,
-                crate::error::point(&self.at.at_height(-self.depth_mm)),
+                crate::error::point(&self.bottom()),
                 crate::error::point(&at)
             )),
             Some(_) => Ok(()),
@@ -312,9 +348,9 @@ impl PressTracker {
     }
 }
 
-/// When the straight line from `a` to `b` crosses z = 0.
-fn crossing(a: &PoseSample, b: &PoseSample) -> HostTime {
-    let (za, zb) = (a.measured.z_mm, b.measured.z_mm);
+/// When the straight line from `a` to `b` crosses the height `z_mm`.
+fn crossing(a: &PoseSample, b: &PoseSample, z_mm: f64) -> HostTime {
+    let (za, zb) = (a.measured.z_mm - z_mm, b.measured.z_mm - z_mm);
     let share = za / (za - zb);
     a.t + HostDuration((share * (b.t - a.t).0 as f64).round() as i64)
 }

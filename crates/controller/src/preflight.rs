@@ -2,7 +2,8 @@
 
 use skinrig_device::{IndenterCapabilities, MotionLimits};
 use skinrig_model::{Point3, RigidTransform, Robot, RunHeader, Skin};
-use skinrig_protocol::plan::{Plan, Step};
+use skinrig_protocol::Surface;
+use skinrig_protocol::plan::{Plan, PressStep, Step};
 
 use crate::error::ControllerError;
 use crate::guard::check_target;
@@ -105,6 +106,7 @@ pub(crate) fn check_plan(plan: &Plan, header: &RunHeader) -> Result<(), Controll
                 for z_mm in [limits.clearance_mm, 0.0, -press.depth_mm] {
                     check_point(plan, &name, press.at.at_height(z_mm))?;
                 }
+                check_search(plan, &name, press)?;
                 let planned = &plan.presses[press.press.0 as usize];
                 if planned.at != press.at || planned.depth_mm != press.depth_mm {
                     return Err(plan_error(
@@ -129,6 +131,34 @@ pub(crate) fn check_plan(plan: &Plan, header: &RunHeader) -> Result<(), Controll
         return Err(plan_error("steps", format!("a step for press {i}"), "none"));
     }
     Ok(())
+}
+
+/// The search for the surface stays between clearance height and floor, and can be told from free air.
+fn check_search(plan: &Plan, place: &str, press: &PressStep) -> Result<(), ControllerError> {
+    let Surface::Touch(search) = press.surface else {
+        return Ok(());
+    };
+    let limits = &plan.limits;
+    check_speed(plan, place, search.speed_mm_s)?;
+    check_point(plan, place, press.at.at_height(-search.band_mm))?;
+    let highest_mm = limits.clearance_mm - limits.position_tolerance_mm;
+    let sound = search.band_mm > 0.0
+        && search.band_mm < highest_mm
+        && search.threshold_n > 0.0
+        && search.threshold_n < limits.max_force_n
+        && search.samples > 0
+        && search.tare.0 > 0;
+    if sound {
+        return Ok(());
+    }
+    Err(plan_error(
+        place,
+        format!(
+            "a search below {highest_mm} mm for a force above 0 and below {} N, with a tare",
+            limits.max_force_n
+        ),
+        format!("{search:?}"),
+    ))
 }
 
 fn check_speed(plan: &Plan, place: &str, speed_mm_s: f64) -> Result<(), ControllerError> {

@@ -1,6 +1,7 @@
 //! One press: down to the surface, to depth, hold, and back up; every moment measured.
 
 use skinrig_model::{AttemptId, CameraId, HostTime, PressOutcome, PressTiming, PressVerdict};
+use skinrig_protocol::Surface;
 use skinrig_protocol::plan::PressStep;
 
 use crate::core::{Collect, Core, OpenPress};
@@ -22,6 +23,7 @@ impl Core<'_> {
         self.open = Some(OpenPress {
             attempt,
             tracker: None,
+            touch: None,
             marks: step.marks.clone(),
             lost: [0; 2],
             bytes: [0; 2],
@@ -35,14 +37,29 @@ impl Core<'_> {
 
     /// The motion. `Some` says why the press is invalid although the tip is back at clearance height.
     fn press_motion(&mut self, step: &PressStep) -> Result<Option<String>, Halt> {
-        let start = self.indenter.position();
-        let down = self.command(step.at.at_height(0.0), step.approach_speed_mm_s)?;
-        let deadline = down + step.deadline;
-        let tracker = PressTracker::new(step.at, step.depth_mm, &self.plan.limits, down, start);
-        if let Some(open) = &mut self.open {
-            open.tracker = Some(tracker);
+        let began = self.now();
+        if let Surface::Touch(search) = step.surface
+            && let Err(trouble) = self.tare(step, search)?
+        {
+            return Ok(Some(trouble)); // the tip never left clearance height
         }
-        let trouble = self.go_down(step, deadline)?;
+        let start = self.indenter.position();
+        let first_stop_mm = match step.surface {
+            Surface::Known => 0.0,
+            Surface::Touch(search) => search.band_mm,
+        };
+        let down = self.command(step.at.at_height(first_stop_mm), step.approach_speed_mm_s)?;
+        // The deadline of a press that tares counts from the tare on.
+        let deadline = match step.surface {
+            Surface::Known => down + step.deadline,
+            Surface::Touch(_) => began + step.deadline,
+        };
+        let mut tracker = PressTracker::new(step.at, step.depth_mm, &self.plan.limits, down, start);
+        if !step.surface.is_known() {
+            tracker.search_surface();
+        }
+        self.with_open(|open| open.tracker = Some(tracker));
+        let trouble = self.go_down(step, down, deadline)?;
 
         let target = step.at.at_height(self.plan.limits.clearance_mm);
         let up = self.command(target, step.retract_speed_mm_s)?;
@@ -70,19 +87,33 @@ impl Core<'_> {
     }
 
     /// Down, settle, hold. `Some` says what did not happen in time.
-    fn go_down(&mut self, step: &PressStep, deadline: HostTime) -> Result<Option<String>, Halt> {
+    fn go_down(
+        &mut self,
+        step: &PressStep,
+        down: HostTime,
+        deadline: HostTime,
+    ) -> Result<Option<String>, Halt> {
         let late = |core: &Self, what: &str, z_mm: f64| {
             let target = step.at.at_height(z_mm);
             Some(core.not_arrived(what, target, step.deadline).to_string())
         };
-        if !self.until(PressTracker::at_surface, deadline)? {
-            return Ok(late(self, "approach", 0.0));
-        }
-        let depth = step.at.at_height(-step.depth_mm);
+        let surface_mm = match step.surface {
+            Surface::Known if self.until(PressTracker::at_surface, deadline)? => 0.0,
+            Surface::Known => return Ok(late(self, "approach", 0.0)),
+            Surface::Touch(search) => match self.find_surface(step, search, down, deadline)? {
+                Ok(found) => {
+                    self.with_tracker(|t| t.touched(&found));
+                    found.measured.z_mm
+                }
+                Err(trouble) => return Ok(Some(trouble)),
+            },
+        };
+        let bottom_mm = surface_mm - step.depth_mm;
+        let depth = step.at.at_height(bottom_mm);
         let t = self.command(depth, step.indent_speed_mm_s)?;
         self.with_tracker(|tracker| tracker.indent_from(t));
         if !self.until(|t| t.at_depth().is_some(), deadline)? {
-            return Ok(late(self, "indentation", -step.depth_mm));
+            return Ok(late(self, "indentation", bottom_mm));
         }
         let settled = self.tracker().and_then(PressTracker::at_depth);
         let until = settled.unwrap_or(t) + step.hold;
@@ -96,10 +127,18 @@ impl Core<'_> {
         self.open.as_ref().and_then(|o| o.tracker.as_ref())
     }
 
-    fn with_tracker(&mut self, change: impl FnOnce(&mut PressTracker)) {
-        if let Some(tracker) = self.open.as_mut().and_then(|o| o.tracker.as_mut()) {
-            change(tracker);
+    pub(crate) fn with_open(&mut self, change: impl FnOnce(&mut OpenPress)) {
+        if let Some(open) = &mut self.open {
+            change(open);
         }
+    }
+
+    fn with_tracker(&mut self, change: impl FnOnce(&mut PressTracker)) {
+        self.with_open(|open| {
+            if let Some(tracker) = &mut open.tracker {
+                change(tracker);
+            }
+        });
     }
 
     /// Ticks until the tracker says so; false when `deadline` came first.
@@ -162,7 +201,8 @@ fn judge(open: &OpenPress, trouble: Option<String>) -> PressOutcome {
             reasons.push(format!("{camera} sent no bytes"));
         }
     }
-    let mean = open.tracker.as_ref().and_then(PressTracker::mean);
+    let tracker = open.tracker.as_ref();
+    let mean = tracker.and_then(PressTracker::mean);
     PressOutcome {
         attempt: open.attempt,
         verdict: if reasons.is_empty() {
@@ -172,8 +212,9 @@ fn judge(open: &OpenPress, trouble: Option<String>) -> PressOutcome {
         },
         timing,
         measured_at: mean.map(skinrig_model::Point3::plane),
-        measured_depth_mm: mean.map(|m| -m.z_mm),
-        peak_force_n: open.tracker.as_ref().and_then(PressTracker::peak_force_n),
+        measured_depth_mm: mean.zip(tracker).map(|(m, t)| t.surface_mm() - m.z_mm),
+        touched_mm: tracker.and_then(PressTracker::touched_mm),
+        peak_force_n: tracker.and_then(PressTracker::peak_force_n),
         scheduled: false,
     }
 }

@@ -6,6 +6,7 @@ use skinrig_device::Rig;
 use skinrig_model::{HostTime, RunEnd, RunHeader};
 use skinrig_protocol::plan::Plan;
 
+use crate::checks::Preflight;
 use crate::control::ControlHandle;
 use crate::core::Core;
 use crate::settings::ControllerSettings;
@@ -99,6 +100,13 @@ impl<'a> Run<'a, Planned> {
         }
     }
 
+    /// With these checks before the robot is powered.
+    #[must_use]
+    pub fn checked(mut self, preflight: Preflight) -> Self {
+        self.core.preflight = Some(preflight);
+        self
+    }
+
     /// Checks the plan against the rig, configures every device and reads it back, starts the cameras and
     /// powers the robot, which holds its position.
     ///
@@ -169,7 +177,23 @@ pub fn execute(
     control: &ControlHandle,
     sink: &mut dyn RecordSink,
 ) -> RunReport {
-    match Run::new(plan, header, rig, control, sink).arm() {
+    finish(Run::new(plan, header, rig, control, sink))
+}
+
+/// As [`execute`], after a preflight: with a failed check the robot is not powered, and the report says which.
+pub fn execute_checked(
+    plan: &Plan,
+    header: RunHeader,
+    rig: Rig,
+    control: &ControlHandle,
+    sink: &mut dyn RecordSink,
+    preflight: Preflight,
+) -> RunReport {
+    finish(Run::new(plan, header, rig, control, sink).checked(preflight))
+}
+
+fn finish(run: Run<'_, Planned>) -> RunReport {
+    match run.arm() {
         Ok(run) => run.begin().run().report(),
         Err(report) => report,
     }

@@ -6,7 +6,7 @@ use crate::{CameraSettings, Clock, EventCamera, Indenter, TriggerBox};
 
 /// The devices of one bench and what is known about it.
 pub struct Rig {
-    /// `simulated`, `replayed` or `bench`.
+    /// `simulated`, `replayed`, `emulated` (production drivers over stand-ins for hardware) or `bench`.
     pub kind: String,
     /// For people, for example `simulated (geometric)`.
     pub name: String,

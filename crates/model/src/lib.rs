@@ -10,6 +10,7 @@ pub mod frame;
 pub mod id;
 pub mod lens;
 pub mod pose;
+pub mod preflight;
 pub mod press;
 pub mod pulse;
 pub mod record;
@@ -26,6 +27,7 @@ pub use frame::{Point2, Point3, RigidTransform, Robot, Skin};
 pub use id::{AttemptId, CameraId, PressId};
 pub use lens::{LensAngle, LensModel};
 pub use pose::PoseSample;
+pub use preflight::{CheckVerdict, PreflightCheck};
 pub use press::{PlannedPress, PressOutcome, PressRole, PressTiming, PressVerdict};
 pub use pulse::{Label, Mark, MarkKind, PulseTrain, SeenMark, SeenSync, SentMark};
 pub use record::{

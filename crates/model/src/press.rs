@@ -99,8 +99,10 @@ pub struct PressOutcome {
     pub timing: Option<PressTiming>,
     /// The mean measured tip position during the hold, skin frame: the ground truth of localisation.
     pub measured_at: Option<Point2>,
-    /// The mean measured depth during the hold, mm, positive.
+    /// The mean measured depth during the hold below the surface, touched or known, mm, positive.
     pub measured_depth_mm: Option<f64>,
+    /// Height at which the surface was touched, skin frame, mm; absent when it was not searched or not found.
+    pub touched_mm: Option<f64>,
     /// The largest force seen, N, when the device reports forces.
     pub peak_force_n: Option<f64>,
     /// True when timing and position come from a schedule (an imported dataset without a pose stream),

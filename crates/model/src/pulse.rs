@@ -130,6 +130,13 @@ pub struct Mark {
     pub press: PressId,
 }
 
+/// The mark that is sent to test the trigger line before a run. No press has its number: a plan has at most
+/// [`MAX_MARKED_PRESS`] presses, numbered from 0.
+pub const LOOPBACK: Mark = Mark {
+    kind: MarkKind::Approach,
+    press: PressId(MAX_MARKED_PRESS),
+};
+
 /// A mark that the trigger box was told to send.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SentMark {

@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 use crate::frame::{Point3, RigidTransform, Robot, Skin};
 use crate::id::{AttemptId, CameraId};
 use crate::pose::PoseSample;
+use crate::preflight::PreflightCheck;
 use crate::press::{PlannedPress, PressOutcome};
 use crate::pulse::SentMark;
 use crate::stream::{RawChunk, StreamFormat};
@@ -85,6 +86,11 @@ pub struct Setting {
     pub read_back: String,
 }
 
+impl Setting {
+    /// In place of what was asked for: the value was only read.
+    pub const AS_FOUND: &str = "as found";
+}
+
 /// What is known before anything moves. Written first.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RunHeader {
@@ -102,7 +108,7 @@ pub struct RunHeader {
     pub plan_sha256: String,
     /// The seed of everything random in this run.
     pub seed: u64,
-    /// `simulated`, `replayed`, `imported` or `bench`.
+    /// `simulated`, `replayed`, `imported`, `emulated` or `bench`.
     pub rig_kind: String,
     /// Name of the rig; for the simulated rig with its level, for example `simulated (geometric)`.
     pub rig_name: String,
@@ -205,6 +211,8 @@ pub enum Record {
         /// Its settings as read back.
         settings: Vec<Setting>,
     },
+    /// What was checked before the robot is armed; nothing is armed when one of them failed.
+    Preflight(Vec<PreflightCheck>),
     /// A press is about to be attempted. Durable before the robot moves for it.
     Intent {
         /// Which attempt.

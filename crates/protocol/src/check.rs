@@ -7,6 +7,7 @@ use skinrig_model::{HostDuration, Point2, Point3, PressId, Skin};
 
 use crate::area::Surroundings;
 use crate::plan::{Plan, PressStep, Step};
+use crate::surface::Surface;
 use crate::timing;
 
 /// A segment of motion that must not be made.
@@ -348,6 +349,39 @@ impl Checker<'_> {
         }
     }
 
+    /// The search for the surface stays below clearance height, in the workspace and above the floor.
+    fn surface(&mut self, press: &PressStep) {
+        let Surface::Touch(search) = press.surface else {
+            return;
+        };
+        let limits = self.plan.limits;
+        let room = limits
+            .max_depth_mm
+            .min(limits.clearance_mm - limits.position_tolerance_mm);
+        let band = search.band_mm;
+        if !(band > 0.0 && band < room) {
+            self.add(
+                Segment::Approach,
+                "the search for the surface begins or ends too far off",
+                format!("a band above 0 and below {room} mm"),
+                format!("{band} mm"),
+                "press.band",
+            );
+            self.by(band - room);
+        }
+        self.workspace(Segment::Approach, press.at.at_height(-band), "press.band");
+        self.speed(Segment::Approach, search.speed_mm_s, "press.speed");
+        if !(search.threshold_n > 0.0 && search.threshold_n < limits.max_force_n) {
+            self.add(
+                Segment::Approach,
+                "the contact force is outside its limit",
+                format!("more than 0 and less than {} N", limits.max_force_n),
+                format!("{} N", search.threshold_n),
+                "press.threshold",
+            );
+        }
+    }
+
     fn press(&mut self, press: &PressStep, position: Option<Point3<Skin>>) {
         let limits = self.plan.limits;
         let at = press.at;
@@ -380,6 +414,7 @@ impl Checker<'_> {
         }
         self.workspace(Segment::Approach, above, key);
         self.workspace(Segment::Press, at.at_height(-press.depth_mm), key);
+        self.surface(press);
         self.speed(
             Segment::Approach,
             press.approach_speed_mm_s,

@@ -143,6 +143,7 @@ impl Writer<'_> {
             press: id,
             at: planned.at,
             depth_mm,
+            surface: self.protocol.surface.unwrap_or_default(),
             start_after_begin: start_s.map(HostDuration::from_secs_f64),
             approach_speed_mm_s: motion.approach.speed_mm_s(limits.clearance_mm),
             indent_speed_mm_s: motion.indent.speed_mm_s(depth_mm),

@@ -6,6 +6,8 @@
 use serde::{Deserialize, Serialize};
 use skinrig_model::{HostDuration, MarkKind, PlannedPress, Point2, Point3, PressId, Skin};
 
+use crate::surface::Surface;
+
 /// Everything a run does, in order.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Plan {
@@ -79,8 +81,11 @@ pub struct PressStep {
     pub press: PressId,
     /// Where, skin frame.
     pub at: Point2,
-    /// How deep, mm, positive.
+    /// How deep below the surface, mm, positive.
     pub depth_mm: f64,
+    /// How the surface is found.
+    #[serde(default, skip_serializing_if = "Surface::is_known")]
+    pub surface: Surface,
     /// The downward motion begins this long after the last `Begin`; at once when that is past or `None`.
     pub start_after_begin: Option<HostDuration>,
     /// Speed from clearance height to the surface, mm/s.

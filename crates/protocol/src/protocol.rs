@@ -11,6 +11,7 @@ use skinrig_model::{
 use crate::area::Surroundings;
 use crate::diagnostic::Diagnostics;
 use crate::plan::{Plan, RunLimits};
+use crate::surface::Surface;
 
 /// Reads a file that a protocol names. The path is the protocol's folder joined with the name in the protocol.
 pub type Loader<'a> = &'a dyn Fn(&Path) -> std::io::Result<Vec<u8>>;
@@ -62,6 +63,8 @@ pub struct Protocol {
     pub limits: RunLimits,
     /// Moments that emit a mark on the trigger line.
     pub marks: Vec<MarkKind>,
+    /// How presses find the surface; `None`: as the rig says, at z = 0 when it says nothing.
+    pub surface: Option<Surface>,
     /// Settings of the analysis.
     pub analysis: AnalysisSettings,
     /// Settings of camera 1 and camera 2.

@@ -3,7 +3,9 @@
 use serde::{Deserialize, Serialize};
 use skinrig_model::HostDuration;
 
-use crate::shape::Field;
+use crate::keys::{count, default};
+use crate::quantity::Dimension::{Force, Length, Speed, Time};
+use crate::shape::{Field, Key, Range, Shape, Table, Word};
 
 /// Where a press takes the surface to be.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
@@ -39,6 +41,61 @@ pub struct TouchSearch {
     /// How long the force in free air is averaged.
     pub tare: HostDuration,
 }
+
+/// How the surface is found: keys of protocols and of rig files.
+pub(crate) static PRESS: Table = Table {
+    name: "press",
+    doc: "How a press finds the surface.",
+    keys: KEYS,
+    exactly_one: &[],
+};
+
+const KEYS: &[Key] = &[
+    default(
+        "surface",
+        Shape::Choice(SURFACES),
+        "known",
+        "Where the surface is.",
+    ),
+    default(
+        "threshold",
+        Shape::Quantity(&[Force], Range::above_zero(12.0)),
+        "0.2 N",
+        "With `touch`: a force this far above the one in free air is a contact. Friction hides less than about 0.1 N.",
+    ),
+    default(
+        "samples",
+        count(1, 1000),
+        "5",
+        "With `touch`: so many samples in a row must be above the threshold.",
+    ),
+    default(
+        "speed",
+        Shape::Quantity(&[Speed], Range::above_zero(10.0)),
+        "2 mm/s",
+        "With `touch`: speed of the search.",
+    ),
+    default(
+        "band",
+        Shape::Quantity(&[Length], Range::above_zero(10.0)),
+        "1 mm",
+        "With `touch`: how far above or below the frame's surface a touch is believed; the search starts and ends there.",
+    ),
+    default(
+        "tare",
+        Shape::Quantity(&[Time], Range::above_zero(10.0)),
+        "300 ms",
+        "With `touch`: how long the force in free air is averaged at clearance height.",
+    ),
+];
+
+const SURFACES: &[Word] = &[
+    ("known", "at z = 0 of the frame"),
+    (
+        "touch",
+        "where the force rises; depths count from there, the floor limit stays where it is",
+    ),
+];
 
 /// Reads a mapping of the table `press`.
 pub(crate) fn surface(f: &Field) -> Option<Surface> {

@@ -6,6 +6,7 @@
 use skinrig_model::{HostDuration, MarkKind, Point3, Skin};
 
 use crate::plan::{Plan, PressStep, RunLimits, Step};
+use crate::surface::Surface;
 
 /// Acceleration assumed for estimates, mm/s². A choice of this project, far below what a haptic robot reaches.
 pub const ASSUMED_ACCELERATION_MM_S2: f64 = 1000.0;
@@ -30,7 +31,14 @@ pub fn motion_s(distance_mm: f64, speed_mm_s: f64) -> f64 {
 /// The estimated moments of a press, s after its begin, in order: the marks, without the end.
 pub(crate) fn moments_s(limits: &RunLimits, press: &PressStep) -> [(MarkKind, f64); 5] {
     let settle = limits.settle_time.as_secs_f64();
-    let contact = motion_s(limits.clearance_mm, press.approach_speed_mm_s) + settle;
+    // The mean case: a touched surface lies where the frame puts it.
+    let contact = match press.surface {
+        Surface::Known => motion_s(limits.clearance_mm, press.approach_speed_mm_s) + settle,
+        Surface::Touch(t) => {
+            let way = (limits.clearance_mm - t.band_mm).max(0.0);
+            motion_s(way, press.approach_speed_mm_s) + settle + t.band_mm / t.speed_mm_s
+        }
+    };
     let at_depth = contact + motion_s(press.depth_mm, press.indent_speed_mm_s) + settle;
     let retract = at_depth + press.hold.as_secs_f64();
     let release = retract + press.depth_mm / press.retract_speed_mm_s;
@@ -45,13 +53,22 @@ pub(crate) fn moments_s(limits: &RunLimits, press: &PressStep) -> [(MarkKind, f6
 
 /// The estimated time of a press in motion and at rest (hold and three times settling), s.
 pub(crate) fn press_s(limits: &RunLimits, press: &PressStep) -> (f64, f64) {
-    let motion = motion_s(limits.clearance_mm, press.approach_speed_mm_s)
+    // The worst case: a touched surface is found at the lower end of its band.
+    let (search, tare) = match press.surface {
+        Surface::Known => (0.0, 0.0),
+        Surface::Touch(t) => (
+            motion_s(2.0 * t.band_mm, t.speed_mm_s) + limits.settle_time.as_secs_f64(),
+            t.tare.as_secs_f64(),
+        ),
+    };
+    let motion = search
+        + motion_s(limits.clearance_mm, press.approach_speed_mm_s)
         + motion_s(press.depth_mm, press.indent_speed_mm_s)
         + motion_s(
             limits.clearance_mm + press.depth_mm,
             press.retract_speed_mm_s,
         );
-    let still = press.hold.as_secs_f64() + 3.0 * limits.settle_time.as_secs_f64();
+    let still = tare + press.hold.as_secs_f64() + 3.0 * limits.settle_time.as_secs_f64();
     (motion, still)
 }
 

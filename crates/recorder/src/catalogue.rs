@@ -39,7 +39,7 @@ pub enum SessionState {
         operator: String,
         /// Where the protocol came from.
         protocol_name: String,
-        /// `simulated`, `replayed`, `imported` or `bench`.
+        /// `simulated`, `replayed`, `imported`, `emulated` or `bench`.
         rig_kind: String,
         /// Name of the rig.
         rig_name: String,

@@ -10,7 +10,9 @@ use sqlx::sqlite::SqliteRow;
 
 use crate::codec::Codec;
 use crate::pose;
-use crate::query::{Fault, int, named, num, opt_int, opt_num, opt_real, opt_text, real, sha, text};
+use crate::query::{
+    Fault, int, later_real, named, num, opt_int, opt_num, opt_real, opt_text, real, sha, text,
+};
 use crate::rows::{AttemptRow, ChunkMeta};
 
 /// The name of a role in the session file.
@@ -122,6 +124,7 @@ pub(crate) fn attempt_from(row: &SqliteRow) -> Result<AttemptRow, Fault> {
             timing,
             measured_at: measured.0.zip(measured.1).map(|(x, y)| Point2::new(x, y)),
             measured_depth_mm: opt_real(row, "measured_depth_mm")?,
+            touched_mm: later_real(row, "touched_mm")?,
             peak_force_n: opt_real(row, "peak_force_n")?,
             scheduled: int(row, "scheduled")? != 0,
         }),

@@ -5,8 +5,8 @@ use std::time::Instant;
 
 use sha2::{Digest, Sha256};
 use skinrig_model::{
-    BoxReport, HostTime, PlannedPress, PoseSample, PressOutcome, PressVerdict, Record, RunEnd,
-    RunHeader,
+    BoxReport, HostTime, PlannedPress, PoseSample, PreflightCheck, PressOutcome, PressVerdict,
+    Record, RunEnd, RunHeader,
 };
 use sqlx::sqlite::SqliteConnection;
 
@@ -114,6 +114,7 @@ impl Journal {
                 }
                 Ok(())
             }
+            Record::Preflight(checks) => self.preflight(&checks).await,
             Record::Intent { attempt, t } => {
                 sqlx::query(
                     "INSERT INTO attempt (press, number, previous, intent_ns) VALUES (?, ?, ?, ?)",
@@ -265,6 +266,23 @@ impl Journal {
         Ok(())
     }
 
+    async fn preflight(&mut self, checks: &[PreflightCheck]) -> Result<(), Fault> {
+        for check in checks {
+            sqlx::query(
+                "INSERT INTO preflight (name, expected, found, verdict, next_step)
+                 VALUES (?, ?, ?, ?, ?)",
+            )
+            .bind(&check.check)
+            .bind(&check.expected)
+            .bind(&check.found)
+            .bind(check.verdict.name())
+            .bind(check.failed().then_some(&check.next_step))
+            .execute(&mut self.conn)
+            .await?;
+        }
+        Ok(())
+    }
+
     async fn press(&mut self, press: &PlannedPress) -> Result<(), Fault> {
         for value in [press.at.x_mm, press.at.y_mm, press.depth_mm] {
             finite(press.id, value)?;
@@ -299,6 +317,7 @@ impl Journal {
             at.map(|p| p.x_mm),
             at.map(|p| p.y_mm),
             outcome.measured_depth_mm,
+            outcome.touched_mm,
             outcome.peak_force_n,
         ];
         for value in numbers.into_iter().flatten() {
@@ -307,7 +326,7 @@ impl Journal {
         let mut update = sqlx::query(
             "UPDATE attempt SET verdict = ?, reason = ?, scheduled = ?, approach_ns = ?, contact_ns = ?,
                at_depth_ns = ?, retract_ns = ?, release_ns = ?, clear_ns = ?, measured_x_mm = ?,
-               measured_y_mm = ?, measured_depth_mm = ?, peak_force_n = ?
+               measured_y_mm = ?, measured_depth_mm = ?, touched_mm = ?, peak_force_n = ?
              WHERE press = ? AND number = ? AND verdict IS NULL",
         )
         .bind(outcome.verdict.name())

@@ -106,6 +106,24 @@ pub fn opt_real(row: &SqliteRow, column: &str) -> Result<Option<f64>, Fault> {
     Ok(row.try_get(column)?)
 }
 
+/// Whether the file has this table: sessions of an older schema lack the later ones.
+pub async fn has_table(conn: &mut SqliteConnection, name: &str) -> Result<bool, Fault> {
+    let row =
+        sqlx::query("SELECT count(*) AS n FROM sqlite_schema WHERE type = 'table' AND name = ?")
+            .bind(name)
+            .fetch_one(conn)
+            .await?;
+    Ok(int(&row, "n")? > 0)
+}
+
+/// A real column that may be null, and that sessions of an older schema do not have.
+pub fn later_real(row: &SqliteRow, column: &str) -> Result<Option<f64>, Fault> {
+    match row.try_get(column) {
+        Err(sqlx::Error::ColumnNotFound(_)) => Ok(None),
+        other => Ok(other?),
+    }
+}
+
 /// A text column.
 pub fn text(row: &SqliteRow, column: &str) -> Result<String, Fault> {
     Ok(row.try_get(column)?)

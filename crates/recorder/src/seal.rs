@@ -12,25 +12,23 @@ use sha2::{Digest, Sha256};
 use sqlx::sqlite::{SqliteConnection, SqliteRow};
 use sqlx::{Row, TypeInfo, ValueRef};
 
-use crate::query::{Fault, each_row};
+use crate::query::{Fault, each_row, has_table};
 use crate::rows::SessionTotals;
-
-/// The table that schema 1 has not.
-const BOX_REPORT: &str = "box_report";
 
 /// The tables that the tree hash covers, in its order, each with the rows and columns that count. Blobs of
 /// camera bytes and poses are covered by the SHA-256 beside them.
-const TABLES: [(&str, &str); 16] = [
+const TABLES: [(&str, &str); 17] = [
     ("session", "SELECT * FROM session ORDER BY id"),
     ("robot_from_skin", "SELECT * FROM robot_from_skin ORDER BY axis"),
     ("device", "SELECT * FROM device ORDER BY id"),
     ("setting", "SELECT * FROM setting ORDER BY device, position"),
+    ("preflight", "SELECT * FROM preflight ORDER BY id"),
     ("press", "SELECT * FROM press ORDER BY id"),
     ("attempt", "SELECT * FROM attempt ORDER BY press, number"),
     ("command", "SELECT * FROM command ORDER BY id"),
     ("pose_block", "SELECT id, first_ns, last_ns, samples, sha256 FROM pose_block ORDER BY id"),
     ("mark", "SELECT * FROM mark ORDER BY id"),
-    (BOX_REPORT, "SELECT * FROM box_report ORDER BY id"),
+    ("box_report", "SELECT * FROM box_report ORDER BY id"),
     (
         "chunk",
         "SELECT camera, seq, host_ns, lost_before, codec, raw_bytes, raw_crc32, stored_sha256, first_us,
@@ -56,13 +54,13 @@ pub struct TableDigest {
     pub sha256: [u8; 32],
 }
 
-/// The digests of all tables. A value is hashed as one type byte (0 null, 1 integer, 2 real, 3 text, 4 blob)
+/// The digests of all tables that the file's schema has. A value is hashed as one type byte (0 null, 1 integer, 2 real, 3 text, 4 blob)
 /// and its eight little-endian bytes, or its length in eight such bytes and its content.
 pub async fn digest_tables(conn: &mut SqliteConnection) -> Result<Vec<TableDigest>, Fault> {
     let mut digests = Vec::with_capacity(TABLES.len());
-    let version = crate::query::schema_version(conn).await?;
     for (name, sql) in TABLES {
-        if name == BOX_REPORT && version < 2 {
+        // A table that is missing from a sealed file is missed in the tree hash.
+        if !has_table(conn, name).await? {
             continue;
         }
         let (mut hash, mut rows, mut bytes) = (Sha256::new(), 0, Vec::new());

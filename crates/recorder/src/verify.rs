@@ -302,6 +302,7 @@ fn check_journal(reader: &SessionReader, report: &mut VerifyReport) {
             ));
         }
     }
+    report.take(reader.preflight());
     report.take(reader.commands());
     report.take(reader.marks_sent());
     check_box_reports(reader, report);

@@ -101,6 +101,7 @@ fn session() -> SessionInput {
             }),
             measured_at: Some(at),
             measured_depth_mm: None,
+            touched_mm: None,
             peak_force_n: None,
             scheduled: false,
         }));

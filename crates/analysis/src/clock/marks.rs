@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use skinrig_model::pulse::decode_marks;
+use skinrig_model::pulse::{LOOPBACK, decode_marks};
 use skinrig_model::{Mark, SentMark, TriggerEdge};
 
 use super::line::{self, Pair};
@@ -38,7 +38,8 @@ pub fn fit_marks(edges: &[TriggerEdge], channel: u8, sent: &[SentMark]) -> Optio
         .copied()
         .filter(|e| e.channel == channel)
         .collect();
-    let decoded = decode_marks(&on_channel);
+    let mut decoded = decode_marks(&on_channel);
+    decoded.marks.retain(|m| m.mark != LOOPBACK); // the test of the line before the run
     let mut sent_by: BTreeMap<Mark, Vec<f64>> = BTreeMap::new();
     for mark in sent {
         let host_us = mark.t.0 as f64 * 1e-3;

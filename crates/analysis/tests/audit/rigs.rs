@@ -332,6 +332,7 @@ fn outcome(
             at.y_mm + 0.02 * random.normal(),
         )),
         measured_depth_mm: Some(2.0 + 0.02 * random.normal()),
+        touched_mm: None,
         peak_force_n: None,
         scheduled: false,
     };

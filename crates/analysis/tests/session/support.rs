@@ -121,6 +121,7 @@ pub fn session() -> (SessionInput, Memory) {
             timing: Some(timing),
             measured_at: Some(at),
             measured_depth_mm: Some(2.0),
+            touched_mm: None,
             peak_force_n: None,
             scheduled: false,
         }));

@@ -1,7 +1,7 @@
 //! A schedule as a plan: the same presses at the same times, executed by the same controller.
 
 use skinrig_model::{HostDuration, HostTime, PlannedPress, Point3, Robot};
-use skinrig_protocol::{Plan, PressStep, RunLimits, Schedule, Step};
+use skinrig_protocol::{Plan, PressStep, RunLimits, Schedule, Step, Surface};
 
 /// Height of the scheduled tip before the first press, mm. Nothing moves.
 const START_MM: f64 = 5.0;
@@ -35,6 +35,7 @@ pub fn compile(schedule: &Schedule, presses: Vec<PlannedPress>, times: &[HostTim
             press: press.id,
             at: press.at,
             depth_mm: press.depth_mm,
+            surface: Surface::Known,
             start_after_begin: Some(HostDuration(begin.0)),
             approach_speed_mm_s: clearance_mm / span(phases.approach, phases.contact),
             indent_speed_mm_s: press.depth_mm / span(phases.contact, phases.at_depth),

@@ -4,6 +4,8 @@ mod course;
 mod edges;
 mod guard;
 mod mock;
+mod preflight;
 mod progress;
 mod rig_faults;
 mod simulated;
+mod touch;

@@ -8,6 +8,7 @@ use skinrig_device::{
     IndenterCapabilities, MotionLimits, Rig, RobotSample, TriggerBox, TriggerCapabilities,
 };
 use skinrig_model::*;
+use skinrig_protocol::Surface;
 use skinrig_protocol::plan::{Plan, PressStep, RunLimits, Step};
 
 pub const MS: i64 = 1_000_000;
@@ -475,6 +476,7 @@ pub fn plan() -> Plan {
             press: p.id,
             at: p.at,
             depth_mm: 2.0,
+            surface: Surface::Known,
             start_after_begin: Some(HostDuration::from_millis(300 + 503 * i as i64)),
             approach_speed_mm_s: 50.0,
             indent_speed_mm_s: 20.0,

@@ -16,6 +16,7 @@ use crate::protocol::{Loader, Protocol, Prototype, Sync};
 use crate::read::read_table;
 use crate::shape::{Field, Table};
 use crate::source::{Sources, Span};
+use crate::surface::Surface;
 use crate::timing;
 use crate::yaml;
 pub(crate) use parts::{biases, calibration_possible, nominal_camera, outline, roi, roles};
@@ -211,6 +212,11 @@ fn assemble(
     {
         calibration_possible(roles, analysis, field, out);
     }
+    let surface = root.get("press").map(|f| {
+        let surface = crate::surface::surface(f)?;
+        band_fits(&surface, f, clearance, max_depth, out);
+        Some(surface)
+    });
     let marks = root.get("triggers").and_then(|f| marks(f, out));
     let between = repetitions.and_then(|r| r.get("between"));
     let cameras = root.get("cameras").map(|f| {
@@ -231,13 +237,11 @@ fn assemble(
     let (depths, roles, sync) = (depths?, roles?, sync.map_or(Some(None), |s| s.map(Some))?);
     let presses = locations.len() as u64 * depths.len() as u64 * roles.len() as u64
         + sync.as_ref().map_or(0, |s: &Sync| u64::from(s.count));
-    if presses > u64::from(MAX_MARKED_PRESS) + 1 {
+    // The last number that a mark can carry tests the trigger line.
+    if presses > u64::from(MAX_MARKED_PRESS) {
         let span = root.get("path").map_or(root.span, |f| f.span);
         out.error(span, "path", "too many presses")
-            .expected(format!(
-                "at most {} presses in all",
-                u64::from(MAX_MARKED_PRESS) + 1
-            ))
+            .expected(format!("at most {MAX_MARKED_PRESS} presses in all"))
             .found(format!("{presses}"))
             .help("split the campaign into several protocols");
         return None;
@@ -265,10 +269,40 @@ fn assemble(
         motion: motion_read?,
         limits: limits_read?,
         marks: marks?,
+        surface: surface.map_or(Some(None), |s| s.map(Some))?,
         analysis: analysis?,
         cameras: cameras?,
         key_places: crate::findings::places(root, &out.sources),
     })
+}
+
+/// The band in which a touch is believed lies below clearance height and above the floor.
+fn band_fits(
+    surface: &Surface,
+    f: &Field,
+    clearance_mm: Option<f64>,
+    max_depth_mm: Option<f64>,
+    out: &mut Collector,
+) {
+    let Surface::Touch(search) = surface else {
+        return;
+    };
+    for (limit, key) in [
+        (clearance_mm, "motion.clearance"),
+        (max_depth_mm, "limits.max_depth"),
+    ] {
+        if let Some(limit) = limit.filter(|limit| search.band_mm >= *limit) {
+            let span = f.get("band").map_or(f.span, |b| b.span);
+            out.error(
+                span,
+                "press.band",
+                "the search would begin or end too far off",
+            )
+            .expected(format!("less than {limit} mm, `{key}`"))
+            .found(format!("{} mm", search.band_mm));
+            return;
+        }
+    }
 }
 
 pub(crate) fn seconds(s: f64) -> HostDuration {

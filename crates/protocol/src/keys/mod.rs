@@ -13,6 +13,7 @@ pub(crate) use run::{EVALUATION, ROI};
 
 use crate::quantity::Dimension::{Length, Speed, Time};
 use crate::shape::{Key, Need, Range, Shape, Table, Word};
+use crate::surface::PRESS;
 use frame::{FRAME, SYNC};
 use path::{ORDER, ORDER_TABLE, PATH, REPETITIONS};
 use run::{CAMERAS, LIMITS, MOTION, TRIGGERS};
@@ -157,6 +158,11 @@ pub(crate) static PROTOCOL: Table = Table {
             "limits",
             Shape::Map(&LIMITS),
             "What must never happen. Checked for every segment of motion before a device is opened, and enforced while running.",
+        ),
+        optional(
+            "press",
+            Shape::Map(&PRESS),
+            "How presses find the surface; absent: as the rig file says, at z = 0 of the frame when it says nothing.",
         ),
         default(
             "triggers",

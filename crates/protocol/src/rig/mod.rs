@@ -147,7 +147,7 @@ pub struct RobotSetup {
     /// `omega3`.
     pub model: &'static str,
     /// Serial number.
-    pub serial: String,
+    pub serial: u16,
     /// Expected firmware version.
     pub firmware: Option<String>,
     /// The vendor's library; `None`: the usual places.
@@ -166,12 +166,22 @@ pub struct RobotSetup {
     pub auto_init: bool,
     /// The sample is off.
     pub sample_is_off: bool,
-    /// Share of the motors' torque that regulation may use, 0 to 1.
-    pub motor_ratio: f64,
-    /// Ratios and largest forces measured with them, N, ascending; may be empty.
-    pub motor_ratio_calibration: Vec<(f64, f64)>,
+    /// Which axes of the device the robot frame's axes are: `+x` to `-z`, right-handed.
+    pub axes: [&'static str; 3],
+    /// Tip force per share of the motors' torque, N.
+    pub force_per_ratio_n: f64,
+    /// Share that carries the arm.
+    pub gravity_ratio: f64,
+    /// Smallest share with which the arm does not sink.
+    pub least_ratio: f64,
+    /// The library tells the force with which the tip is pushed back, instead of that of the motors.
+    pub reports_sample_force: bool,
     /// Integral gain of the regulation.
     pub integral_gain: f64,
+    /// Proportional gain; `None`: the library's.
+    pub proportional_gain: Option<f64>,
+    /// Derivative gain; `None`: the library's.
+    pub derivative_gain: Option<f64>,
     /// mm/s².
     pub acceleration_mm_s2: f64,
     /// mm/s³.

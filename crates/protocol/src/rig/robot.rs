@@ -7,8 +7,6 @@ use crate::shape::Field;
 
 /// One step of the controller's watchdog, s.
 const WATCHDOG_STEP_S: f64 = 125e-6;
-/// The most that an omega.3 can exert, N; a motor ratio of 1.
-const MOST_FORCE_N: f64 = 12.0;
 
 pub(super) fn tip(f: &Field, out: &mut Collector) -> Option<Tip> {
     let shape = f.word("shape")?;
@@ -80,17 +78,43 @@ pub(super) fn robot(
         .found("`sample_is_off: false`")
         .help("take the sample off and say so, or initialise the arm by hand and write `auto_init: false`");
     }
-    let calibration = match f.get("motor_ratio_calibration") {
-        Some(list) => calibration(list, out),
-        None => Some(Vec::new()),
-    };
-    let ratio = f.get("motor_ratio");
-    if let (Some(field), Some(calibration), Some(limit)) = (ratio, &calibration, max_force_n) {
-        check_ratio(field, calibration, limit, out);
+    let axes = f.get("axes").and_then(|a| axes(a, out));
+    let force = f.get("motor_force")?;
+    if let (Some(limit), Some(per_ratio), Some(gravity), Some(least)) = (
+        max_force_n,
+        force.quantity("per_ratio"),
+        force.number("gravity_ratio"),
+        force.number("least_ratio"),
+    ) {
+        let strongest = (1.0 - gravity) * per_ratio;
+        let sinking = gravity + limit / per_ratio < least;
+        if strongest < limit || sinking {
+            let (expected, found) = if sinking {
+                (
+                    format!(
+                        "a limit of more than {:.3} N: below, the arm sinks",
+                        (least - gravity) * per_ratio
+                    ),
+                    format!("{limit} N, `limits.max_force`"),
+                )
+            } else {
+                (
+                    format!("at least {limit} N, `limits.max_force`"),
+                    format!("{strongest:.3} N with all of the motors' torque"),
+                )
+            };
+            out.error(
+                force.span,
+                force.path.as_str(),
+                "the force limit cannot be set",
+            )
+            .expected(expected)
+            .found(found);
+        }
     }
     Some(RobotSetup {
         model: f.word("model")?,
-        serial: f.text("serial")?,
+        serial: f.count("serial").and_then(|n| u16::try_from(n).ok())?,
         firmware: f.text("firmware"),
         library: library.map_or(Some(None), |l| l.map(Some))?,
         library_version: f.text("library_version"),
@@ -100,9 +124,14 @@ pub(super) fn robot(
         velocity_threshold: f.count("velocity_threshold"),
         auto_init: auto_init?,
         sample_is_off: sample_is_off?,
-        motor_ratio: f.number("motor_ratio")?,
-        motor_ratio_calibration: calibration?,
+        axes: axes?,
+        force_per_ratio_n: force.quantity("per_ratio")?,
+        gravity_ratio: force.number("gravity_ratio")?,
+        least_ratio: force.number("least_ratio")?,
+        reports_sample_force: force.word("reported")? == "by_sample",
         integral_gain: f.number("integral_gain")?,
+        proportional_gain: f.number("proportional_gain"),
+        derivative_gain: f.number("derivative_gain"),
         acceleration_mm_s2: f.quantity("acceleration")?,
         jerk_mm_s3: f.quantity("jerk")?,
         supervisor: f.flag("supervisor")?,
@@ -126,54 +155,29 @@ fn watchdog(f: &Field, out: &mut Collector) -> Option<u8> {
     Some(steps.round() as u8) // 1 to 255 by the key's range
 }
 
-fn calibration(list: &Field, out: &mut Collector) -> Option<Vec<(f64, f64)>> {
-    let pairs: Vec<(f64, f64)> = list
-        .items()
-        .iter()
-        .map(|item| Some((item.number("ratio")?, item.quantity("force")?)))
-        .collect::<Option<_>>()?;
-    for (pair, item) in pairs.windows(2).zip(list.items().iter().skip(1)) {
-        if let [(ratio, force), (next_ratio, next_force)] = pair
-            && (next_ratio <= ratio || next_force < force)
-        {
-            out.error(item.span, item.path.as_str(), "the table does not rise")
-                .expected(format!(
-                    "a ratio above {ratio} and a force of at least {force} N"
-                ))
-                .found(format!("{next_ratio} and {next_force} N"));
-            return None;
-        }
+/// Three different axes, right-handed.
+fn axes(f: &Field, out: &mut Collector) -> Option<[&'static str; 3]> {
+    let [x, y, z] = f.items() else { return None };
+    let axes = [x.as_word()?, y.as_word()?, z.as_word()?];
+    let mut m = [[0.0f64; 3]; 3];
+    for (row, axis) in m.iter_mut().zip(axes) {
+        let column = match axis.trim_start_matches(['+', '-']) {
+            "x" => 0,
+            "y" => 1,
+            _ => 2,
+        };
+        row[column] = if axis.starts_with('-') { -1.0 } else { 1.0 };
     }
-    Some(pairs)
-}
-
-/// The largest force that a motor ratio allows must be within the bench's limit: by the calibration where there is
-/// one, else by the nominal 12 N at a ratio of 1 (pose dependent: a calibration is better).
-fn check_ratio(field: &Field, calibration: &[(f64, f64)], limit_n: f64, out: &mut Collector) {
-    let crate::shape::Value::Number(ratio) = field.value else {
-        return;
-    };
-    let force_n = match calibration.iter().find(|(r, _)| *r >= ratio) {
-        // The next larger ratio that was measured bounds the force.
-        Some((_, force)) => *force,
-        None => match calibration.last() {
-            Some((largest, _)) => {
-                out.error(field.span, field.path.as_str(), "beyond the calibration")
-                    .expected(format!("at most {largest}, the largest ratio measured"))
-                    .found(ratio.to_string());
-                return;
-            }
-            None => MOST_FORCE_N * ratio,
-        },
-    };
-    if force_n > limit_n {
-        out.error(
-            field.span,
-            field.path.as_str(),
-            "the motors could press harder than the bench bears",
-        )
-        .expected(format!("at most {limit_n} N, `limits.max_force`"))
-        .found(format!("{force_n:.2} N"))
-        .help("lower the ratio, measure `motor_ratio_calibration` on a scale, or raise the limit");
+    let [a, b, c] = m;
+    let determinant = a[0] * (b[1] * c[2] - b[2] * c[1]) - a[1] * (b[0] * c[2] - b[2] * c[0])
+        + a[2] * (b[0] * c[1] - b[1] * c[0]);
+    if determinant < 0.5 {
+        out.error(f.span, f.path.as_str(), "the axes are not right-handed")
+            .expected(
+                "three different axes, z = x cross y, such as `[+x, +y, +z]` or `[+y, -x, +z]`",
+            )
+            .found(format!("[{}]", axes.join(", ")));
+        return None;
     }
+    Some(axes)
 }

@@ -48,7 +48,7 @@ fn the_shipped_files_mean_what_they_show() {
     let Some(Surface::Touch(search)) = rig.surface else {
         panic!("{:?}", rig.surface)
     };
-    assert_eq!((search.threshold_n, search.samples), (0.3, 5));
+    assert_eq!((search.threshold_n, search.samples), (0.2, 5));
 
     let emulated = parse(&shipped("emulated.yaml")).unwrap_or_else(|e| panic!("{e}"));
     assert_eq!(emulated.kind.name(), "emulated");
@@ -173,25 +173,25 @@ fn what_cannot_be_is_named() {
         "0.031875",
     );
     finding(
-        "motor_ratio: 0.1 ",
-        "motor_ratio: 0.3 ",
-        "robot.motor_ratio",
-        "beyond the calibration",
-        "at most 0.2",
+        "axes: [+x, +y, +z]",
+        "axes: [+y, +x, +z]",
+        "robot.axes",
+        "the axes are not right-handed",
+        "z = x cross y",
+    );
+    finding(
+        "gravity_ratio: 0",
+        "gravity_ratio: 0.4",
+        "robot.motor_force",
+        "the force limit cannot be set",
+        "7.200 N",
     );
     finding(
         "max_force: 8 N",
-        "max_force: 1.2 N",
-        "robot.motor_ratio",
-        "the motors could press harder than the bench bears",
-        "1.40 N",
-    );
-    finding(
-        "{ratio: 0.2, force: 2.7 N}",
-        "{ratio: 0.2, force: 1.2 N}",
-        "robot.motor_ratio_calibration[2]",
-        "the table does not rise",
-        "at least 1.4 N",
+        "max_force: 0.5 N",
+        "robot.motor_force",
+        "the force limit cannot be set",
+        "the arm sinks",
     );
     finding(
         "serial: \"00001754\"",

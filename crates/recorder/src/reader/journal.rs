@@ -1,15 +1,15 @@
 //! What happened: presses and their attempts, commands, marks, remarks, the end.
 
 use skinrig_model::{
-    BoxReport, HostTime, InterruptionKind, Mark, MarkKind, MotionCommand, PlannedPress, Point3,
-    PressId, PressOutcome, RunEnd, SentMark,
+    BoxReport, CheckVerdict, HostTime, InterruptionKind, Mark, MarkKind, MotionCommand,
+    PlannedPress, Point3, PreflightCheck, PressId, PressOutcome, RunEnd, SentMark,
 };
 
 use super::SessionReader;
 use crate::box_row::report_from;
 use crate::error::RecorderError;
 use crate::from_row::{attempt_from, planned_from};
-use crate::query::{self, Fault, int, named, num, opt_text, real, text};
+use crate::query::{self, Fault, has_table, int, named, num, opt_text, real, text};
 use crate::rows::{AttemptRow, CommandRow, InterruptionRow, NoteRow};
 
 impl SessionReader {
@@ -51,6 +51,26 @@ impl SessionReader {
             .into_iter()
             .map(|(_, mut attempts)| attempts.pop()?.outcome)
             .collect())
+    }
+
+    /// What was checked before the run was armed, in order; nothing for a session of an older schema.
+    ///
+    /// # Errors
+    /// When the file is damaged.
+    pub fn preflight(&self) -> Result<Vec<PreflightCheck>, RecorderError> {
+        const DOING: &str = "reading the preflight";
+        if !self.ask(DOING, async |conn| has_table(conn, "preflight").await)? {
+            return Ok(Vec::new());
+        }
+        self.all(DOING, "SELECT * FROM preflight ORDER BY id", |row| {
+            Ok(PreflightCheck {
+                check: text(row, "name")?,
+                expected: text(row, "expected")?,
+                found: text(row, "found")?,
+                verdict: named(row, "verdict", &CheckVerdict::ALL, CheckVerdict::name)?,
+                next_step: opt_text(row, "next_step")?.unwrap_or_default(),
+            })
+        })
     }
 
     /// Every motion command, in order.

@@ -139,6 +139,7 @@ pub fn outcome(attempt: AttemptId, t: i64, verdict: PressVerdict) -> PressOutcom
         }),
         measured_at: Some(Point2::new(1.0 / 3.0, -4.0)),
         measured_depth_mm: Some(1.99),
+        touched_mm: Some(-0.012),
         peak_force_n: None,
         scheduled: false,
     }
@@ -190,6 +191,11 @@ pub fn records(presses: u32) -> Vec<Record> {
             }],
         });
     }
+    out.push(Record::Preflight(vec![
+        PreflightCheck::new("disk", "1 GB", "2 GB", true, ""),
+        PreflightCheck::new("clock", "advancing", "no time", false, "power-cycle it"),
+        PreflightCheck::skipped("retouch", "a touch", "not asked for"),
+    ]));
     let mut ids: Vec<AttemptId> = (0..presses - 1)
         .map(|i| AttemptId {
             press: PressId(i),

@@ -22,6 +22,11 @@ fn everything_comes_back() {
     assert_eq!(reader.session_id().unwrap().len(), 32);
     assert_eq!(reader.seal().unwrap().unwrap().totals, seal.totals);
     let expected = records(6);
+    let preflight = expected.iter().find_map(|r| match r {
+        Record::Preflight(checks) => Some(checks.clone()),
+        _ => None,
+    });
+    assert_eq!(Some(reader.preflight().unwrap()), preflight);
     let mut chunks = Vec::new();
     for camera in CameraId::ALL {
         let edges = reader.trigger_edges(camera).unwrap();
@@ -403,5 +408,40 @@ fn a_folder_is_listed_with_its_broken_files() {
     assert_eq!((*sealed, end, totals.presses.open()), (false, &None, 2));
     assert!(
         matches!(&sessions[2].state, SessionState::Broken { reason } if reason.contains("less than 100"))
+    );
+}
+
+#[test]
+fn sessions_of_the_first_schema_are_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.session.sqlite");
+    let mut writer = SessionWriter::create(&path).unwrap();
+    for record in records(4) {
+        writer.accept(record).unwrap();
+    }
+    drop(writer);
+    let runtime = tokio::runtime::Builder::new_current_thread()
+        .build()
+        .unwrap();
+    runtime.block_on(async {
+        use sqlx::{ConnectOptions, Connection, Executor, sqlite::SqliteConnectOptions};
+        let options = SqliteConnectOptions::new().filename(&path);
+        let mut conn = options.connect().await.unwrap();
+        for sql in [
+            "DROP TABLE preflight",
+            "ALTER TABLE attempt DROP COLUMN touched_mm",
+            "PRAGMA user_version = 1",
+        ] {
+            conn.execute(sql).await.unwrap();
+        }
+        conn.close().await.unwrap();
+    });
+    let reader = SessionReader::open(&path).unwrap();
+    assert_eq!(reader.preflight().unwrap(), []);
+    let outcomes = reader.last_outcomes().unwrap();
+    let first = outcomes[0].as_ref().unwrap();
+    assert_eq!(
+        (first.measured_depth_mm, first.touched_mm),
+        (Some(1.99), None)
     );
 }

@@ -1,9 +1,9 @@
 //! Keys of the robot, the cameras and the trigger box.
 
-use super::{ANGLE, FORCE, MASS, time};
+use super::{ANGLE, MASS, time};
 use crate::keys::schedule::CAMERA as NOMINAL_CAMERA;
 use crate::keys::{ROI, count, default, optional, required};
-use crate::quantity::Dimension::{Acceleration, EventRate, Jerk, Time};
+use crate::quantity::Dimension::{Acceleration, EventRate, Force, Jerk, Time};
 use crate::shape::{Range, Shape, Table, Word};
 
 pub(super) static ROBOT: Table = Table {
@@ -13,7 +13,7 @@ pub(super) static ROBOT: Table = Table {
         default("model", Shape::Choice(ROBOTS), "omega3", "Which robot."),
         required(
             "serial",
-            Shape::Text,
+            count(0, 65_534),
             "Its serial number, as `skinrig devices` shows it.",
         ),
         optional(
@@ -36,6 +36,12 @@ pub(super) static ROBOT: Table = Table {
             ANGLE,
             "0 deg",
             "How the base is mounted: 0 deg upright, 90 deg lying flat. Wrong values push the arm off.",
+        ),
+        default(
+            "axes",
+            Shape::Tuple(&AXIS, &["x", "y", "z"]),
+            "[+x, +y, +z]",
+            "Which axes of the device the robot frame's x, y and z are: z points away from the sample. Right-handed.",
         ),
         optional(
             "effector_mass",
@@ -66,19 +72,10 @@ pub(super) static ROBOT: Table = Table {
             "Your word that sample, hands and tools are out of the arm's whole reach.",
         ),
         default(
-            "motor_ratio",
-            Shape::Number(Range::above_zero(1.0)),
-            "0.1",
-            "Share of the motors' torque that regulation may use: caps the force.",
-        ),
-        optional(
-            "motor_ratio_calibration",
-            Shape::List {
-                of: &Shape::Map(&MOTOR_RATIO),
-                min: 1,
-                max: 100,
-            },
-            "Largest forces measured on a scale, by ratio, in ascending order.",
+            "motor_force",
+            Shape::Map(&MOTOR_FORCE),
+            "{}",
+            "How a cap on the motors' torque bounds the force at the tip; settle it with a scale.",
         ),
         default(
             "integral_gain",
@@ -86,16 +83,26 @@ pub(super) static ROBOT: Table = Table {
             "0",
             "Integral gain of the regulation; 0: forces do not build up while the tip rests on something.",
         ),
+        optional(
+            "proportional_gain",
+            Shape::Number(Range::from_zero(100.0)),
+            "Proportional gain; absent: the library's.",
+        ),
+        optional(
+            "derivative_gain",
+            Shape::Number(Range::from_zero(100.0)),
+            "Derivative gain; absent: the library's.",
+        ),
         default(
             "acceleration",
             Shape::Quantity(&[Acceleration], Range::above_zero(10_000.0)),
-            "100 mm/s2",
+            "200 mm/s2",
             "Largest acceleration of moves.",
         ),
         default(
             "jerk",
             Shape::Quantity(&[Jerk], Range::above_zero(1e6)),
-            "1000 mm/s3",
+            "4000 mm/s3",
             "Largest jerk of moves.",
         ),
         default(
@@ -110,19 +117,51 @@ pub(super) static ROBOT: Table = Table {
 
 const ROBOTS: &[Word] = &[("omega3", "Force Dimension omega.3")];
 
-static MOTOR_RATIO: Table = Table {
-    name: "motor_ratio",
-    doc: "A ratio and the largest force at the tip that was measured with it.",
+static MOTOR_FORCE: Table = Table {
+    name: "motor_force",
+    doc: "Force at the tip = per_ratio (ratio - gravity_ratio), with ratio the share of the motors' torque that may be used.",
     keys: &[
-        required("ratio", Shape::Number(Range::above_zero(1.0)), "The ratio."),
-        required(
-            "force",
-            FORCE,
-            "The largest force over all poses that were tried.",
+        default(
+            "per_ratio",
+            Shape::Quantity(&[Force], Range::above_zero(50.0)),
+            "12 N",
+            "Largest force over all poses that was measured on a scale, by ratio. The default is the device's nominal force; the true one depends on the pose.",
+        ),
+        default(
+            "gravity_ratio",
+            Shape::Number(Range::between(0.0, 0.9)),
+            "0",
+            "Share that carries the arm itself.",
+        ),
+        default(
+            "least_ratio",
+            Shape::Number(Range::between(0.0, 1.0)),
+            "0.05",
+            "Smallest share with which the arm does not sink.",
+        ),
+        default(
+            "reported",
+            Shape::Choice(REPORTED),
+            "by_motors",
+            "Which force the library tells; settle it with a load cell.",
         ),
     ],
     exactly_one: &[],
 };
+
+const REPORTED: &[Word] = &[
+    ("by_motors", "with which the motors push the tip"),
+    ("by_sample", "with which the tip is pushed back"),
+];
+
+static AXIS: Shape = Shape::Choice(&[
+    ("+x", "out of the base, towards the operator"),
+    ("-x", "into the base"),
+    ("+y", "to the operator's right"),
+    ("-y", "to the operator's left"),
+    ("+z", "up"),
+    ("-z", "down"),
+]);
 
 pub(super) static CAMERAS: Table = Table {
     name: "rig_cameras",

@@ -4,7 +4,7 @@ mod devices;
 
 use crate::keys::{count, default, optional, required};
 use crate::quantity::Dimension::{Angle, Data, DataRate, Force, Length, Mass, Speed, Time};
-use crate::shape::{Key, Range, Shape, Table, Word};
+use crate::shape::{Range, Shape, Table, Word};
 use devices::{CAMERAS, ROBOT, TRIGGER_BOX};
 
 /// The version of the rig file's language that this crate reads.
@@ -73,7 +73,7 @@ pub(crate) static RIG: Table = Table {
         ),
         optional(
             "press",
-            Shape::Map(&PRESS),
+            Shape::Map(&crate::surface::PRESS),
             "How the surface is found, when the protocol does not say; absent: the frame is trusted.",
         ),
     ],
@@ -90,7 +90,7 @@ const KINDS: &[Word] = &[
 
 static FRAME: Table = Table {
     name: "rig_frame",
-    doc: "Where the skin lies in the robot's frame. Skin: z out of the surface, z = 0 at the surface. Robot: z up.",
+    doc: "Where the skin lies in the robot's frame. Skin: z out of the surface, z = 0 at the surface. Robot: z away from the sample (`robot.axes`).",
     keys: &[
         optional(
             "given",
@@ -214,8 +214,8 @@ static LIMITS: Table = Table {
         ),
         default(
             "max_lead",
-            Shape::Quantity(&[Length], Range::above_zero(5.0)),
-            "1 mm",
+            Shape::Quantity(&[Length], Range::above_zero(4.0)),
+            "2 mm",
             "How far the robot's target may run ahead of where it is: bounds the force that builds up in contact.",
         ),
         required(
@@ -286,58 +286,3 @@ static PREFLIGHT: Table = Table {
     ],
     exactly_one: &[],
 };
-
-/// How the surface is found; a protocol has the same keys.
-pub(crate) static PRESS: Table = Table {
-    name: "press",
-    doc: "How a press finds the surface.",
-    keys: PRESS_KEYS,
-    exactly_one: &[],
-};
-
-const PRESS_KEYS: &[Key] = &[
-    default(
-        "surface",
-        Shape::Choice(SURFACES),
-        "known",
-        "Where the surface is.",
-    ),
-    default(
-        "threshold",
-        FORCE,
-        "0.3 N",
-        "With `touch`: a force this far above the one in free air is a contact. Friction hides less than about 0.1 N.",
-    ),
-    default(
-        "samples",
-        count(1, 1000),
-        "5",
-        "With `touch`: so many samples in a row must be above the threshold.",
-    ),
-    default(
-        "speed",
-        Shape::Quantity(&[Speed], Range::above_zero(10.0)),
-        "2 mm/s",
-        "With `touch`: speed of the search.",
-    ),
-    default(
-        "band",
-        Shape::Quantity(&[Length], Range::above_zero(10.0)),
-        "0.5 mm",
-        "With `touch`: how far above or below the frame's surface a touch is believed; the search starts and ends there.",
-    ),
-    default(
-        "tare",
-        time(10.0),
-        "300 ms",
-        "With `touch`: how long the force in free air is averaged at clearance height.",
-    ),
-];
-
-const SURFACES: &[Word] = &[
-    ("known", "at z = 0 of the frame"),
-    (
-        "touch",
-        "where the force rises; depths count from there, the floor limit stays where it is",
-    ),
-];

@@ -1,0 +1,368 @@
+//! The preflight: what is checked of rig and devices before the robot is powered.
+
+use skinrig_model::pulse::{LOOPBACK, decode_marks};
+use skinrig_model::{
+    CameraId, DeviceIdentity, DeviceRole, HostDuration, PreflightCheck, RawChunk, Record, Setting,
+    TriggerEdge,
+};
+
+use crate::core::{Collect, Core};
+use crate::error::{ControllerError, Halt};
+
+/// What a run checks before it powers the robot.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Preflight {
+    /// Checks that the caller made already: disk, frame, recorder.
+    pub made: Vec<PreflightCheck>,
+    /// Who is expected in which role.
+    pub expected: Vec<ExpectedDevice>,
+    /// Both cameras' clocks must be seen to advance within this time; not checked when absent.
+    pub clocks_within: Option<HostDuration>,
+    /// A mark must come back through both cameras; not checked when absent.
+    pub loopback: Option<Loopback>,
+}
+
+/// Who is expected in a role.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ExpectedDevice {
+    /// Which role.
+    pub role: DeviceRole,
+    /// Its serial number; any when absent.
+    pub serial: Option<String>,
+    /// Its firmware version, or a part of what it says of it; any when absent.
+    pub firmware: Option<String>,
+    /// Values that were read from it, by name, as they must be; a version of a library for example.
+    pub settings: Vec<(String, String)>,
+}
+
+/// The way of a mark from the trigger box through the cameras.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Loopback {
+    /// The trigger channel of camera 1 and camera 2.
+    pub channels: [u8; 2],
+    /// From sending to both cameras' bytes at the host.
+    pub within: HostDuration,
+}
+
+/// What the cameras delivered while they are checked.
+#[derive(Debug, Default)]
+pub(crate) struct Watch {
+    edges: [Vec<TriggerEdge>; 2],
+    first_us: [Option<u64>; 2],
+    last_us: [Option<u64>; 2],
+}
+
+impl Watch {
+    pub(crate) fn see(&mut self, chunk: &RawChunk) {
+        let i = chunk.camera.index();
+        self.edges[i].extend_from_slice(&chunk.triggers);
+        for t_us in [chunk.facts.first_us, chunk.facts.last_us]
+            .into_iter()
+            .flatten()
+        {
+            self.first_us[i].get_or_insert(t_us);
+            self.last_us[i] = Some(t_us);
+        }
+    }
+
+    fn advances(&self, camera: CameraId) -> bool {
+        let i = camera.index();
+        matches!((self.first_us[i], self.last_us[i]), (Some(a), Some(b)) if b > a)
+    }
+
+    /// True when the loop-back's mark, and no other mark, came through on `channel`.
+    fn saw_mark(&self, camera: CameraId, channel: u8) -> bool {
+        let marks = decode_marks(&self.on(camera, channel)).marks;
+        !marks.is_empty() && marks.iter().all(|m| m.mark == LOOPBACK)
+    }
+
+    fn on(&self, camera: CameraId, channel: u8) -> Vec<TriggerEdge> {
+        let edges = self.edges[camera.index()].iter().copied();
+        edges.filter(|e| e.channel == channel).collect()
+    }
+
+    /// What was seen on `channel`, and elsewhere, for "found".
+    fn describe(&self, camera: CameraId, channel: u8) -> String {
+        let here = self.on(camera, channel);
+        let mut channels: Vec<u8> = self.edges[camera.index()]
+            .iter()
+            .map(|e| e.channel)
+            .collect();
+        channels.sort_unstable();
+        channels.dedup();
+        channels.retain(|c| *c != channel);
+        let decoded = decode_marks(&here);
+        let what = match decoded.marks.as_slice() {
+            [] if here.is_empty() => format!("no edge on channel {channel}"),
+            [] => format!(
+                "{} edges on channel {channel} that make no mark",
+                here.len()
+            ),
+            [only] if only.mark == LOOPBACK => "the mark".to_owned(),
+            [first, ..] => {
+                let n = decoded.marks.len();
+                format!(
+                    "{n} marks, the first `{}` of {}",
+                    first.mark.kind, first.mark.press
+                )
+            }
+        };
+        if channels.is_empty() {
+            what
+        } else {
+            format!("{what}; edges on channel {channels:?}")
+        }
+    }
+}
+
+impl Core<'_> {
+    /// Checks an identity and what was read back from its device.
+    pub(crate) fn check_device(
+        &mut self,
+        role: DeviceRole,
+        identity: &DeviceIdentity,
+        settings: &[Setting],
+    ) {
+        let Some(preflight) = &self.preflight else {
+            return;
+        };
+        let wanted = preflight.expected.iter().find(|e| e.role == role);
+        let mut checks = Vec::new();
+        let serial = wanted.and_then(|w| w.serial.as_deref());
+        checks.push(PreflightCheck::new(
+            format!("{role}: identity"),
+            serial.map_or_else(|| "any serial number".to_owned(), |s| format!("serial {s}")),
+            format!("{} {}", identity.model, identity.serial),
+            serial.is_none_or(|s| s == identity.serial),
+            "connect the right device, or correct its serial number in the rig file",
+        ));
+        if let Some(version) = wanted.and_then(|w| w.firmware.as_deref()) {
+            checks.push(PreflightCheck::new(
+                format!("{role}: firmware"),
+                version,
+                identity.firmware.as_str(),
+                says_version(&identity.firmware, version),
+                "install the expected version, or accept this one in the rig file after testing it",
+            ));
+        }
+        for (name, value) in wanted.iter().flat_map(|w| &w.settings) {
+            let found = settings.iter().find(|s| s.name == *name);
+            checks.push(PreflightCheck::new(
+                format!("{role}: {name}"),
+                value.as_str(),
+                found.map_or("not told", |s| s.read_back.as_str()),
+                found.is_some_and(|s| same(value, &s.read_back)),
+                "find out what changed, or accept the value in the rig file after testing it",
+            ));
+        }
+        if role != DeviceRole::TriggerBox {
+            checks.push(read_back(role, settings));
+        }
+        if role == DeviceRole::Indenter {
+            let told = settings.iter().find(|s| s.name == "initialised");
+            checks.push(match told {
+                Some(s) => PreflightCheck::new(
+                    "indenter: initialised",
+                    "true",
+                    s.read_back.as_str(),
+                    s.read_back == "true",
+                    "initialise the robot by hand (calibration pole into the pit), or see docs/bench.md",
+                ),
+                None => PreflightCheck::skipped(
+                    "indenter: initialised",
+                    "true",
+                    "this robot needs no initialisation",
+                ),
+            });
+        }
+        self.checks.extend(checks);
+    }
+
+    /// With the cameras streaming: both clocks advance, and a mark comes back through both.
+    pub(crate) fn check_streams(&mut self) -> Result<(), Halt> {
+        let Some(preflight) = self.preflight.clone() else {
+            return Ok(());
+        };
+        self.watch = Some(Watch::default());
+        let answer = self.watch_streams(&preflight);
+        self.watch = None;
+        answer
+    }
+
+    fn watch_streams(&mut self, preflight: &Preflight) -> Result<(), Halt> {
+        if let Some(within) = preflight.clocks_within {
+            self.watch_until(within, |w| CameraId::ALL.into_iter().all(|c| w.advances(c)))?;
+            for camera in CameraId::ALL {
+                let watch = self.watch.as_ref();
+                let times = watch.map_or((None, None), |w| {
+                    (w.first_us[camera.index()], w.last_us[camera.index()])
+                });
+                let found = match times {
+                    (Some(a), Some(b)) => format!("from {a} to {b} us"),
+                    _ => "no time".to_owned(),
+                };
+                self.checks.push(PreflightCheck::new(
+                    format!("{camera}: clock"),
+                    format!("advancing within {within}"),
+                    found,
+                    watch.is_some_and(|w| w.advances(camera)),
+                    "power-cycle the camera; a slave camera needs its master's sync line",
+                ));
+            }
+        }
+        let Some(loopback) = preflight.loopback else {
+            return Ok(());
+        };
+        let Some(trigger) = &mut self.trigger_box else {
+            return Ok(());
+        };
+        let sent = trigger.send(LOOPBACK).map_err(ControllerError::from)?;
+        let train = trigger.capabilities().train_duration;
+        self.hold_line(sent.t + train);
+        let seen = |w: &Watch| {
+            CameraId::ALL
+                .into_iter()
+                .all(|c| w.saw_mark(c, loopback.channels[c.index()]))
+        };
+        self.watch_until(loopback.within, seen)?;
+        for camera in CameraId::ALL {
+            let channel = loopback.channels[camera.index()];
+            let watch = self.watch.as_ref();
+            self.checks.push(PreflightCheck::new(
+                format!("{camera}: trigger loop-back"),
+                format!("the mark on channel {channel} within {}", loopback.within),
+                watch.map_or_else(String::new, |w| w.describe(camera, channel)),
+                watch.is_some_and(|w| w.saw_mark(camera, channel)),
+                "check the trigger cable, its channel in the rig file, and levels (docs/bench.md)",
+            ));
+        }
+        Ok(())
+    }
+
+    /// Looks at the cameras until `done`, or until `within` is over.
+    fn watch_until(
+        &mut self,
+        within: HostDuration,
+        done: impl Fn(&Watch) -> bool,
+    ) -> Result<(), Halt> {
+        let until = self.now() + within;
+        while !self.watch.as_ref().is_some_and(&done) && self.now() < until {
+            self.tick(Some(until))?;
+            // A chunk may take long to fill.
+            self.collect(Collect::Flush)?;
+        }
+        Ok(())
+    }
+
+    /// Hands over the checks. With a failed one, or when the devices failed on the way, nothing is armed.
+    pub(crate) fn conclude_preflight(&mut self, result: Result<(), Halt>) -> Result<(), Halt> {
+        if self.preflight.is_none() {
+            return result;
+        }
+        let mut checks = std::mem::take(&mut self.checks);
+        if let Err(Halt::Fault(e)) = &result {
+            checks.push(PreflightCheck::new(
+                "devices",
+                "every device answers, fits the plan and keeps its settings",
+                e.to_string(),
+                false,
+                "`skinrig devices` shows what is connected",
+            ));
+        }
+        let failed: Vec<String> = checks
+            .iter()
+            .filter(|c| c.failed())
+            .map(|c| {
+                format!(
+                    "{}: expected {}, found {}; {}",
+                    c.check, c.expected, c.found, c.next_step
+                )
+            })
+            .collect();
+        self.journal.emit(Record::Preflight(checks))?;
+        result?;
+        if failed.is_empty() {
+            return Ok(());
+        }
+        Err(ControllerError::Preflight { failed }.into())
+    }
+}
+
+/// Everything that was written reads back; values that were only read do not count.
+fn read_back(role: DeviceRole, settings: &[Setting]) -> PreflightCheck {
+    let written = settings.iter().filter(|s| s.requested != Setting::AS_FOUND);
+    let differing: Vec<String> = written
+        .clone()
+        .filter(|s| !same(&s.requested, &s.read_back))
+        .map(|s| format!("{} {} instead of {}", s.name, s.read_back, s.requested))
+        .collect();
+    PreflightCheck::new(
+        format!("{role}: settings read back"),
+        format!("{} as written", written.count()),
+        if differing.is_empty() {
+            "all".to_owned()
+        } else {
+            differing.join(", ")
+        },
+        differing.is_empty(),
+        "power-cycle the device and try again",
+    )
+}
+
+/// Equal as texts, or as numbers as far as single precision tells.
+fn same(wanted: &str, found: &str) -> bool {
+    if wanted == found {
+        return true;
+    }
+    match (wanted.parse::<f64>(), found.parse::<f64>()) {
+        (Ok(a), Ok(b)) => (a - b).abs() <= 1e-4 * a.abs().max(1e-3),
+        _ => false,
+    }
+}
+
+/// Whether `found`, what a device says of its firmware, names the version `wanted` as a whole: `3.0` is in
+/// `FPGA 3.0, system 1c`, not in `13.0` or `3.01`.
+fn says_version(found: &str, wanted: &str) -> bool {
+    let part = |c: char| c.is_ascii_alphanumeric() || c == '.';
+    found.match_indices(wanted).any(|(at, _)| {
+        let before = found[..at].chars().next_back();
+        let after = found[at + wanted.len()..].chars().next();
+        !before.is_some_and(part) && !after.is_some_and(part)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn versions_and_values_are_compared_as_a_whole() {
+        assert!(says_version("FPGA 3.0, system 1c", "3.0"));
+        assert!(says_version("3.0", "3.0"));
+        for found in ["13.0", "3.01", "3.0.1", "v3", ""] {
+            assert!(!says_version(found, "3.0"), "{found}");
+        }
+        assert!(same("0.14", "0.14000000059604645") && same("evt2", "evt2"));
+        assert!(!same("0.14", "0.15") && !same("on", "off") && !same("", "0"));
+    }
+
+    #[test]
+    fn what_was_only_read_is_no_setting() {
+        let setting = |requested: &str, read_back: &str| Setting {
+            name: "x".into(),
+            requested: requested.into(),
+            read_back: read_back.into(),
+        };
+        let found = setting(Setting::AS_FOUND, "7");
+        let check = read_back(DeviceRole::Indenter, &[found.clone(), setting("5", "5.0")]);
+        assert!(
+            !check.failed() && check.expected == "1 as written",
+            "{check:?}"
+        );
+        let check = read_back(DeviceRole::Indenter, &[found, setting("5", "6")]);
+        assert!(
+            check.failed() && check.found == "x 6 instead of 5",
+            "{check:?}"
+        );
+    }
+}

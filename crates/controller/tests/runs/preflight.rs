@@ -1,0 +1,165 @@
+//! The preflight on the simulated rig: what is checked, and that a failed check powers nothing.
+
+use skinrig_controller::{
+    ControlHandle, ExpectedDevice, Loopback, Preflight, RunReport, execute_checked,
+};
+use skinrig_model::*;
+use skinrig_sim::config::SimConfig;
+use skinrig_sim::faults::Fault;
+use skinrig_sim::rig::simulated_rig;
+
+use crate::mock::{Sink, header};
+use crate::simulated::paced_plan;
+
+fn full() -> Preflight {
+    Preflight {
+        made: vec![PreflightCheck::new("disk", "1 GB", "2 GB", true, "")],
+        expected: Vec::new(),
+        clocks_within: Some(HostDuration::from_millis(500)),
+        loopback: Some(Loopback {
+            channels: [0; 2],
+            within: HostDuration::from_millis(500),
+        }),
+    }
+}
+
+fn run(faults: Vec<Fault>, preflight: Preflight) -> (RunReport, Vec<PreflightCheck>, Vec<Record>) {
+    let mut config = SimConfig::new(5, SimLevel::Kinematic);
+    config.faults = faults;
+    let plan = paced_plan();
+    let header = RunHeader {
+        robot_from_skin: config.robot_from_skin,
+        ..header(&plan)
+    };
+    let mut sink = Sink::default();
+    let rig = simulated_rig(&config);
+    let control = ControlHandle::new();
+    let report = execute_checked(&plan, header, rig, &control, &mut sink, preflight);
+    let tables: Vec<_> = sink
+        .records
+        .iter()
+        .filter_map(|r| match r {
+            Record::Preflight(checks) => Some(checks.clone()),
+            _ => None,
+        })
+        .collect();
+    assert_eq!(tables.len(), 1, "one table, whatever happens");
+    (report, tables.concat(), sink.records)
+}
+
+fn failed(checks: &[PreflightCheck]) -> Vec<&str> {
+    let failed = checks.iter().filter(|c| c.failed());
+    failed.map(|c| c.check.as_str()).collect()
+}
+
+#[test]
+fn a_sound_rig_passes_every_check_and_runs() {
+    let (report, checks, records) = run(Vec::new(), full());
+    assert_eq!((report.end, report.valid), (RunEnd::Completed, 3));
+    let names: Vec<&str> = checks.iter().map(|c| c.check.as_str()).collect();
+    assert_eq!(
+        names,
+        [
+            "disk",
+            "indenter: identity",
+            "indenter: settings read back",
+            "indenter: initialised",
+            "camera 1: identity",
+            "camera 1: settings read back",
+            "camera 2: identity",
+            "camera 2: settings read back",
+            "trigger box: identity",
+            "camera 1: clock",
+            "camera 2: clock",
+            "camera 1: trigger loop-back",
+            "camera 2: trigger loop-back",
+        ]
+    );
+    assert_eq!(failed(&checks), [""; 0]);
+    // The mark of the test is not one of the session's.
+    let sent = records.iter().filter_map(|r| match r {
+        Record::MarkSent(s) => Some(s.mark),
+        _ => None,
+    });
+    assert_eq!(sent.filter(|m| *m == pulse::LOOPBACK).count(), 0);
+    let at = |f: &dyn Fn(&Record) -> bool| records.iter().position(f).unwrap();
+    let table = at(&|r| matches!(r, Record::Preflight(_)));
+    assert!(
+        table < at(&|r| matches!(r, Record::Poses(_)))
+            || table < at(&|r| matches!(r, Record::Intent { .. }))
+    );
+}
+
+/// The run must end before anything is powered: no command, every press missed, the failed checks named.
+fn refused(faults: Vec<Fault>, preflight: Preflight, expected: &[&str]) {
+    let (report, checks, records) = run(faults, preflight);
+    assert_eq!(failed(&checks), expected);
+    let RunEnd::Faulted(reason) = &report.end else {
+        panic!("{report:?}");
+    };
+    assert!(
+        reason.contains("preflight") || expected == ["devices"],
+        "{reason}"
+    );
+    assert!(checks.iter().all(|c| c.failed() != c.next_step.is_empty()));
+    assert_eq!((report.missed, report.disarmed), (3, true));
+    assert!(!records.iter().any(|r| matches!(r, Record::Command { .. })));
+}
+
+#[test]
+fn a_lost_trigger_line_is_found_before_the_robot_is_powered() {
+    let start_pulse = Fault::PulseLost {
+        camera: CameraId::Two,
+        train: 0,
+        pulse: 0,
+    };
+    refused(vec![start_pulse], full(), &["camera 2: trigger loop-back"]);
+    let mut crossed = full();
+    crossed.loopback = Some(Loopback {
+        channels: [0, 7],
+        within: HostDuration::from_millis(500),
+    });
+    refused(Vec::new(), crossed, &["camera 2: trigger loop-back"]);
+}
+
+#[test]
+fn another_device_and_another_version_are_refused() {
+    let mut preflight = full();
+    preflight.expected = vec![
+        ExpectedDevice {
+            role: DeviceRole::Camera2,
+            serial: Some("00001754".into()),
+            firmware: None,
+            settings: vec![("fpga".into(), "3.0".into())],
+        },
+        ExpectedDevice {
+            role: DeviceRole::TriggerBox,
+            serial: None,
+            firmware: Some("9.9".into()),
+            settings: Vec::new(),
+        },
+    ];
+    refused(
+        Vec::new(),
+        preflight,
+        &[
+            "camera 2: identity",
+            "camera 2: fpga",
+            "trigger box: firmware",
+        ],
+    );
+}
+
+#[test]
+fn what_the_caller_found_and_what_a_device_refuses_end_it_too() {
+    let mut preflight = full();
+    preflight.made = vec![PreflightCheck::new(
+        "disk",
+        "9 GB",
+        "1 GB",
+        false,
+        "make room",
+    )];
+    refused(Vec::new(), preflight, &["disk"]);
+    refused(vec![Fault::IndenterReadBack], full(), &["devices"]);
+}

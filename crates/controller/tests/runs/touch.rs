@@ -1,0 +1,128 @@
+//! Presses that find the surface by touch, on the simulated rig whose skin does not lie where the frame says.
+
+use skinrig_controller::{ControlHandle, execute};
+use skinrig_model::*;
+use skinrig_protocol::plan::{Plan, Step};
+use skinrig_protocol::{Surface, TouchSearch};
+use skinrig_sim::config::SimConfig;
+use skinrig_sim::rig::simulated_rig;
+
+use crate::mock::{Sink, header};
+use crate::simulated::paced_plan;
+
+const SEARCH: TouchSearch = TouchSearch {
+    threshold_n: 0.15,
+    samples: 5,
+    speed_mm_s: 4.0,
+    band_mm: 1.0,
+    tare: HostDuration::from_millis(200),
+};
+
+fn touching_plan() -> Plan {
+    let mut plan = paced_plan();
+    for step in &mut plan.steps {
+        if let Step::Press(p) = step {
+            p.surface = Surface::Touch(SEARCH);
+            p.start_after_begin = None;
+            p.deadline = HostDuration::from_millis(6_000);
+        }
+    }
+    plan
+}
+
+/// Runs the plan with the skin `off_mm` above the place where the frame says it is.
+fn run(off_mm: f64, plan: &Plan) -> (RunEnd, Vec<PressOutcome>, Vec<PoseSample>) {
+    let config = SimConfig::new(5, SimLevel::Kinematic);
+    let mut rig = simulated_rig(&config);
+    rig.robot_from_skin.translation_mm[2] -= off_mm;
+    let header = RunHeader {
+        robot_from_skin: rig.robot_from_skin,
+        ..header(plan)
+    };
+    let mut sink = Sink::default();
+    let report = execute(plan, header, rig, &ControlHandle::new(), &mut sink);
+    assert!(report.retracted && report.disarmed, "{report:?}");
+    let (mut outcomes, mut poses) = (Vec::new(), Vec::new());
+    for record in sink.records {
+        match record {
+            Record::Outcome(o) => outcomes.push(o),
+            Record::Poses(p) => poses.extend(p),
+            _ => {}
+        }
+    }
+    (report.end, outcomes, poses)
+}
+
+#[test]
+fn the_depth_counts_from_the_touched_surface() {
+    for off_mm in [-0.5, 0.0, 0.6] {
+        let (end, outcomes, poses) = run(off_mm, &touching_plan());
+        assert_eq!(end, RunEnd::Completed);
+        assert_eq!(outcomes.len(), 3);
+        for o in outcomes {
+            assert_eq!(o.verdict, PressVerdict::Valid, "{off_mm}: {o:?}");
+            // 0.15 N are 0.25 mm of a skin of 0.6 N/mm; noise and viscosity take or give a little.
+            let touched = o.touched_mm.unwrap();
+            let late = off_mm - touched;
+            assert!((0.1..0.3).contains(&late), "{off_mm}: {touched}");
+            let depth = o.measured_depth_mm.unwrap();
+            assert!((depth - 2.0).abs() < 0.03, "{depth}");
+            // The contact is the moment of the touch, on the way down at the touched height.
+            let contact = o.timing.unwrap().contact;
+            let at = poses.iter().find(|p| p.t == contact).unwrap();
+            assert_eq!(at.measured.z_mm, touched);
+        }
+    }
+}
+
+#[test]
+fn a_surface_outside_its_band_is_refused_and_the_run_goes_on() {
+    for (off_mm, words) in [(1.5, "found a touch at once"), (-1.5, "found none down to")] {
+        let (end, outcomes, poses) = run(off_mm, &touching_plan());
+        assert_eq!(end, RunEnd::Completed);
+        assert_eq!(outcomes.len(), 3);
+        for o in outcomes {
+            let reason = o.verdict.reason().unwrap_or_default();
+            assert!(reason.contains(words), "{off_mm}: {reason}");
+            assert_eq!((o.touched_mm, o.measured_depth_mm), (None, None));
+        }
+        let lowest = poses.iter().map(|p| p.measured.z_mm).fold(9.0, f64::min);
+        assert!(lowest > -1.1, "it never indents: {lowest}");
+    }
+}
+
+#[test]
+fn the_floor_stays_where_it_is() {
+    let mut plan = touching_plan();
+    plan.limits.max_depth_mm = 2.5;
+    let (end, outcomes, poses) = run(-0.6, &plan);
+    assert_eq!(end, RunEnd::Completed);
+    for o in outcomes {
+        let reason = o.verdict.reason().unwrap_or_default();
+        assert!(reason.contains("above the floor at -2.5 mm"), "{reason}");
+    }
+    let lowest = poses.iter().map(|p| p.measured.z_mm).fold(9.0, f64::min);
+    assert!(lowest > -1.1, "{lowest}");
+}
+
+#[test]
+fn a_search_that_makes_no_sense_never_moves() {
+    for spoil in [
+        (|s: &mut TouchSearch| s.band_mm = 5.0) as fn(&mut TouchSearch),
+        |s| s.threshold_n = 9.0,
+        |s| s.samples = 0,
+        |s| s.speed_mm_s = f64::NAN,
+    ] {
+        let mut plan = touching_plan();
+        for step in &mut plan.steps {
+            if let Step::Press(p) = step
+                && let Surface::Touch(search) = &mut p.surface
+            {
+                spoil(search);
+            }
+        }
+        let (end, outcomes, _) = run(0.0, &plan);
+        assert!(matches!(end, RunEnd::Faulted(_)), "{end:?}");
+        assert_eq!(outcomes.len(), 0);
+    }
+}
