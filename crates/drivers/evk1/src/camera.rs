@@ -37,6 +37,8 @@ pub struct Evk1 {
     chunker: Chunker,
     report: StreamReport,
     notes: Vec<String>,
+    /// It was started before.
+    used: bool,
     gone: bool,
     closed: bool,
 }
@@ -95,6 +97,7 @@ impl Evk1 {
             chunker: Chunker::new(camera),
             report: StreamReport::default(),
             notes: Vec::new(),
+            used: false,
             gone: false,
             closed: false,
         })
@@ -255,7 +258,12 @@ impl Evk1 {
             Some(s) => (s.trigger_channels().to_vec(), s.sync()),
             None => (Vec::new(), SyncMode::default()),
         };
-        let mut registers = self.registers();
+        let mut report = StreamReport::default();
+        let mut registers =
+            Registers::new(self.transport.as_mut(), &self.config.read_back_exceptions);
+        if std::mem::replace(&mut self.used, true) {
+            report.left_over_bytes = sequences::clear_left_over(&mut registers)?;
+        }
         if !channels.is_empty() {
             // By the public driver's contract they are off after a stop.
             triggers::write(&mut registers, &channels)?;
@@ -269,7 +277,7 @@ impl Evk1 {
             .start_stream(Arc::clone(&inbox), &self.config)
             .map_err(|e| e.during("queueing transfers"))?;
         self.chunker.start(sync == SyncMode::Slave);
-        self.report = StreamReport::default();
+        self.report = report;
         let clock = &mut self.clock;
         let mut wait = |span: Duration| {
             let span = i64::try_from(span.as_nanos()).unwrap_or(i64::MAX);

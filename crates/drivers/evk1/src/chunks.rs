@@ -17,6 +17,9 @@ pub struct Chunker {
     gate: Gate,
     after_loss: bool,
     watch: Watch,
+    /// Nothing of this stream has a time yet.
+    fresh: bool,
+    last_us: u64,
 }
 
 impl Chunker {
@@ -30,6 +33,8 @@ impl Chunker {
             gate: Gate::AwaitTime,
             after_loss: false,
             watch: Watch::default(),
+            fresh: true,
+            last_us: 0,
         }
     }
 
@@ -41,6 +46,7 @@ impl Chunker {
             Gate::AwaitTime
         };
         self.after_loss = false;
+        self.fresh = true;
         self.watch.reset();
     }
 
@@ -83,6 +89,12 @@ impl Chunker {
         self.watch
             .look(&bytes, arrived, |jump| report.add_jump(jump));
         let (facts, triggers) = self.scanner.push(&bytes);
+        if let (Some(first), Some(last)) = (facts.first_us, facts.last_us) {
+            if std::mem::replace(&mut self.fresh, false) && first < self.last_us {
+                report.restarted = Some((self.last_us, first));
+            }
+            self.last_us = last;
+        }
         chunks.push(RawChunk {
             camera: self.camera,
             seq: self.seq,

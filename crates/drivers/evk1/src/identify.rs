@@ -1,6 +1,7 @@
 //! Which of the devices on the bus are EVK1 Gen3.1 cameras. Other cameras share their USB IDs and must not receive
 //! EVK1 requests, so the descriptors are read first.
 
+use std::fmt;
 use std::time::Duration;
 
 use skinrig_device::{Clock, RealClock};
@@ -9,7 +10,7 @@ use skinrig_model::HostDuration;
 use crate::access::Registers;
 use crate::error::{Evk1Error, UsbError};
 use crate::registers::{ATIS_CONTROL, FPGA_VERSION, SERIAL_MSB, request};
-use crate::usb::{Access, LibUsb, Transport, bus};
+use crate::usb::{Access, LibUsb, Slot, Transport, bus};
 
 /// What to do when a user may not open the camera.
 pub const UDEV_STEP: &str = "write `SUBSYSTEM==\"usb\", ATTR{idVendor}==\"04b4\", MODE=\"0666\"` to \
@@ -96,36 +97,61 @@ impl Found {
 /// [`UsbError::NoUsb`] on a machine without USB.
 pub fn enumerate() -> Result<Vec<Found>, UsbError> {
     let clock = RealClock::start();
-    let mut all = Vec::new();
-    for slot in bus()? {
-        let state = match slot.open(clock) {
-            Ok(Access::Open(mut usb)) => state_of(identify(&mut usb, &mut clock.clone())),
-            Ok(Access::Treuzell) => FoundState::NotEvk1(TREUZELL.to_owned()),
-            Err(e) => state_of(Err(e.during("opening"))),
-        };
-        all.push(Found {
-            place: slot.place(),
-            state,
-        });
-    }
-    Ok(all)
+    Ok(bus()?.iter().map(|slot| ask_slot(slot, clock).0).collect())
+}
+
+/// Asks one device, and hands over the camera that it may be.
+fn ask_slot(slot: &Slot, clock: RealClock) -> (Found, Option<LibUsb>) {
+    let (state, camera) = match slot.open(clock) {
+        Ok(Access::Open(mut usb)) => match identify(&mut usb, &mut clock.clone()) {
+            Ok(identity) => (FoundState::Ready(identity), Some(usb)),
+            Err(e) => (FoundState::of(e), None),
+        },
+        Ok(Access::Treuzell) => (FoundState::NotEvk1(TREUZELL.to_owned()), None),
+        Err(e) => (FoundState::of(e.during("opening")), None),
+    };
+    let place = slot.place();
+    (Found { place, state }, camera)
 }
 
 const TREUZELL: &str = "a Treuzell camera (EVK3, EVK4 or alike: interface subclass 0x19), which shares its USB IDs with the EVK1";
 
-fn state_of(answer: Result<Identity, Evk1Error>) -> FoundState {
-    match answer {
-        Ok(identity) => FoundState::Ready(identity),
-        Err(Evk1Error::Usb {
-            cause: UsbError::Busy,
-            ..
-        }) => FoundState::Busy,
-        Err(Evk1Error::Usb {
-            cause: UsbError::NoPermission,
-            ..
-        }) => FoundState::NoPermission,
-        Err(Evk1Error::NotEvk1 { found, .. }) => FoundState::NotEvk1(found),
-        Err(e) => FoundState::Faulty(e.to_string()),
+impl FoundState {
+    fn of(error: Evk1Error) -> Self {
+        match error {
+            Evk1Error::Usb {
+                cause: UsbError::Busy,
+                ..
+            } => Self::Busy,
+            Evk1Error::Usb {
+                cause: UsbError::NoPermission,
+                ..
+            } => Self::NoPermission,
+            Evk1Error::NotEvk1 { found, .. } => Self::NotEvk1(found),
+            e => Self::Faulty(e.to_string()),
+        }
+    }
+}
+
+impl fmt::Display for FoundState {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Ready(id) => write!(f, "EVK1 Gen3.1, serial {}, {}", id.serial, id.firmware()),
+            Self::Busy => write!(f, "held by another program"),
+            Self::NoPermission => write!(f, "no permission to open it"),
+            Self::NotEvk1(what) => write!(f, "not an EVK1 Gen3.1: {what}"),
+            Self::Faulty(what) => write!(f, "does not answer as it should: {what}"),
+        }
+    }
+}
+
+impl fmt::Display for Found {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: {}", self.place, self.state)?;
+        match self.next_step() {
+            Some(step) => write!(f, " ({step})"),
+            None => Ok(()),
+        }
     }
 }
 
@@ -136,16 +162,16 @@ fn state_of(answer: Result<Identity, Evk1Error>) -> FoundState {
 pub(crate) fn open_serial(serial: &str, clock: RealClock) -> Result<LibUsb, Evk1Error> {
     let mut others = Vec::new();
     for slot in bus().map_err(|e| e.during("listing USB devices"))? {
-        let seen = match slot.open(clock) {
-            Ok(Access::Open(mut usb)) => match identify(&mut usb, &mut clock.clone()) {
-                Ok(identity) if identity.serial == serial => return Ok(usb),
-                Ok(identity) => format!("an EVK1 with serial {}", identity.serial),
-                Err(e) => e.to_string(),
-            },
-            Ok(Access::Treuzell) => TREUZELL.to_owned(),
-            Err(e) => e.to_string(),
-        };
-        others.push(format!("{} ({seen})", slot.place()));
+        match ask_slot(&slot, clock) {
+            (
+                Found {
+                    state: FoundState::Ready(identity),
+                    ..
+                },
+                Some(camera),
+            ) if identity.serial == serial => return Ok(camera),
+            (other, _) => others.push(other.to_string()),
+        }
     }
     Err(Evk1Error::NotFound {
         serial: serial.to_owned(),

@@ -13,6 +13,8 @@ const KEPT: usize = 16;
 pub struct StreamReport {
     /// Bytes at the start that had no time: before the first TIME_HIGH word, and, on a slave, before its time advanced.
     pub discarded_bytes: u64,
+    /// Bytes that the stream before had left in the camera's buffers, let go before this one began.
+    pub left_over_bytes: u64,
     /// Bytes lost since, which `lost_before` of the chunks says as well.
     pub lost_bytes: u64,
     /// How often bytes were lost.
@@ -25,6 +27,8 @@ pub struct StreamReport {
     pub jump_count: u64,
     /// The first jumps.
     pub jumps: Vec<TimeJump>,
+    /// The last time of the stream before and the first of this one, µs, when time began again at the start.
+    pub restarted: Option<(u64, u64)>,
     /// OVERFLOW_HITCOUNT at start and at stop, as read; its meaning is not public. `None` while streaming, and when the
     /// camera was gone.
     pub overflow_hits: Option<(u16, u16)>,
@@ -57,6 +61,12 @@ impl StreamReport {
                 self.discarded_bytes
             ));
         }
+        if self.left_over_bytes > 0 {
+            notes.push(format!(
+                "{} bytes left over from the stream before were let go",
+                self.left_over_bytes
+            ));
+        }
         if self.loss_count > 0 {
             notes.push(format!(
                 "{} bytes were lost on the host in {} gaps of {} together",
@@ -67,6 +77,11 @@ impl StreamReport {
             notes.push(format!(
                 "the time base jumped {} times, first from {} to {} µs at {}: the camera lost events or its time",
                 self.jump_count, first.from_us, first.to_us, first.arrived
+            ));
+        }
+        if let Some((last, first)) = self.restarted {
+            notes.push(format!(
+                "the time base began again: {first} µs after {last} µs of the stream before"
             ));
         }
         if let Some((before, after)) = self.overflow_hits

@@ -9,7 +9,7 @@ use std::time::Duration;
 use skinrig_model::{SENSOR_HEIGHT, SENSOR_WIDTH};
 
 use crate::access::Registers;
-use crate::error::{Evk1Error, UsbError};
+use crate::error::Evk1Error;
 use crate::registers as r;
 use crate::roi::Map;
 
@@ -186,6 +186,33 @@ pub fn stop(registers: &mut Registers<'_>) -> Result<(), Evk1Error> {
     registers.set(r::STEREO_MERGE_ENABLE, 0)
 }
 
+/// Longest wait for bytes that may not be there.
+const READ_LIMIT: Duration = Duration::from_millis(100);
+
+fn read_events(registers: &mut Registers<'_>, buffer: &mut [u8]) -> Result<usize, Evk1Error> {
+    let read = registers.transport().read_events(buffer, READ_LIMIT);
+    read.map_err(|e| e.during("emptying the event endpoint"))
+}
+
+/// Empties what a stopped stream has left in the buffers between sensor and host, which would come first at the next
+/// start, with times of its own; returns the number of bytes. The public driver leaves them there.
+///
+/// # Errors
+/// [`Evk1Error::Usb`].
+pub fn clear_left_over(registers: &mut Registers<'_>) -> Result<u64, Evk1Error> {
+    /// More than any buffer on the way holds: what still comes then is no rest.
+    const ENOUGH_BYTES: u64 = 16 << 20;
+    let mut buffer = vec![0; 128 << 10];
+    let mut total = 0;
+    while total <= ENOUGH_BYTES {
+        match read_events(registers, &mut buffer)? {
+            0 => break,
+            n => total += n as u64,
+        }
+    }
+    Ok(total)
+}
+
 /// Powers down, and empties what is left in the camera's and the host's buffers: up to 8 rounds, ended by a round
 /// that brings nothing or by 300 000 bytes.
 ///
@@ -194,21 +221,16 @@ pub fn stop(registers: &mut Registers<'_>) -> Result<(), Evk1Error> {
 pub fn close(registers: &mut Registers<'_>) -> Result<(), Evk1Error> {
     const ROUNDS: u32 = 8;
     const ENOUGH_BYTES: usize = 300_000;
-    const LIMIT: Duration = Duration::from_millis(100);
-    let doing = |e: UsbError| e.during("emptying the event endpoint");
     power_down(registers)?;
-    registers.transport().clear_halt().map_err(doing)?;
+    let cleared = registers.transport().clear_halt();
+    cleared.map_err(|e| e.during("clearing the event endpoint"))?;
     let mut total = 0;
     for _ in 0..ROUNDS {
         let before = total;
         registers.write_blind(r::TRIGGERS, 0)?;
         let mut buffer = [0; 1024];
         while total <= ENOUGH_BYTES {
-            match registers
-                .transport()
-                .read_events(&mut buffer, LIMIT)
-                .map_err(doing)?
-            {
+            match read_events(registers, &mut buffer)? {
                 0 => break,
                 n => total += n,
             }

@@ -70,6 +70,7 @@ pub fn bus() -> Result<Vec<Slot>, UsbError> {
             });
         }
     }
+    slots.sort_by_key(|slot| (slot.device.bus_number(), slot.device.address()));
     Ok(slots)
 }
 
@@ -139,6 +140,16 @@ pub struct LibUsb {
     stalled: bool,
 }
 
+impl LibUsb {
+    /// Clears the stall that ended the stream before, if one did.
+    fn unstall(&mut self) -> Result<(), UsbError> {
+        if std::mem::take(&mut self.stalled) {
+            self.handle.clear_halt(EVENT_ENDPOINT)?;
+        }
+        Ok(())
+    }
+}
+
 impl Transport for LibUsb {
     fn control_in(
         &mut self,
@@ -181,6 +192,7 @@ impl Transport for LibUsb {
     }
 
     fn read_events(&mut self, buffer: &mut [u8], limit: Duration) -> Result<usize, UsbError> {
+        self.unstall()?;
         match self.handle.read_bulk(EVENT_ENDPOINT, buffer, limit) {
             Err(rusb::Error::Timeout) => Ok(0),
             other => Ok(other?),
@@ -189,9 +201,7 @@ impl Transport for LibUsb {
 
     fn start_stream(&mut self, inbox: Arc<Inbox>, config: &Evk1Config) -> Result<(), UsbError> {
         self.stop_stream()?;
-        if std::mem::take(&mut self.stalled) {
-            self.clear_halt()?;
-        }
+        self.unstall()?;
         let (context, handle) = (self.context.clone(), Arc::clone(&self.handle));
         self.stream = Some(Transfers::start(
             context, handle, inbox, self.clock, config,

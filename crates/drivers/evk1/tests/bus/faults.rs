@@ -1,0 +1,115 @@
+//! What goes wrong: every wait ends, every fault has a name, and what came before is handed over.
+
+use skinrig_device::{CameraSettings, DeviceError, EventCamera, RealClock};
+use skinrig_emulated_camera::harness::on_bus;
+use skinrig_emulated_camera::steer::Order;
+use skinrig_evk1::{Evk1, Evk1Config, FoundState, enumerate};
+use skinrig_model::CameraId;
+
+use crate::bench::{FIRST, events, noise, open, until};
+
+#[test]
+fn a_pulled_cable_is_named_and_the_camera_comes_back() {
+    let test = "faults::a_pulled_cable_is_named_and_the_camera_comes_back";
+    on_bus(test, vec![noise(FIRST).into()], |remote| {
+        let mut camera = open(FIRST);
+        camera.start().unwrap();
+        let mut chunks = Vec::new();
+        until(&mut camera, &mut chunks, |c| events(c) > 100).unwrap();
+        remote.order(FIRST, Order::Unplug).unwrap();
+        let lost = until(&mut camera, &mut chunks, |_| false).unwrap_err();
+        assert!(
+            lost.to_string().contains("the device is gone from the bus"),
+            "{lost}"
+        );
+        camera.stop(&mut chunks).unwrap_err();
+        camera.stop(&mut chunks).unwrap();
+        camera.start().unwrap_err();
+        let handed = remote.observe(FIRST).unwrap().handed.bytes;
+        let kept: usize = chunks.iter().map(|c| c.bytes.len()).sum();
+        let lost: u64 = chunks.iter().map(|c| c.lost_before).sum();
+        assert_eq!(kept as u64 + lost, handed);
+        drop(camera);
+        remote.order(FIRST, Order::Plug).unwrap();
+        let mut camera = open(FIRST);
+        camera.start().unwrap();
+        until(&mut camera, &mut Vec::new(), |c| events(c) > 100).unwrap();
+    });
+}
+
+#[test]
+fn a_stall_ends_the_stream_and_the_next_start_clears_it() {
+    let test = "faults::a_stall_ends_the_stream_and_the_next_start_clears_it";
+    on_bus(test, vec![noise(FIRST).into()], |remote| {
+        let mut camera = open(FIRST);
+        camera.start().unwrap();
+        let mut chunks = Vec::new();
+        until(&mut camera, &mut chunks, |c| events(c) > 100).unwrap();
+        remote.order(FIRST, Order::Stall).unwrap();
+        let lost = until(&mut camera, &mut chunks, |_| false).unwrap_err();
+        assert!(lost.to_string().contains("the endpoint stalled"), "{lost}");
+        camera.stop(&mut chunks).unwrap_err();
+        camera.start().unwrap();
+        let before = events(&chunks);
+        until(&mut camera, &mut chunks, |c| events(c) > before + 100).unwrap();
+        camera.stop(&mut chunks).unwrap();
+    });
+}
+
+#[test]
+fn a_register_that_does_not_take_a_value_is_named() {
+    let test = "faults::a_register_that_does_not_take_a_value_is_named";
+    on_bus(test, vec![noise(FIRST).into()], |remote| {
+        let mut camera = open(FIRST);
+        remote.order(FIRST, Order::Stick(0x0358)).unwrap();
+        let settings = CameraSettings {
+            biases: [("bias_fo".to_owned(), 1600)].into(),
+            ..CameraSettings::default()
+        };
+        let error = camera.configure(&settings).unwrap_err();
+        assert!(matches!(error, DeviceError::ReadBack { .. }));
+        insta::assert_snapshot!(error, @r"
+camera 1 00001621: bgen_22 (0x0358): expected 0x71002100 after writing, found 0x71003d00
+");
+    });
+}
+
+#[test]
+fn a_camera_that_stops_answering_is_given_up_in_time() {
+    let test = "faults::a_camera_that_stops_answering_is_given_up_in_time";
+    on_bus(test, vec![noise(FIRST).into()], |remote| {
+        let mut camera = open(FIRST);
+        remote.order(FIRST, Order::Silence(true)).unwrap();
+        let lost = camera.start().unwrap_err();
+        assert!(
+            lost.to_string().contains("no answer within the time limit"),
+            "{lost}"
+        );
+        drop(camera);
+        let found = enumerate().unwrap();
+        assert!(matches!(found[0].state, FoundState::Faulty(_)), "{found:?}");
+        remote.order(FIRST, Order::Silence(false)).unwrap();
+        remote.order(FIRST, Order::FailReads(true)).unwrap();
+        let (config, clock) = (Evk1Config::default(), RealClock::start());
+        let error = Evk1::open_serial(FIRST, CameraId::One, config, clock)
+            .err()
+            .unwrap();
+        assert!(
+            error.to_string().contains("expected status 0x40"),
+            "{error}"
+        );
+    });
+}
+
+/// Transfers are cancelled and freed however the camera is let go.
+#[test]
+fn a_streaming_camera_can_be_dropped() {
+    let test = "faults::a_streaming_camera_can_be_dropped";
+    on_bus(test, vec![noise(FIRST).into()], |_| {
+        for _ in 0..3 {
+            let mut camera = open(FIRST);
+            camera.start().unwrap();
+            drop(camera);
+        }
+    });
+}

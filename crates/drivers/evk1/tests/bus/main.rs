@@ -1,0 +1,9 @@
+//! The whole driver, libusb included, on an emulated bus: production code down to the system calls.
+#![cfg(target_os = "linux")]
+#![expect(clippy::unwrap_used, reason = "tests")]
+
+mod bench;
+mod devices;
+mod faults;
+mod stream;
+mod time;

@@ -1,0 +1,159 @@
+//! Bytes: all of them, in order, as they were sent; and what is lost is known.
+
+use skinrig_device::{EventCamera, RealClock};
+use skinrig_emulated_camera::Evk1Config as Emulated;
+use skinrig_emulated_camera::config::{Content, Pacing};
+use skinrig_emulated_camera::harness::on_bus;
+use skinrig_emulated_camera::steer::Order;
+use skinrig_evk1::{Evk1, Evk1Config};
+use skinrig_formats::{Decoder, Scanner};
+use skinrig_model::{CameraId, RawChunk, StreamFormat};
+
+use crate::bench::{FIRST, bytes, events, noise, open, until};
+
+/// Chunks that do not lose anything are the stream, and their facts are those of a scan from its beginning.
+fn check_facts(chunks: &[RawChunk]) {
+    let mut scanner = Scanner::new(StreamFormat::Evt2);
+    for chunk in chunks {
+        let (facts, triggers) = scanner.push(&chunk.bytes);
+        assert_eq!((facts, &triggers), (chunk.facts, &chunk.triggers));
+        assert_eq!(chunk.bytes.len() % 4, 0);
+    }
+}
+
+#[test]
+fn what_the_camera_handed_over_is_what_the_chunks_hold() {
+    let dense = Emulated {
+        content: Content::Dense { mev_per_s: 10.0 },
+        pacing: Pacing::HostTime,
+        ..Emulated::new(FIRST)
+    };
+    let test = "stream::what_the_camera_handed_over_is_what_the_chunks_hold";
+    on_bus(test, vec![dense.into()], |remote| {
+        let mut camera = open(FIRST);
+        camera.start().unwrap();
+        let mut chunks = Vec::new();
+        until(&mut camera, &mut chunks, |c| events(c) > 5_000_000).unwrap();
+        camera.stop(&mut chunks).unwrap();
+        let handed = remote.observe(FIRST).unwrap().handed;
+        assert_eq!(camera.report().lost_bytes, 0);
+        assert_eq!(camera.report().discarded_bytes, 0);
+        assert_eq!(camera.report().jump_count, 0);
+        let all = bytes(&chunks);
+        assert_eq!(handed.bytes, all.len() as u64);
+        assert_eq!(handed.crc32, crc32fast::hash(&all));
+        check_facts(&chunks);
+    });
+}
+
+#[test]
+fn transfers_that_end_within_a_word_change_nothing() {
+    let test = "stream::transfers_that_end_within_a_word_change_nothing";
+    on_bus(test, vec![noise(FIRST).into()], |remote| {
+        let mut camera = open(FIRST);
+        camera.start().unwrap();
+        let mut chunks = Vec::new();
+        for cut in [1, 2, 3, 1] {
+            remote.order(FIRST, Order::Cut(cut)).unwrap();
+            let before = chunks.len();
+            until(&mut camera, &mut chunks, |c| c.len() > before + 20).unwrap();
+        }
+        camera.stop(&mut chunks).unwrap();
+        let all = bytes(&chunks);
+        let mut decoder = Decoder::new(StreamFormat::Evt2);
+        decoder.for_each_slice(&all, |_| {});
+        assert_eq!(decoder.stats().skipped_words(), 0, "no word may be torn");
+        assert_eq!(camera.report().jump_count, 0);
+        let lost: u64 = chunks.iter().map(|c| c.lost_before).sum();
+        let handed = remote.observe(FIRST).unwrap().handed;
+        assert_eq!(handed.bytes, all.len() as u64 + lost);
+        assert!(lost < 4, "at most the beginning of the last word");
+        check_facts(&chunks);
+    });
+}
+
+#[test]
+fn garbage_is_kept_as_it_came_and_breaks_nothing() {
+    let test = "stream::garbage_is_kept_as_it_came_and_breaks_nothing";
+    on_bus(test, vec![noise(FIRST).into()], |remote| {
+        let mut camera = open(FIRST);
+        camera.start().unwrap();
+        let mut chunks = Vec::new();
+        let garbage = vec![0x2bad_cafe, 0xb000_0001, 0xf123_4567, 0x7fff_ffff];
+        remote
+            .order(FIRST, Order::Garbage(garbage.clone()))
+            .unwrap();
+        let wanted: Vec<u8> = garbage.iter().flat_map(|w| w.to_le_bytes()).collect();
+        until(&mut camera, &mut chunks, |c| {
+            bytes(c).windows(wanted.len()).any(|w| w == wanted)
+        })
+        .unwrap();
+        camera.stop(&mut chunks).unwrap();
+        check_facts(&chunks);
+    });
+}
+
+/// The driver's owner sleeps: the pipe keeps moving, so that the camera itself loses nothing, and the host knows how
+/// much it lost.
+#[test]
+fn a_driver_that_is_not_asked_never_blocks_the_pipe() {
+    let test = "stream::a_driver_that_is_not_asked_never_blocks_the_pipe";
+    let camera = Emulated {
+        content: Content::Dense { mev_per_s: 2.0 },
+        pacing: Pacing::HostTime,
+        ..Emulated::new(FIRST)
+    };
+    on_bus(test, vec![camera.into()], |remote| {
+        let config = Evk1Config {
+            chunk_bytes: 128 << 10,
+            backlog_bytes: 1 << 20,
+            ..Evk1Config::default()
+        };
+        let clock = RealClock::start();
+        let mut camera = Evk1::open_serial(FIRST, CameraId::One, config, clock).unwrap();
+        camera.start().unwrap();
+        let mut chunks = Vec::new();
+        until(&mut camera, &mut chunks, |_| {
+            remote.observe(FIRST).unwrap().handed.bytes > 1 << 20
+        })
+        .unwrap();
+        let handed = || remote.observe(FIRST).unwrap().handed.bytes;
+        let asleep = handed() + (8 << 20);
+        while handed() < asleep {
+            std::thread::yield_now();
+        }
+        camera.poll(&mut chunks).unwrap();
+        camera.stop(&mut chunks).unwrap();
+        let lost: u64 = chunks.iter().map(|c| c.lost_before).sum();
+        assert!(lost > 6 << 20, "{lost}");
+        assert_eq!(lost, camera.report().lost_bytes);
+        assert_eq!(handed(), lost + bytes(&chunks).len() as u64);
+        // After a gap the stream goes on with a time.
+        for pair in chunks.windows(2) {
+            if pair[1].lost_before > 0 && !pair[1].bytes.is_empty() {
+                assert_eq!(pair[1].bytes[3] >> 4, 8);
+            }
+        }
+        assert!(chunks.is_sorted_by_key(|c| c.host_time));
+        let times: Vec<u64> = chunks.iter().filter_map(|c| c.facts.first_us).collect();
+        assert!(times.is_sorted());
+    });
+}
+
+#[test]
+fn what_an_earlier_session_left_behind_does_not_come_first() {
+    let camera = Emulated {
+        stale_words: 5000,
+        ..noise(FIRST)
+    };
+    let test = "stream::what_an_earlier_session_left_behind_does_not_come_first";
+    on_bus(test, vec![camera.into()], |_| {
+        let mut camera = open(FIRST);
+        camera.start().unwrap();
+        let mut chunks = Vec::new();
+        until(&mut camera, &mut chunks, |c| events(c) > 1000).unwrap();
+        camera.stop(&mut chunks).unwrap();
+        assert_eq!(camera.report().jump_count, 0, "{:?}", camera.report());
+        assert!(chunks[0].facts.first_us.unwrap() < 1000);
+    });
+}
