@@ -110,7 +110,7 @@ static uint8_t mark(const uint8_t *p, uint8_t n)
 {
     if (n != 8)
         return RESULT_BAD_ARGUMENT;
-    uint32_t number = take_32(p), payload = take_32(p + 4), kind = payload >> PRESS_BITS;
+    uint32_t number = take_32(p), data = take_32(p + 4), kind = data >> PRESS_BITS;
     if (number == mark_number && number != 0) {
         append_64(mark_start);
         return RESULT_OK;
@@ -121,7 +121,7 @@ static uint8_t mark(const uint8_t *p, uint8_t n)
         return RESULT_BAD_ARGUMENT;
     if (!armed)
         return RESULT_NOT_ARMED;
-    if (!train_mark(payload, &mark_start))
+    if (!train_mark(data, &mark_start))
         return RESULT_BUSY;
     mark_number = number;
     append_64(mark_start);

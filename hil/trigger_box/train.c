@@ -22,8 +22,8 @@
 
 struct train {
     uint8_t kind;       // event_kind
-    uint32_t payload;   // 20 bits
-    uint32_t widths;    // bit k: pulse k is long; the start pulse apart
+    uint32_t data;      // 20 bits
+    uint32_t bits;      // of all pulses, the first on top; that of the start pulse means nothing
     uint64_t start;     // first rising edge
 };
 
@@ -33,6 +33,7 @@ static volatile bool waiting; // `next` begins after `current`
 static struct train current, next;
 
 static uint8_t pulse;       // of the current train
+static uint32_t bits_left;  // of the current train, that of the present pulse on top
 static bool high;           // the outputs are up
 static uint32_t rise;       // lower 32 bits of the present pulse's rising edge
 static uint32_t due;        // lower 32 bits of the next edge
@@ -68,16 +69,17 @@ static inline bool write_at(uint16_t at, uint8_t value)
     return late & 0x80;
 }
 
-static uint32_t width_us(uint8_t k)
+static uint32_t width_us(void)
 {
-    if (k == 0)
+    if (pulse == 0)
         return START_WIDTH_US;
-    return (current.widths >> k) & 1 ? ONE_WIDTH_US : ZERO_WIDTH_US;
+    return bits_left >> 31 ? ONE_WIDTH_US : ZERO_WIDTH_US;
 }
 
 static void begin(void)
 {
     pulse = 0;
+    bits_left = current.bits;
     high = false;
     rise = due = (uint32_t)current.start;
     state = ACTIVE;
@@ -104,9 +106,10 @@ ISR(TIMER1_COMPA_vect)
             else
                 ++counts.syncs;
             uint32_t press_mask = (1UL << PRESS_BITS) - 1;
-            events_push(current.kind, mark ? current.payload : current.payload & press_mask, current.start);
+            events_push(current.kind, mark ? current.data : current.data & press_mask, current.start);
         }
-        due = rise + width_us(pulse) * TICKS_PER_US;
+        due = rise + width_us() * TICKS_PER_US;
+        bits_left <<= 1;
     } else if (++pulse < PULSES_PER_TRAIN) {
         rise += PULSE_PERIOD_US * TICKS_PER_US;
         due = rise;
@@ -122,20 +125,24 @@ ISR(TIMER1_COMPA_vect)
     OCR1A = (uint16_t)due - (uint16_t)LEAD_TICKS;
 }
 
-// Bits `widths` of a train: pulse 1 is the payload's first bit, the last pulse its parity.
-static uint32_t widths_of(uint32_t payload)
+// The remainder of data * x^11 by the generator over GF(2), masked.
+static uint16_t check_bits(uint32_t data)
 {
-    uint32_t widths = 0;
-    bool odd = false;
-    for (uint8_t k = 1; k <= PAYLOAD_BITS; ++k) {
-        if ((payload >> (PAYLOAD_BITS - k)) & 1) {
-            widths |= 1UL << k;
-            odd = !odd;
-        }
+    uint16_t rest = 0;
+    for (uint32_t bit = 1UL << (DATA_BITS - 1); bit; bit >>= 1) {
+        bool one = (rest >> (CHECK_BITS - 1)) & 1;
+        if (data & bit)
+            one = !one;
+        rest = (rest << 1) & ((1 << CHECK_BITS) - 1);
+        if (one)
+            rest ^= GENERATOR;
     }
-    if (odd)
-        widths |= 1UL << (PULSES_PER_TRAIN - 1);
-    return widths;
+    return rest ^ CHECK_MASK;
+}
+
+static struct train train_of(uint8_t kind, uint32_t data)
+{
+    return (struct train){.kind = kind, .data = data, .bits = data << CHECK_BITS | check_bits(data)};
 }
 
 // The earliest whole microsecond at which a train may begin.
@@ -155,9 +162,9 @@ void train_setup(void)
     TIMSK1 |= _BV(OCIE1A);
 }
 
-bool train_mark(uint32_t payload, uint64_t *start)
+bool train_mark(uint32_t data, uint64_t *start)
 {
-    struct train t = {.kind = EVENT_MARK, .payload = payload, .widths = widths_of(payload)};
+    struct train t = train_of(EVENT_MARK, data);
     bool taken = false;
     ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
     {
@@ -178,8 +185,7 @@ bool train_mark(uint32_t payload, uint64_t *start)
 
 bool train_sync(uint32_t count)
 {
-    uint32_t payload = (SYNC_CODE << PRESS_BITS) | (count & ((1UL << PRESS_BITS) - 1));
-    struct train t = {.kind = EVENT_SYNC, .payload = payload, .widths = widths_of(payload)};
+    struct train t = train_of(EVENT_SYNC, SYNC_CODE << PRESS_BITS | (count & ((1UL << PRESS_BITS) - 1)));
     bool taken = false;
     ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
     {

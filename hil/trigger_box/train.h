@@ -7,17 +7,22 @@
 #define ONE_WIDTH_US 200UL
 #define ZERO_WIDTH_US 100UL
 #define PULSE_PERIOD_US 400UL
-#define PAYLOAD_BITS 20
-#define PULSES_PER_TRAIN (PAYLOAD_BITS + 2)
-#define TRAIN_US (PULSES_PER_TRAIN * PULSE_PERIOD_US)
+#define DATA_BITS 20
+#define CHECK_BITS 11
+#define PULSES_PER_TRAIN (1 + DATA_BITS + CHECK_BITS)
+// A train and two periods of rest.
+#define TRAIN_US ((PULSES_PER_TRAIN + 2) * PULSE_PERIOD_US)
 #define PRESS_BITS 17
+// x^11 + x^8 + x^7 + x^5 + x^4 + x^3 + x + 1 without its highest term, and what the check bits are XORed with.
+#define GENERATOR 0x1bb
+#define CHECK_MASK 0x7fd
 #define SYNC_CODE 6UL
 
 void train_setup(void);
 
 // Starts the train of a mark (kind above bit 17, press below) as soon as the line is free and sets `*start` to the
 // instant of its first rising edge. False while the train of another mark is under way or waits.
-bool train_mark(uint32_t payload, uint64_t *start);
+bool train_mark(uint32_t data, uint64_t *start);
 
 // Starts the sync train number `count` unless any train is under way.
 bool train_sync(uint32_t count);

@@ -355,6 +355,8 @@ static void obey(struct client *c, char *line)
         c->wants_edges = true;
     } else if (!strcmp(line, "times")) {
         c->wants_times = true;
+    } else if (!strcmp(line, "cycle")) {
+        ; // the answer tells it
     } else if (!strcmp(line, "clock")) {
         tell(c, "clock %lld %.17g %s\n", (long long)start_ns, cycles_per_ns, free_running ? "free" : "paced");
         return;

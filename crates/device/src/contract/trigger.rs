@@ -1,6 +1,6 @@
 //! What every trigger box must do.
 
-use skinrig_model::{HostDuration, HostTime, Mark};
+use skinrig_model::{HostDuration, HostTime, Mark, SentMark};
 
 use super::{TICK, pass};
 use crate::{Clock, DeviceError, TriggerBox};
@@ -47,14 +47,14 @@ pub fn trigger_box(
             last.is_none_or(|l| l < sent.t),
             "trigger box: instants out of order"
         );
-        let mut free = sent.t + train;
         last = Some(sent.t);
+        let mut free = over_for_certain(sent, train);
         match device.send(mark) {
             Err(DeviceError::State { .. }) => {}
             // On a real clock the train may be over before the question reaches the box.
-            Ok(again) if clock.now() >= free => {
-                free = again.t + train;
+            Ok(again) if clock.now() >= sent.t + train + HostDuration(-sent.uncertainty_ns) => {
                 last = Some(again.t);
+                free = over_for_certain(again, train);
             }
             other => {
                 panic!("trigger box: a mark during a train must be a State error: found {other:?}")
@@ -63,4 +63,9 @@ pub fn trigger_box(
         let wait = free - clock.now() + TICK;
         pass(clock.as_mut(), wait, || {});
     }
+}
+
+/// When the train of `sent` is over, at the latest.
+fn over_for_certain(sent: SentMark, train: HostDuration) -> HostTime {
+    sent.t + train + HostDuration(sent.uncertainty_ns)
 }

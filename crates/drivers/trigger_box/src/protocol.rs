@@ -1,7 +1,7 @@
 //! What host and box say to each other. Twin of `hil/trigger_box/protocol.h`; the table is in `hil/trigger_box/README.md`.
 
 use skinrig_model::pulse::{MAX_MARKED_PRESS, SYNC_CODE};
-use skinrig_model::{BoxTime, Mark, MarkKind, PressId};
+use skinrig_model::{BoxTime, Mark, MarkKind, PressId, PulseTrain};
 
 /// The version of the protocol that this driver speaks.
 pub const PROTOCOL_VERSION: u8 = 1;
@@ -19,8 +19,8 @@ pub const BAUD_RATE: u32 = 250_000;
 pub const TICKS_PER_US: u64 = 16;
 /// The longest serial number, characters.
 pub const MAX_SERIAL: usize = 16;
-/// The shortest period of sync trains, ms: twice a train.
-pub const MIN_SYNC_PERIOD_MS: u16 = 18;
+/// The shortest period of sync trains, ms: twice a train, so that marks find room between them.
+pub const MIN_SYNC_PERIOD_MS: u16 = (2 * PulseTrain::DURATION_US).div_ceil(1_000) as u16;
 
 const REPLY: u8 = 0x80;
 const HELLO: u8 = 0x01;
@@ -124,9 +124,9 @@ impl Request {
         match self {
             Self::Arm { silence_ms } => body.extend_from_slice(&silence_ms.to_le_bytes()),
             Self::Mark { number, mark } => {
-                let payload = (mark.kind.code() << 17) | mark.press.0;
+                let data = (mark.kind.code() << 17) | mark.press.0;
                 body.extend_from_slice(&number.to_le_bytes());
-                body.extend_from_slice(&payload.to_le_bytes());
+                body.extend_from_slice(&data.to_le_bytes());
             }
             Self::Sync { period_ms, first } => {
                 body.extend_from_slice(&period_ms.to_le_bytes());

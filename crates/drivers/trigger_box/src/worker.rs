@@ -287,8 +287,9 @@ impl Worker {
         let Ok(answer) = self.ask(&Request::Events { from }, once) else {
             return; // asked again for the same ones soon
         };
-        let Ok(events) = self.expect_events(&answer) else {
-            return;
+        let events = match self.expect_events(&answer) {
+            Ok(events) => events,
+            Err(fault) => return self.remember(fault),
         };
         if events.dropped != self.dropped {
             let lost = events.dropped.wrapping_sub(self.dropped);
@@ -335,9 +336,12 @@ impl Worker {
         );
     }
 
-    /// Remembers a fault for the next poll.
     fn fault(&self, expected: &str, found: String) {
-        let fault = self.state(expected, found);
+        self.remember(self.state(expected, found));
+    }
+
+    /// Keeps a fault for the next poll.
+    fn remember(&self, fault: DeviceError) {
         let mut shared = lock(&self.shared);
         if shared.faults.len() < MAX_FAULTS && !shared.faults.contains(&fault) {
             shared.faults.push(fault);
@@ -369,6 +373,7 @@ impl Worker {
             )));
         }
         if self.desired.armed && answer.reply.flags.disarmed_by_silence() {
+            let restored = self.restore_on_line();
             self.fault(
                 "armed",
                 format!(
@@ -376,7 +381,7 @@ impl Worker {
                     self.config.silence_ms
                 ),
             );
-            self.restore_on_line()?;
+            restored?;
         }
         Ok(answer)
     }

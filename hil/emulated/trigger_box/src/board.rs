@@ -161,6 +161,14 @@ impl EmulatedBox {
         EdgeStream::open(&self.socket)
     }
 
+    /// The present cycle.
+    ///
+    /// # Errors
+    /// When the board is gone.
+    pub fn cycle(&mut self) -> io::Result<u64> {
+        self.order("cycle")
+    }
+
     /// Drives the input now; returns the cycle.
     ///
     /// # Errors
@@ -169,13 +177,17 @@ impl EmulatedBox {
         self.order(&format!("input {}", u8::from(high)))
     }
 
-    /// Drives the input in a later cycle; cycles must be given in order.
+    /// Drives the input to these levels in these later cycles, which must be in order.
     ///
     /// # Errors
     /// When the board is gone, or too many are planned.
-    pub fn input_at(&mut self, high: bool, cycle: u64) -> io::Result<()> {
-        self.order(&format!("input {} {cycle}", u8::from(high)))
-            .map(|_| ())
+    pub fn plan_input(&mut self, plan: &[(bool, u64)]) -> io::Result<()> {
+        let lines: String = plan
+            .iter()
+            .map(|(high, cycle)| format!("input {} {cycle}\n", u8::from(*high)))
+            .collect();
+        self.control.write_all(lines.as_bytes())?;
+        plan.iter().try_for_each(|_| self.taken().map(|_| ()))
     }
 
     /// Spoils bytes of the serial line from now on; tells what the noise did before.
@@ -184,7 +196,9 @@ impl EmulatedBox {
     /// When the board is gone.
     pub fn noise(&mut self, seed: u32, noise: NoisePerMillion) -> io::Result<NoiseDone> {
         let NoisePerMillion { flip, drop, insert } = noise;
-        let answer = self.say(&format!("noise {seed} {flip} {drop} {insert}"))?;
+        let order = format!("noise {seed} {flip} {drop} {insert}\n");
+        self.control.write_all(order.as_bytes())?;
+        let answer = self.answer()?;
         let numbers: Vec<u64> = answer.split(' ').filter_map(|w| w.parse().ok()).collect();
         match numbers[..] {
             [_cycle, flipped, dropped, inserted] => Ok(NoiseDone {
@@ -225,13 +239,17 @@ impl EmulatedBox {
 
     /// Gives an order; the cycle in which it was taken.
     fn order(&mut self, line: &str) -> io::Result<u64> {
-        let answer = self.say(line)?;
+        self.control.write_all(format!("{line}\n").as_bytes())?;
+        self.taken()
+    }
+
+    fn taken(&mut self) -> io::Result<u64> {
+        let answer = self.answer()?;
         let cycle = answer.strip_prefix("ok ").and_then(|c| c.parse().ok());
         cycle.ok_or_else(|| io::Error::other(answer))
     }
 
-    fn say(&mut self, line: &str) -> io::Result<String> {
-        self.control.write_all(format!("{line}\n").as_bytes())?;
+    fn answer(&mut self) -> io::Result<String> {
         let mut answer = String::new();
         if self.lines.read_line(&mut answer)? == 0 {
             return Err(io::ErrorKind::UnexpectedEof.into());
