@@ -21,7 +21,8 @@ uint64_t clock_now(void)
 {
     uint8_t sreg = SREG;
     cli();
-    uint64_t now = clock_extend(TCNT1);
+    uint64_t now;
+    clock_extend(TCNT1, &now);
     SREG = sreg;
     return now;
 }

@@ -17,24 +17,20 @@ void clock_start(void);
 // The present.
 uint64_t clock_now(void);
 
-// The instant at which Timer1 read `timer`, at most half a turn (2 ms) ago. Interrupts are off.
-static inline uint64_t clock_extend(uint16_t timer)
+// Sets `*ticks` to the instant at which Timer1 read `timer`, at most half a turn (2 ms) ago. Interrupts are off.
+static inline void clock_extend(uint16_t timer, uint64_t *ticks)
 {
-    union {
-        struct {
-            uint16_t timer;
-            uint32_t overflows;
-            uint16_t overflows_high;
-        } __attribute__((packed)) part;
-        uint64_t ticks;
-    } t;
-    t.part.timer = timer;
-    t.part.overflows = clock_overflows;
-    t.part.overflows_high = clock_overflows_high;
+    struct {
+        uint16_t timer;
+        uint32_t overflows;
+        uint16_t overflows_high;
+    } __attribute__((packed, may_alias)) *parts = (void *)ticks;
+    parts->timer = timer;
+    parts->overflows = clock_overflows;
+    parts->overflows_high = clock_overflows_high;
     // An overflow that waits for its interrupt counts for instants after it.
-    if ((TIFR1 & _BV(TOV1)) && timer < 0x8000 && ++t.part.overflows == 0)
-        ++t.part.overflows_high;
-    return t.ticks;
+    if ((TIFR1 & _BV(TOV1)) && timer < 0x8000 && ++parts->overflows == 0)
+        ++parts->overflows_high;
 }
 
 // The present's lower 32 bits. Interrupts are off.

@@ -1,33 +1,31 @@
 // A ring of numbered events: filled by interrupts, emptied by what the host acknowledges.
 #include "events.h"
 
+#include <stddef.h>
 #include <util/atomic.h>
 
 #define CAPACITY 64 // a power of two
 
 static struct event ring[CAPACITY];
-static uint32_t oldest;
-static uint32_t next;
+static uint32_t oldest; // number of the first kept event
+static uint8_t first;   // its place
+static uint8_t kept;
 static uint16_t dropped;
 
-void events_push(uint8_t kind, uint32_t code, uint64_t ticks)
+struct event *events_new(void)
 {
-    if (next - oldest == CAPACITY) {
+    if (kept == CAPACITY) {
         if (dropped != UINT16_MAX)
             ++dropped;
-        return;
+        return NULL;
     }
-    struct event *e = &ring[(uint8_t)next % CAPACITY];
-    e->kind = kind;
-    e->code = code;
-    e->ticks = ticks;
-    ++next;
+    return &ring[(uint8_t)(first + kept++) % CAPACITY];
 }
 
 uint32_t events_next(void)
 {
     uint32_t n;
-    ATOMIC_BLOCK(ATOMIC_RESTORESTATE) { n = next; }
+    ATOMIC_BLOCK(ATOMIC_RESTORESTATE) { n = oldest + kept; }
     return n;
 }
 
@@ -40,15 +38,19 @@ void events_forget(uint32_t before)
 {
     ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
     {
-        if (before - oldest <= next - oldest)
+        uint32_t n = before - oldest;
+        if (n <= kept) {
             oldest = before;
+            first += (uint8_t)n;
+            kept -= (uint8_t)n;
+        }
     }
 }
 
 void events_get(uint32_t number, struct event *out)
 {
     // A kept event is written no more, so that interrupts may run.
-    *out = ring[(uint8_t)number % CAPACITY];
+    *out = ring[(uint8_t)(first + (uint8_t)(number - oldest)) % CAPACITY];
 }
 
 uint16_t events_dropped(void)

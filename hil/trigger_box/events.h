@@ -4,12 +4,13 @@
 
 struct event {
     uint8_t kind;
-    uint32_t code; // the press of a mark with its kind above bit 17, the count of a sync train, 0
+    uint32_t code; // the 20 data bits of a train, 0 for an edge
     uint64_t ticks;
 };
 
-// Appends an event, or counts it as dropped when the memory is full. Interrupts are off.
-void events_push(uint8_t kind, uint32_t code, uint64_t ticks);
+// A place for the next event, which is counted in already, or a null pointer when the memory is full: then the event is
+// counted as dropped. Interrupts are off until the place is filled.
+struct event *events_new(void);
 
 // Number of the event that will come next; the first since reset is 0.
 uint32_t events_next(void);
@@ -17,7 +18,7 @@ uint32_t events_next(void);
 // Number of the oldest event that is still kept.
 uint32_t events_oldest(void);
 
-// Forgets all events before number `before`.
+// Forgets all events before number `before`, if they are kept.
 void events_forget(uint32_t before);
 
 // Copies event number `number`, which must be kept.

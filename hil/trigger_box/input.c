@@ -11,13 +11,24 @@
 
 static struct input_counts counts;
 
+static inline bool is_high(void)
+{
+    return PINB & _BV(PIN_INPUT);
+}
+
+// Kept short: while it runs, an edge of a train that is due must wait.
 static void record(bool level, uint16_t timer)
 {
     ++counts.edges;
-    events_push(level ? EVENT_INPUT_ROSE : EVENT_INPUT_FELL, 0, clock_extend(timer));
+    struct event *e = events_new();
+    if (!e)
+        return;
+    e->kind = level ? EVENT_INPUT_ROSE : EVENT_INPUT_FELL;
+    e->code = 0;
+    clock_extend(timer, &e->ticks);
 }
 
-static void wait_for(bool level)
+static inline void wait_for(bool level)
 {
     if (level)
         TCCR1B |= _BV(ICES1);
@@ -29,7 +40,7 @@ ISR(TIMER1_CAPT_vect)
 {
     uint16_t timer = ICR1;
     bool level = TCCR1B & _BV(ICES1);
-    if (input_high() != level) {
+    if (is_high() != level) {
         // Over before it could be looked at (or raised by the change of polarity itself): not an edge to rely on.
         if (counts.glitches != UINT16_MAX)
             ++counts.glitches;
@@ -37,7 +48,7 @@ ISR(TIMER1_CAPT_vect)
     }
     record(level, timer);
     wait_for(!level);
-    if (input_high() != level) {
+    if (is_high() != level) {
         // The opposite edge came before the capture was ready for it: stamped a microsecond late at most.
         record(!level, TCNT1);
         wait_for(level);
@@ -48,13 +59,13 @@ void input_setup(void)
 {
     // With its pull-up an input that nothing is wired to stays silent.
     PORTB |= _BV(PIN_INPUT);
-    wait_for(!input_high());
+    wait_for(!is_high());
     TIMSK1 |= _BV(ICIE1);
 }
 
 bool input_high(void)
 {
-    return PINB & _BV(PIN_INPUT);
+    return is_high();
 }
 
 void input_count(struct input_counts *out)

@@ -14,7 +14,7 @@
 #include "protocol.h"
 
 // How long before an edge its interrupt is due: longer than the longest stretch without interrupts.
-#define LEAD_TICKS (20UL * TICKS_PER_US)
+#define LEAD_TICKS (40UL * TICKS_PER_US)
 // From "now" to the first edge of a train that need not wait.
 #define START_LEAD_TICKS (100UL * TICKS_PER_US)
 // Cycles between the reading of Timer1 in `write_at` and the change of the port, besides the wait itself.
@@ -100,13 +100,16 @@ ISR(TIMER1_COMPA_vect)
     high = !high;
     if (high) {
         if (pulse == 0) {
-            bool mark = current.kind == EVENT_MARK;
-            if (mark)
+            struct event *e = events_new();
+            if (e) {
+                e->kind = current.kind;
+                e->code = current.data;
+                e->ticks = current.start;
+            }
+            if (current.kind == EVENT_MARK)
                 ++counts.marks;
             else
                 ++counts.syncs;
-            uint32_t press_mask = (1UL << PRESS_BITS) - 1;
-            events_push(current.kind, mark ? current.data : current.data & press_mask, current.start);
         }
         due = rise + width_us() * TICKS_PER_US;
         bits_left <<= 1;

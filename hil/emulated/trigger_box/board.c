@@ -272,6 +272,10 @@ static void tell_time(avr_cycle_count_t cycle)
 static avr_irq_t *pins[LAST_PIN + 1];
 static int levels[LAST_PIN + 1];
 
+// The spare output wired to the input, through something slow: cycles of delay, 0 for no wire.
+static avr_cycle_count_t loop_delay;
+static void plan(avr_cycle_count_t cycle, int level);
+
 static void pin_changed(struct avr_irq_t *irq, uint32_t value, void *param)
 {
     (void)irq;
@@ -279,6 +283,8 @@ static void pin_changed(struct avr_irq_t *irq, uint32_t value, void *param)
     if (levels[pin] != level) {
         levels[pin] = level;
         tell_edge(pin, level);
+        if (pin == LAST_PIN && loop_delay)
+            plan(avr->cycle + loop_delay, level);
     }
 }
 
@@ -312,6 +318,20 @@ static void arm_planned(void)
         return;
     avr_cycle_count_t due = planned[planned_tail % PLANNED].cycle;
     avr_cycle_timer_register(avr, due > avr->cycle ? due - avr->cycle : 1, planned_due, NULL);
+}
+
+static bool plan_is_full(void)
+{
+    return planned_head - planned_tail == PLANNED;
+}
+
+static void plan(avr_cycle_count_t cycle, int level)
+{
+    if (plan_is_full())
+        return;
+    planned[planned_head % PLANNED].cycle = cycle;
+    planned[planned_head++ % PLANNED].level = level;
+    arm_planned();
 }
 
 // --------------------------------------------------------------------------------------------------------- power
@@ -361,16 +381,17 @@ static void obey(struct client *c, char *line)
         tell(c, "clock %lld %.17g %s\n", (long long)start_ns, cycles_per_ns, free_running ? "free" : "paced");
         return;
     } else if (sscanf(line, "input %d %llu", &level, &cycle) == 2 && (level == 0 || level == 1)) {
-        if (planned_head - planned_tail == PLANNED ||
-            (planned_head != planned_tail && planned[(planned_head - 1) % PLANNED].cycle >= cycle)) {
+        bool in_order = planned_head == planned_tail || planned[(planned_head - 1) % PLANNED].cycle < cycle;
+        if (plan_is_full() || !in_order) {
             tell(c, "error too many planned edges, or not in order: %s\n", line);
             return;
         }
-        planned[planned_head % PLANNED].cycle = cycle;
-        planned[planned_head++ % PLANNED].level = level;
-        arm_planned();
+        plan(cycle, level);
     } else if (sscanf(line, "input %d", &level) == 1 && (level == 0 || level == 1)) {
         drive_input(level);
+    } else if (sscanf(line, "loop %llu", &cycle) == 1) {
+        loop_delay = cycle;
+        drive_input(cycle ? levels[LAST_PIN] : 1);
     } else if (sscanf(line, "noise %u %u %u %u", &seed, &flip, &drop, &insert) == 4) {
         noise.state = seed;
         noise.flip = flip;

@@ -402,7 +402,7 @@ impl Events {
                     kind: MarkKind::from_code(code >> 17)?,
                     press: PressId(code & MAX_MARKED_PRESS),
                 }),
-                2 if code <= MAX_MARKED_PRESS => EventKind::Sync(code),
+                2 if code >> 17 == SYNC_CODE => EventKind::Sync(code & MAX_MARKED_PRESS),
                 3 => EventKind::Input { rising: false },
                 4 => EventKind::Input { rising: true },
                 _ => return None,

@@ -190,6 +190,14 @@ impl EmulatedBox {
         plan.iter().try_for_each(|_| self.taken().map(|_| ()))
     }
 
+    /// Wires the spare output to the input, which follows it after this many cycles; 0 takes the wire away.
+    ///
+    /// # Errors
+    /// When the board is gone.
+    pub fn loop_back(&mut self, cycles: u64) -> io::Result<()> {
+        self.order(&format!("loop {cycles}")).map(|_| ())
+    }
+
     /// Spoils bytes of the serial line from now on; tells what the noise did before.
     ///
     /// # Errors
