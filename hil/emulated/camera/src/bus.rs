@@ -114,8 +114,8 @@ impl Bus {
 
     /// What reaches the cameras from outside.
     #[must_use]
-    pub fn world(&self) -> &World {
-        &self.0.world
+    pub fn world(&self) -> Arc<World> {
+        Arc::clone(&self.0.world)
     }
 
     /// A line to steer the devices by.

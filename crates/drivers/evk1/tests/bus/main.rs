@@ -5,5 +5,6 @@
 mod bench;
 mod devices;
 mod faults;
+mod settings;
 mod stream;
 mod time;

@@ -1,6 +1,6 @@
 //! Bytes: all of them, in order, as they were sent; and what is lost is known.
 
-use skinrig_device::{EventCamera, RealClock};
+use skinrig_device::{CameraSettings, EventCamera, RealClock};
 use skinrig_emulated_camera::Evk1Config as Emulated;
 use skinrig_emulated_camera::config::{Content, Pacing};
 use skinrig_emulated_camera::harness::on_bus;
@@ -155,5 +155,44 @@ fn what_an_earlier_session_left_behind_does_not_come_first() {
         camera.stop(&mut chunks).unwrap();
         assert_eq!(camera.report().jump_count, 0, "{:?}", camera.report());
         assert!(chunks[0].facts.first_us.unwrap() < 1000);
+    });
+}
+
+#[test]
+fn a_camera_that_overflows_shows_as_jumps_of_its_time_and_by_its_counter() {
+    let fast = Emulated {
+        fifo_bytes: 4 << 10,
+        content: Content::Dense { mev_per_s: 50.0 },
+        ..Emulated::new(FIRST)
+    };
+    let test = "stream::a_camera_that_overflows_shows_as_jumps_of_its_time_and_by_its_counter";
+    on_bus(test, vec![fast.into()], |remote| {
+        // Two transfers of 16 KiB do not take a packet of 200 kB.
+        let config = Evk1Config {
+            transfers: 2,
+            transfer_bytes: 16 << 10,
+            ..Evk1Config::default()
+        };
+        let clock = RealClock::start();
+        let mut camera = Evk1::open_serial(FIRST, CameraId::One, config, clock).unwrap();
+        camera.configure(&CameraSettings::default()).unwrap();
+        camera.start().unwrap();
+        let mut chunks = Vec::new();
+        until(&mut camera, &mut chunks, |c| events(c) > 20_000).unwrap();
+        camera.stop(&mut chunks).unwrap();
+        assert!(remote.observe(FIRST).unwrap().counters.dropped_bytes > 0);
+        assert!(camera.report().jump_count > 0);
+        let hits = camera.report().overflow_hits;
+        assert!(
+            hits.is_some_and(|(before, after)| before < after),
+            "{hits:?}"
+        );
+        let mut notes = Vec::new();
+        camera.take_notes(&mut notes);
+        let said = notes.join("\n");
+        assert!(
+            said.contains("jumped") && said.contains("overflow"),
+            "{said}"
+        );
     });
 }
