@@ -267,10 +267,17 @@ impl<'a> Core<'a> {
         answer
     }
 
-    /// Stops one camera and emits what it still had.
+    /// Stops one camera and emits what it still had, and what it has to say about its stream.
     pub(crate) fn stop_camera(&mut self, camera: CameraId) -> Result<(), ControllerError> {
-        let stopped = self.cameras[camera.index()].stop(&mut self.chunks);
+        let device = &mut self.cameras[camera.index()];
+        let stopped = device.stop(&mut self.chunks);
+        let mut notes = Vec::new();
+        device.take_notes(&mut notes);
         self.emit_chunks()?;
+        for note in notes {
+            let (t, text) = (self.now(), format!("{camera}: {note}"));
+            self.journal.emit(Record::Note { t, text })?;
+        }
         Ok(stopped?)
     }
 

@@ -47,6 +47,20 @@ fn plans_that_do_not_hold_together_never_arm() {
 }
 
 #[test]
+fn what_a_camera_says_about_its_stream_is_recorded() {
+    let remark = Some((CameraId::Two, "the time base jumped".to_owned()));
+    let faults = Faults { remark, ..faults() };
+    let told = run_plan(&plan(), faults, START, Sink::default());
+    let notes: Vec<&str> = (told.records.iter())
+        .filter_map(|r| match r {
+            Record::Note { text, .. } if text.contains("camera") => Some(text.as_str()),
+            _ => None,
+        })
+        .collect();
+    assert_eq!(notes, ["camera 2: the time base jumped"]);
+}
+
+#[test]
 fn a_run_that_is_dropped_or_unwound_comes_to_rest() {
     // The last one: the robot panics once more while the caller's panic unwinds.
     for (unwound, second) in [(false, None), (true, None), (true, Some(Failure::Panic))] {

@@ -41,6 +41,8 @@ pub struct Faults {
     pub poses_end_ms: Option<i64>,
     /// Bytes lost by a camera before its chunk with this number.
     pub loss: Option<(CameraId, u64, u64)>,
+    /// A camera that has something to say about its stream, once.
+    pub remark: Option<(CameraId, String)>,
     /// The tip stays where it is sideways from this time on, ms.
     pub stuck_sideways_ms: Option<i64>,
     /// The operator's hand at this tick.
@@ -382,6 +384,10 @@ impl EventCamera for MockCamera {
         answer?;
         self.chunk(chunks);
         Ok(())
+    }
+    fn take_notes(&mut self, notes: &mut Vec<String>) {
+        let mine = |of: &mut (CameraId, String)| of.0 == self.1;
+        notes.extend(lock(&self.0).faults.remark.take_if(mine).map(|r| r.1));
     }
 }
 
