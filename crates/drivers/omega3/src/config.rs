@@ -189,14 +189,18 @@ pub struct Trips {
     pub hard_force_factor: f64,
     /// Largest force with which the arm may hang still when armed, N: more means that it touches something.
     pub max_tare_n: f64,
-    /// How long the force is averaged while still after arming, to be subtracted from then on.
+    /// How long the force is averaged while the arm hangs still after arming, to be subtracted from then on.
     pub tare: Duration,
+    /// Largest spread of the force, per axis, in that time, N: more means that the arm is not still yet.
+    pub max_tare_spread_n: f64,
     /// Largest credible speed of the tip between two samples, mm/s.
     pub max_tip_speed_mm_s: f64,
     /// Largest credible jump between two samples beyond that, mm.
     pub max_jump_mm: f64,
     /// Distance from the set point at which the arm is braked, mm; above [`Motion::max_lead_mm`].
     pub max_deviation_mm: f64,
+    /// Longest time without a new reading.
+    pub max_silence: Duration,
     /// Slowest regulation loop, kHz.
     pub min_control_khz: f64,
     /// How far outside the run's box the tip may be measured, mm.
@@ -209,9 +213,11 @@ impl Default for Trips {
             hard_force_factor: 1.5,
             max_tare_n: 1.5,
             tare: Duration::from_millis(300),
+            max_tare_spread_n: 0.5,
             max_tip_speed_mm_s: 1000.0,
             max_jump_mm: 2.0,
             max_deviation_mm: 5.0,
+            max_silence: Duration::from_millis(200),
             min_control_khz: 1.0,
             box_margin_mm: 2.0,
         }
@@ -302,6 +308,7 @@ impl OmegaConfig {
             ("motion.max_step_mm", m.max_step_mm),
             ("motion.max_lead_mm", m.max_lead_mm),
             ("trips.max_tare_n", t.max_tare_n),
+            ("trips.max_tare_spread_n", t.max_tare_spread_n),
             ("trips.max_tip_speed_mm_s", t.max_tip_speed_mm_s),
             ("trips.max_jump_mm", t.max_jump_mm),
             ("trips.min_control_khz", t.min_control_khz),

@@ -8,7 +8,7 @@ use skinrig_drd_abi::{ErrorCode, ForceOffCause, StatusField};
 use skinrig_model::{DeviceRole, HostDuration, HostTime, Point3, Robot, Setting};
 
 use crate::brake::{MayBeLive, brake};
-use crate::config::OmegaConfig;
+use crate::config::{OmegaConfig, Trips};
 use crate::monitor::{Freshness, Monitor, Trip};
 use crate::open::{NotSet, Opened};
 use crate::regulation;
@@ -16,6 +16,7 @@ use crate::sdk::{Answer, CallError, Sdk};
 use crate::stream::Stream;
 use crate::supervisor::Supervisor;
 use crate::trajectory::{Trajectory, norm};
+use crate::weighing::Weighing;
 
 /// Longest time that one step of the set point stands for, s: a cycle that comes later makes the motion wait.
 const LONGEST_CYCLE_S: f64 = 0.004;
@@ -46,6 +47,7 @@ struct Armed {
     freshness: Freshness,
     tare: Tare,
     last: HostTime,
+    heard: HostTime,
     tip: Point3<Robot>,
     status_due: HostTime,
     control_due: HostTime,
@@ -59,11 +61,7 @@ struct Armed {
 }
 
 enum Tare {
-    Taking {
-        until: HostTime,
-        sum: [f64; 3],
-        n: u32,
-    },
+    Taking(Weighing),
     Known([f64; 3]),
 }
 
@@ -200,7 +198,10 @@ impl<C: Clock> Engine<C> {
                 State::Armed(armed) if matches!(armed.tare, Tare::Known(_)) => return Ok(()),
                 State::Armed(_) if self.clock.now() < deadline => {}
                 State::Armed(_) => {
-                    let e = self.wrong_state("armed", "without new readings of the force");
+                    let e = self.wrong_state(
+                        "still, to take the force at rest as zero",
+                        "moving or without new readings; see that the arm hangs free",
+                    );
                     self.state = State::Parked;
                     return Err(self.brake_after(e));
                 }
@@ -242,23 +243,24 @@ impl<C: Clock> Engine<C> {
         if !here.position_m.iter().all(|c| c.is_finite()) {
             return Err(self.wrong_state("at a known position", "without one (not a number)"));
         }
-        regulation::start(&*sdk, id, &self.config, limits, here.position_m)
-            .map_err(|e| self.not_set(e))?;
+        regulation::start(&*sdk, id, &self.config, limits).map_err(|e| self.not_set(e))?;
         let khz = self.await_regulation()?;
-        let tip = self.config.mount.axes.point_from_metres(here.position_m);
+        // A braked arm sinks: the set point begins where the regulation holds it now.
         let now = self.clock.now();
+        let here = sdk.regulated_position(id).map_err(|e| self.of_call(e))?;
+        let tip = self.config.mount.axes.point_from_metres(here.position_m);
+        if !tip.is_finite() {
+            return Err(self.wrong_state("at a known position", "without one (not a number)"));
+        }
         let mut freshness = Freshness::new(self.config.trips.min_control_khz);
         freshness.set_rate(khz);
         self.state = State::Armed(Box::new(Armed {
             trajectory: Trajectory::at_rest(self.config.motion, tip),
             monitor: Monitor::new(self.config.trips, *limits, now, tip.to_array()),
             freshness,
-            tare: Tare::Taking {
-                until: now + span(self.config.trips.tare),
-                sum: [0.0; 3],
-                n: 0,
-            },
+            tare: Tare::Taking(Weighing::begin(now)),
             last: now,
+            heard: now,
             tip,
             status_due: now,
             control_due: now + CONTROL_EVERY,
@@ -398,8 +400,15 @@ impl<C: Clock> Engine<C> {
 
     fn trip(&mut self, trip: Trip) {
         let trip = match trip {
-            // An unplugged robot is seen first as a regulation that ended.
+            // An unplugged robot may be seen first as a regulation that ended.
             Trip::RegulationEnded => self.why_regulation_ended(),
+            Trip::Call(e) if e.code == ErrorCode::NO_REGULATION => self.why_regulation_ended(),
+            // The regulation takes the power off when it ends by itself.
+            Trip::ForceOff(ForceOffCause::None | ForceOffCause::Software)
+                if !self.sdk.is_running(self.opened.id) =>
+            {
+                self.why_regulation_ended()
+            }
             other => other,
         };
         self.stream.fail(self.of_trip(&trip));
@@ -495,7 +504,10 @@ impl<C: Clock> Engine<C> {
 
         let sign = config.mount.reported_force_sign;
         let pushed = axes.robot_from_device(force.map(|f| sign * f));
-        let force_n = armed.weigh(now, pushed, config.trips.max_tare_n)?;
+        let new = armed
+            .freshness
+            .is_new(now, reading.position_m, reading.cached);
+        let force_n = armed.weigh(now, pushed, new, &config.trips)?;
 
         let dt_s = (now - armed.last).as_secs_f64().min(LONGEST_CYCLE_S);
         armed.last = now;
@@ -503,16 +515,17 @@ impl<C: Clock> Engine<C> {
         let target = axes.metres_from_point(armed.trajectory.set_point());
         sdk.track(id, target).map_err(Trip::Call)?;
 
-        if armed
-            .freshness
-            .is_new(now, reading.position_m, reading.cached)
-        {
+        if new {
+            armed.heard = now;
             stream.push(RobotSample {
                 t: now,
                 commanded: set_point,
                 measured: tip,
                 force_n,
             });
+        } else if now - armed.heard > span(config.trips.max_silence) {
+            let limit = config.trips.max_silence;
+            return Err(Trip::Silent { limit });
         }
         Ok(())
     }
@@ -521,19 +534,20 @@ impl<C: Clock> Engine<C> {
 impl Armed {
     /// Checks the force with which the motors push the tip (robot frame, N). Gives the force with which the world
     /// pushes the tip up: opposite, and without what the arm needs to hang still; NaN while that is not known.
-    fn weigh(&mut self, now: HostTime, pushed: [f64; 3], max_tare_n: f64) -> Result<f64, Trip> {
+    fn weigh(
+        &mut self,
+        now: HostTime,
+        pushed: [f64; 3],
+        new: bool,
+        trips: &Trips,
+    ) -> Result<f64, Trip> {
         match &mut self.tare {
-            Tare::Taking { until, sum, n } => {
+            Tare::Taking(weighing) => {
                 self.monitor.force(pushed)?;
-                for (total, f) in sum.iter_mut().zip(pushed) {
-                    *total += f;
-                }
-                *n += 1;
-                if now >= *until {
-                    let mean = sum.map(|f| f / f64::from(*n));
-                    if norm(mean) > max_tare_n {
+                if new && let Some(mean) = weighing.add(now, pushed, trips) {
+                    if norm(mean) > trips.max_tare_n {
                         return Err(Trip::Tare {
-                            limit_n: max_tare_n,
+                            limit_n: trips.max_tare_n,
                             found_n: norm(mean),
                         });
                     }

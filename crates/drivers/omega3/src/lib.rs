@@ -29,6 +29,7 @@ pub mod sdk;
 mod stream;
 pub mod supervisor;
 pub mod trajectory;
+mod weighing;
 
 pub use config::OmegaConfig;
 pub use error::OmegaError;

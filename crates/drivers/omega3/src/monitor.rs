@@ -1,13 +1,14 @@
 //! What the driver watches every cycle while the motors are live, and why it brakes.
 
 use std::fmt;
+use std::time::Duration;
 
 use skinrig_device::MotionLimits;
 use skinrig_drd_abi::{ForceOffCause, StatusField, StatusVector};
 use skinrig_model::HostTime;
 
 use crate::config::Trips;
-use crate::error::is_loss;
+use crate::error::{is_loss, next_step};
 use crate::open::cause_words;
 use crate::sdk::CallError;
 use crate::trajectory::{distance, norm};
@@ -17,6 +18,11 @@ use crate::trajectory::{distance, norm};
 pub enum Trip {
     /// The vendor's regulation thread ended, by its own account because of jitter.
     RegulationEnded,
+    /// The regulation loop delivers no new reading.
+    Silent {
+        /// Since when, at most.
+        limit: Duration,
+    },
     /// The regulation loop is too slow, kHz.
     RegulationSlow {
         /// Limit.
@@ -90,6 +96,12 @@ impl fmt::Display for Trip {
                     "the vendor's regulation thread ended (jitter or overload of this computer)"
                 )
             }
+            Self::Silent { limit } => {
+                write!(
+                    f,
+                    "the regulation loop delivered no new position for {limit:?}"
+                )
+            }
             Self::RegulationSlow {
                 expected_khz,
                 found_khz,
@@ -124,7 +136,7 @@ impl fmt::Display for Trip {
                 "the tip left the box of the run: expected at most {limit_mm:.2} mm outside, found {found_mm:.2} mm"
             ),
             Self::Supervisor(why) => write!(f, "the supervisor process ended: {why}"),
-            Self::Call(e) => write!(f, "{e}"),
+            Self::Call(e) => write!(f, "{e}; {}", next_step(e.code)),
         }
     }
 }

@@ -72,26 +72,26 @@ fn set_pace(
     })
 }
 
-/// Starts the regulation, writes its settings and turns position control and the track filter on.
+/// Starts the regulation, which holds where the arm is, writes its settings and turns position control and the track
+/// filter on.
 pub(crate) fn start(
     sdk: &dyn Sdk,
     id: DeviceId,
     config: &OmegaConfig,
     limits: &MotionLimits,
-    hold_m: [f64; 3],
 ) -> Result<(), NotSet> {
     sdk.start(id).map_err(NotSet::Call)?;
     apply(sdk, id, config, limits)?;
     sdk.regulate_position(id).map_err(NotSet::Call)?;
     sdk.enable_filter(id).map_err(NotSet::Call)?;
-    if !sdk.is_filtering(id) {
-        return Err(NotSet::Differs {
-            name: "track_filter",
-            expected: "on".to_owned(),
-            found: "off".to_owned(),
-        });
+    if sdk.is_filtering(id) {
+        return Ok(());
     }
-    sdk.track(id, hold_m).map_err(NotSet::Call)
+    Err(NotSet::Differs {
+        name: "track_filter",
+        expected: "on".to_owned(),
+        found: "off".to_owned(),
+    })
 }
 
 /// True when the library takes a setting only while the regulation runs: it is then checked at arming.

@@ -57,18 +57,12 @@ impl Supervisor {
         pipe.write_all(order.as_bytes())
             .and_then(|()| pipe.flush())
             .map_err(|e| fail("cannot write to", &e))?;
-        match first_line(answers, patience) {
-            Some(line) if line == READY => Ok(Self { child, pipe }),
-            other => {
-                let _ = child.kill();
-                let _ = child.wait();
-                let found = other.unwrap_or_else(|| "nothing".to_owned());
-                Err(fail(
-                    "no answer from",
-                    &format!("expected {READY:?}, found {found:?}"),
-                ))
-            }
+        if is_ready(answers, patience) {
+            return Ok(Self { child, pipe });
         }
+        let _ = child.kill();
+        let _ = child.wait();
+        Err(fail("no answer from", &format!("expected {READY:?}")))
     }
 
     /// Whether it still runs.
@@ -90,20 +84,20 @@ impl Supervisor {
     }
 }
 
-/// The first line of `answers`, read on a thread of its own so that the wait has an end.
-fn first_line(answers: impl Read + Send + 'static, patience: Duration) -> Option<String> {
+/// Whether a line of `answers` says so; read on a thread of its own so that the wait has an end.
+fn is_ready(answers: impl Read + Send + 'static, patience: Duration) -> bool {
     let (tell, hear) = mpsc::sync_channel(1);
     let reader = move || {
-        let mut line = String::new();
-        if BufReader::new(answers).read_line(&mut line).is_ok() {
-            let _ = tell.send(line.trim_end().to_owned());
-        }
+        let mut lines = BufReader::new(answers).lines().map_while(Result::ok);
+        let _ = tell.send(lines.any(|line| line == READY));
+        // Whatever it still prints goes nowhere, and does not stop it.
+        lines.for_each(drop);
     };
     std::thread::Builder::new()
         .name("omega3-supervisor".to_owned())
         .spawn(reader)
-        .ok()?;
-    hear.recv_timeout(patience).ok()
+        .is_ok()
+        && hear.recv_timeout(patience).unwrap_or(false)
 }
 
 /// How a watch ended.

@@ -229,7 +229,8 @@ type Mishap = (fn(&Scripted), &'static str);
 
 #[test]
 fn every_fault_brakes_and_is_named_until_disarmed() {
-    let mishaps: [Mishap; 11] = [
+    let mishaps: [Mishap; 12] = [
+        (|s| s.with(|s| s.cached = true), "no new position"),
         (|s| s.with(|s| s.running = false), "regulation thread ended"),
         (|s| s.with(|s| s.khz = 0.5), "regulation loop is slow"),
         (
@@ -256,7 +257,7 @@ fn every_fault_brakes_and_is_named_until_disarmed() {
         bench.go([20.0, 0.0, -5.0], 20.0).unwrap();
         bench.run_ms(30);
         happens(&bench.sdk);
-        bench.run_ms(120);
+        bench.run_ms(220);
         let failure = bench.stream.failure();
         let Some(DeviceError::State { found, .. }) = &failure else {
             panic!("{word}: {failure:?}")

@@ -1,0 +1,160 @@
+//! What a healthy arm does: the contract, lines, bounds, force, order of calls.
+
+use emulated_libdrd::{ArmConfig, Contact, Mode};
+use skinrig_device::contract::{self, IndenterContract};
+use skinrig_device::{DeviceError, Indenter, RealClock};
+use skinrig_model::HostDuration;
+use skinrig_omega3::Omega;
+
+use crate::support::*;
+
+#[test]
+fn keeps_the_contract() {
+    let arm = arm();
+    let options = IndenterContract {
+        limits: LIMITS,
+        targets: [point([15.0, 4.0, 16.0]), point([10.0, -2.0, 22.0])],
+        outside: point([12.0, 15.5, 16.0]),
+        speed_mm_s: 30.0,
+        tolerance_mm: 0.1,
+        patience: HostDuration::from_millis(1_200),
+    };
+    contract::indenter(
+        &mut || {
+            let clock = RealClock::start();
+            let omega = Omega::open(config(&arm), clock).expect("opens");
+            (Box::new(omega), Box::new(clock))
+        },
+        &options,
+    );
+}
+
+#[test]
+fn one_thread_calls_in_order_within_bounds() {
+    let arm = arm();
+    let mut omega = armed(&arm);
+    go(&mut omega, [20.0, 5.0, 15.0], 30.0);
+    omega.hold().expect("holds");
+    omega.disarm().expect("disarms");
+    omega.arm().expect("arms again");
+    go(&mut omega, START, 30.0);
+    drop(omega);
+    let state = arm.state().expect("lives");
+    assert_eq!((state.mode, state.held), (Mode::Brake, false));
+
+    let journal = arm.journal().expect("is readable");
+    let owners = journal.owners();
+    assert_eq!(owners.len(), 1, "{owners:?}");
+    assert_eq!(owners[0].2, "omega3");
+    let at = |name: &str| journal.first(name).unwrap_or_else(|| panic!("no {name}"));
+    let order = [
+        "dhdGetSDKVersion",
+        "drdOpenID",
+        "dhdGetSystemType",
+        "dhdSetWatchdog",
+        "drdStart",
+        "drdTrackPos",
+        "drdStop",
+    ];
+    for pair in order.windows(2) {
+        assert!(at(pair[0]) < at(pair[1]), "{pair:?}");
+    }
+    // After every start the limits are written again before the first target.
+    let mut limited = false;
+    for entry in &journal.entries {
+        match entry.call.as_str() {
+            "drdStart" => limited = false,
+            "drdSetPosTrackParam" => limited = true,
+            "drdTrackPos" => assert!(limited, "a target before the limits"),
+            _ => {}
+        }
+    }
+    assert!(journal.last("drdStop") < journal.last("drdClose"));
+    for forbidden in [
+        "drdAutoInit",
+        "drdCheckInit",
+        "drdMoveToPos",
+        "dhdSetBrakes",
+    ] {
+        assert_eq!(journal.first(forbidden), None, "{forbidden}");
+    }
+    assert!(journal.beside_regulation().is_empty());
+    let step_mm = journal.largest_step_m("drdTrackPos") * 1e3;
+    assert!(step_mm <= 0.1 + 1e-6, "{step_mm} mm");
+}
+
+#[test]
+fn samples_are_new_finite_and_end_where_they_were_sent() {
+    let arm = arm();
+    let mut omega = armed(&arm);
+    omega.command(point([20.0, 0.0, 12.0]), 25.0).expect("goes");
+    let target = point([20.0, 0.0, 12.0]);
+    let samples = poll_until(&mut omega, |s| {
+        s.commanded == target && s.measured.distance_mm(target) < 0.05
+    })
+    .expect("arrives");
+    assert!(samples.windows(2).all(|w| w[0].t < w[1].t));
+    let lead = samples
+        .iter()
+        .map(|s| s.commanded.distance_mm(s.measured))
+        .fold(0.0, f64::max);
+    assert!(lead <= 2.0 + 0.1, "{lead} mm");
+    assert!(samples.iter().all(|s| s.measured.is_finite()));
+    // In free air nothing pushes but friction.
+    let last = samples.last().expect("some");
+    assert!(last.force_n.abs() < 0.3, "{last:?}");
+}
+
+#[test]
+fn a_press_is_felt_upwards_and_capped_by_the_motor_ratio() {
+    let arm = arm_like(&ArmConfig {
+        contact: Some(Contact {
+            stiffness_n_m: 20_000.0,
+            ..Contact::horizontal(0.015)
+        }),
+        ..ArmConfig::default()
+    });
+    let mut omega = armed(&arm);
+    go(&mut omega, [12.5, 0.0, 15.2], 10.0);
+    // Far into a hard sample: the lead bounds the pull, the ratio caps the force, nothing trips.
+    omega.command(point([12.5, 0.0, 5.0]), 5.0).expect("goes");
+    let pressed = poll_until(&mut omega, |s| s.force_n > 0.8).expect("is felt");
+    let strongest = pressed.iter().map(|s| s.force_n).fold(0.0, f64::max);
+    let truly = arm.state().expect("lives").contact_force_n[2];
+    assert!(truly > 0.5, "the sample pushes up: {truly} N");
+    assert!(strongest <= LIMITS.max_force_n + 0.3, "{strongest} N");
+    go(&mut omega, [12.5, 0.0, 20.0], 20.0);
+    omega.disarm().expect("disarms");
+}
+
+#[test]
+fn at_the_force_limit_it_stops_and_only_rises() {
+    let arm = arm_like(&ArmConfig {
+        contact: Some(Contact {
+            stiffness_n_m: 20_000.0,
+            ..Contact::horizontal(0.015)
+        }),
+        ..ArmConfig::default()
+    });
+    let mut config = config(&arm);
+    // The ratio is badly calibrated: it would allow 12 N where 2 N were asked for.
+    config.envelope.n_per_ratio = 2.0;
+    config.gains.p = Some(4.0);
+    let mut omega = Omega::open(config, RealClock::start()).expect("opens");
+    let mut limits = LIMITS;
+    limits.max_force_n = 1.0;
+    omega.configure(&limits).expect("takes its limits");
+    omega.arm().expect("arms");
+    go(&mut omega, [12.5, 0.0, 15.2], 10.0);
+    omega.command(point([12.5, 0.0, 10.0]), 2.0).expect("goes");
+    let samples = poll_until(&mut omega, |s| s.force_n > 1.0).expect("stops, and does not brake");
+    let strongest = samples.iter().map(|s| s.force_n).fold(0.0, f64::max);
+    assert!(strongest < 1.5, "{strongest} N");
+    let deeper = omega.command(point([12.5, 0.0, 10.0]), 2.0);
+    assert!(
+        matches!(deeper, Err(DeviceError::Refused { .. })),
+        "{deeper:?}"
+    );
+    go(&mut omega, START, 20.0);
+    assert_eq!(arm.state().expect("lives").mode, Mode::Force);
+}
