@@ -75,6 +75,7 @@ const HARNESSES: &[&str] = &[
     "skinrig-tests",
     "skinrig-bench",
     "skinrig-emulated-libdrd",
+    "skinrig-emulated-bench",
     "skinrig-emulated-camera",
     "skinrig-emulated-trigger-box",
     "skinrig-usbshim",

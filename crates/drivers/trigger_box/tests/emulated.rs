@@ -172,7 +172,7 @@ fn trains_are_exact_to_the_cycle_on_all_outputs_at_once() {
 
 /// 3,125 trains are 100,000 pulses.
 #[test]
-#[ignore = "takes half a minute: cargo test -p skinrig-trigger-box --test emulated -- --ignored"]
+#[ignore = "takes most of a minute: cargo test -p skinrig-trigger-box --test emulated -- --ignored"]
 fn a_hundred_thousand_pulses_without_loss() {
     run_marks(3_125);
 }

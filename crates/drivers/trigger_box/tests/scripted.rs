@@ -346,18 +346,15 @@ fn a_lost_request_and_a_lost_reply_both_end_in_one_train() {
 #[test]
 fn a_mark_without_any_answer_is_lost_and_the_next_one_is_not_taken_for_it() {
     for carried_out in [false, true] {
-        let (line, mut device) = try_open(
+        let (line, device) = try_open(
             Script::default(),
             TriggerBoxConfig {
                 command_timeout: Duration::from_secs(1),
                 ..config()
             },
         );
-        let mut device = device
-            .as_mut()
-            .map(|d| d.arm().map(|()| d))
-            .unwrap()
-            .unwrap();
+        let mut device = device.unwrap();
+        device.arm().unwrap();
         let fault = Some((MARK, u32::MAX));
         if carried_out {
             line.script().mute_after = fault;

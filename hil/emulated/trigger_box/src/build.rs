@@ -20,6 +20,8 @@ impl std::fmt::Display for Unavailable {
     }
 }
 
+impl std::error::Error for Unavailable {}
+
 /// What was built.
 #[derive(Debug, Clone)]
 pub struct Built {

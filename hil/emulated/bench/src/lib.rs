@@ -1,0 +1,180 @@
+//! A whole bench of stand-ins in real time, tied together as wires and light tie a real one.
+//!
+//! ```text
+//!  skinrig run --rig hil/rigs/emulated.yaml     (a child process: production drivers only)
+//!    |dlopen                |libusb               |serial port
+//!  libdrd stand-in        preload library       pseudo-terminal
+//!    |                      |                     |
+//!  firmware of the arm -- tip --> cameras <-- edges -- firmware of the trigger box on simavr
+//! ```
+//!
+//! Everything recorded here is emulated.
+#![cfg(target_os = "linux")]
+
+mod ties;
+
+use std::ffi::OsStr;
+use std::io;
+use std::process::Command;
+use std::sync::Arc;
+
+use drd::{ArmConfig, Contact, DeviceConfig as ArmDevice, EmulatedArm};
+use skinrig_emulated_camera::config::{Content, SceneContent};
+use skinrig_emulated_camera::{Bus, BusConfig, BusError, Evk1Config};
+use skinrig_emulated_trigger_box::{BoardOptions, EmulatedBox, Unavailable};
+use skinrig_model::{CameraId, Point3, RigidTransform, Robot, SimLevel, Skin};
+
+use ties::Ties;
+
+/// Serial numbers of the two cameras, as in `hil/rigs/emulated.yaml`.
+pub const CAMERA_SERIALS: [&str; 2] = ["00000001", "00000002"];
+/// Serial number of the arm, as in `hil/rigs/emulated.yaml`.
+pub const ARM_SERIAL: u16 = 4711;
+/// Serial number in the trigger box's EEPROM.
+pub const BOX_SERIAL: &str = "emulated";
+/// Names the stand-in for libdrd in a rig file.
+pub const LIBRARY_VARIABLE: &str = "SKINRIG_EMULATED_LIBDRD";
+/// Names the port of the trigger box in a rig file.
+pub const BOX_VARIABLE: &str = "SKINRIG_EMULATED_TRIGGER_BOX";
+
+/// What the bench is.
+#[derive(Debug, Clone)]
+pub struct BenchConfig {
+    /// Seed of the cameras' true geometry and of their noise.
+    pub seed: u64,
+    /// What the pixels do: `geometric` or `optical`.
+    pub level: SimLevel,
+    /// Where the skin lies; the same as in the rig file.
+    pub robot_from_skin: RigidTransform<Robot, Skin>,
+    /// How fast the cameras' clocks are, ppm.
+    pub camera_ppm: [f64; 2],
+    /// What the cameras' clocks read at the start, µs.
+    pub camera_origin_us: [u64; 2],
+    /// How fast the trigger box's clock is, ppm.
+    pub box_ppm: f64,
+    /// Stiffness of the skin, N/m.
+    pub skin_n_m: f64,
+}
+
+impl Default for BenchConfig {
+    /// A bench with crystals as they are: tens of ppm apart.
+    fn default() -> Self {
+        Self {
+            seed: 1,
+            level: SimLevel::Geometric,
+            robot_from_skin: RigidTransform::translation(-10.0, -2.0, -20.0),
+            camera_ppm: [23.0, -31.0],
+            camera_origin_us: [0, 7_000_000],
+            box_ppm: 48.0,
+            skin_n_m: 500.0,
+        }
+    }
+}
+
+/// A bench cannot be set up.
+#[derive(Debug, thiserror::Error)]
+pub enum BenchError {
+    /// The arm.
+    #[error("emulated arm: {0}")]
+    Arm(#[source] io::Error),
+    /// The cameras.
+    #[error(transparent)]
+    Cameras(#[from] BusError),
+    /// The trigger box needs tools that this machine lacks.
+    #[error("emulated trigger box: {0}")]
+    Box(#[from] Unavailable),
+    /// What ties them together.
+    #[error("emulated bench: {0}")]
+    Ties(#[source] io::Error),
+}
+
+/// A running bench; everything on it ends with this value.
+pub struct EmulatedBench {
+    // Declared first: nothing may reach for a device that is gone.
+    _ties: Ties,
+    arm: Arc<EmulatedArm>,
+    bus: Arc<Bus>,
+    trigger_box: EmulatedBox,
+}
+
+impl EmulatedBench {
+    /// Starts arm, cameras and trigger box, and ties them together.
+    ///
+    /// # Errors
+    /// When a device cannot be started; [`BenchError::Box`] on a machine without avr-gcc or simavr.
+    pub fn start(config: &BenchConfig) -> Result<Self, BenchError> {
+        let trigger_box = EmulatedBox::start(&BoardOptions {
+            ppm: config.box_ppm,
+            serial: Some(BOX_SERIAL.to_owned()),
+            ..BoardOptions::default()
+        })?;
+        let surface = config.robot_from_skin.apply(Point3::new(0.0, 0.0, 0.0));
+        let arm = EmulatedArm::spawn(&ArmConfig {
+            devices: vec![ArmDevice {
+                serial: ARM_SERIAL,
+                ..ArmDevice::default()
+            }],
+            contact: Some(Contact {
+                stiffness_n_m: config.skin_n_m,
+                ..Contact::horizontal(surface.z_mm * 1e-3)
+            }),
+            ..ArmConfig::default()
+        });
+        let arm = Arc::new(arm.map_err(BenchError::Arm)?);
+        let devices = CameraId::ALL.map(|camera| camera_of(config, camera).into());
+        let bus = Arc::new(Bus::start(&BusConfig {
+            devices: devices.into(),
+        })?);
+        let ties = Ties::make(&arm, &bus, &trigger_box).map_err(BenchError::Ties)?;
+        Ok(Self {
+            _ties: ties,
+            arm,
+            bus,
+            trigger_box,
+        })
+    }
+
+    /// A command that runs beside this bench: its USB bus, its libdrd, its serial port.
+    ///
+    /// # Errors
+    /// [`BenchError::Cameras`] when the preload library was not built.
+    pub fn command(&self, program: impl AsRef<OsStr>) -> Result<Command, BenchError> {
+        let mut command = self.bus.command(program)?;
+        command
+            .env(LIBRARY_VARIABLE, self.arm.library())
+            .env(BOX_VARIABLE, self.trigger_box.port());
+        Ok(command)
+    }
+
+    /// The arm: its true state, and faults.
+    #[must_use]
+    pub fn arm(&self) -> &EmulatedArm {
+        &self.arm
+    }
+
+    /// The cameras' bus: faults.
+    #[must_use]
+    pub fn bus(&self) -> &Bus {
+        &self.bus
+    }
+
+    /// The trigger box: noise, unplugging, resets.
+    pub const fn trigger_box(&mut self) -> &mut EmulatedBox {
+        &mut self.trigger_box
+    }
+}
+
+fn camera_of(config: &BenchConfig, camera: CameraId) -> Evk1Config {
+    let i = camera.index();
+    Evk1Config {
+        drift_ppm: config.camera_ppm[i],
+        origin_us: config.camera_origin_us[i],
+        content: Content::Scene(Box::new(SceneContent {
+            camera,
+            seed: config.seed,
+            level: config.level,
+            robot_from_skin: Some(config.robot_from_skin),
+        })),
+        ..Evk1Config::new(CAMERA_SERIALS[i])
+    }
+}
