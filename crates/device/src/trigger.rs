@@ -19,7 +19,8 @@ pub trait TriggerBox: Send {
     /// What it can do.
     fn capabilities(&self) -> TriggerCapabilities;
 
-    /// Starts the pulse train of `mark` now and returns when its first edge rose.
+    /// Starts the pulse train of `mark` now and returns when its first edge rose. Behind a train that the box sends by
+    /// itself the mark's begins right after it; the answer tells when, and need not wait for it.
     ///
     /// # Errors
     /// [`DeviceError::State`] while a train is under way; [`DeviceError::Refused`] for a press id that does

@@ -16,7 +16,7 @@ use crate::greeting::greet;
 use crate::link::Link;
 use crate::protocol::{Counters, MAX_SERIAL, MIN_SYNC_PERIOD_MS, SelfTest};
 use crate::serial::SerialDial;
-use crate::wire::{Dial, OpenError};
+use crate::wire::{Dial, OpenError, dial_patiently};
 use crate::worker::{Command, Done, Job, Shared, Worker, lock};
 
 /// Beyond its deadline a command may still be on the line for one more try or one hello.
@@ -54,7 +54,8 @@ impl SerialTriggerBox {
         clock: RealClock,
     ) -> Result<Self, DeviceError> {
         let named = config.serial.clone().unwrap_or_else(|| config.port.clone());
-        let wire = dial.dial().map_err(|e| open_failed(&e, &named))?;
+        let wire = dial_patiently(dial.as_mut(), config.hello_timeout)
+            .map_err(|e| open_failed(&e, &named))?;
         let mut link = Link::new(wire, clock);
         let greeted = greet(
             &mut link,

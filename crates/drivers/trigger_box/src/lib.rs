@@ -17,6 +17,6 @@ pub mod wire;
 mod worker;
 
 pub use config::TriggerBoxConfig;
-pub use discover::{FoundPort, PortState, enumerate};
+pub use discover::{BY_ID, FoundPort, PortState, enumerate, port_of_adapter};
 pub use driver::SerialTriggerBox;
 pub use wire::{Dial, OpenError, Wire};

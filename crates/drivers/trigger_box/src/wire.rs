@@ -1,7 +1,7 @@
 //! The seam below the driver: bytes to and from a box, over a serial port or a script.
 
 use std::io;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// An open line to a box.
 pub trait Wire: Send {
@@ -28,6 +28,24 @@ pub trait Dial: Send {
     /// # Errors
     /// [`OpenError`].
     fn dial(&mut self) -> Result<Box<dyn Wire>, OpenError>;
+}
+
+/// From one attempt to open a busy line to the next.
+const BUSY_INTERVAL: Duration = Duration::from_millis(50);
+
+/// Opens a line, and waits for `patience` while another program has it: whatever looks at new serial ports (a modem
+/// manager) does so for a moment, and a port is released only when the last process that inherited it lets go.
+///
+/// # Errors
+/// [`OpenError`].
+pub fn dial_patiently(dial: &mut dyn Dial, patience: Duration) -> Result<Box<dyn Wire>, OpenError> {
+    let end = Instant::now() + patience;
+    loop {
+        match dial.dial() {
+            Err(OpenError::Busy(_)) if Instant::now() < end => std::thread::sleep(BUSY_INTERVAL),
+            other => return other,
+        }
+    }
 }
 
 /// Why a line could not be opened.

@@ -268,9 +268,7 @@ impl Worker {
     }
 
     fn exchange_time(&mut self) {
-        // A single try: an exchange over a repeated request is a loose one.
-        let once = Patience::once(self.config.reply_timeout);
-        if let Ok(answer) = self.ask(&Request::Time, once) {
+        if let Ok(answer) = self.ask(&Request::Time, self.short_patience()) {
             let own = exchange(&answer);
             self.host_from_box.add(own);
             self.report(BoxReport::Exchange {
@@ -283,8 +281,7 @@ impl Worker {
 
     fn fetch_events(&mut self) {
         let from = self.next_event;
-        let once = Patience::once(self.config.reply_timeout);
-        let Ok(answer) = self.ask(&Request::Events { from }, once) else {
+        let Ok(answer) = self.ask(&Request::Events { from }, self.short_patience()) else {
             return; // asked again for the same ones soon
         };
         let events = match self.expect_events(&answer) {
@@ -485,6 +482,16 @@ impl Worker {
         Patience {
             per_try: self.config.reply_timeout,
             total: self.config.command_timeout,
+        }
+    }
+
+    /// For what is asked again and again: commands wait meanwhile. Not a single try, since on a slow machine each reply
+    /// might come just after its request was given up.
+    fn short_patience(&self) -> Patience {
+        let four_tries = self.config.reply_timeout * 4;
+        Patience {
+            per_try: self.config.reply_timeout,
+            total: four_tries.min(self.config.command_timeout),
         }
     }
 

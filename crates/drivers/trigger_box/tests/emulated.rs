@@ -283,45 +283,98 @@ fn host_times_are_certain_and_box_times_are_those_of_the_edges() {
 }
 
 #[test]
-fn sync_trains_count_on_and_a_mark_follows_the_one_under_way() {
+fn sync_trains_count_on_among_marks() {
     let Some(board) = EmulatedBox::start_or_skip(&paced()) else {
         return;
     };
     let mut edges = board.edges().unwrap();
     let mut device = open(&board, RealClock::start());
-    device.set_sync(Some(28)).unwrap();
+    device.set_sync(Some(100)).unwrap();
     let mut reports = Vec::new();
-    for k in 0..12 {
+    for k in 0..6 {
         send_when_free(&mut device, mark(k)).unwrap();
     }
-    poll_until(&mut device, &mut reports, |r| marks_in(r).len() == 12);
+    poll_until(&mut device, &mut reports, |r| {
+        marks_in(r).len() == 6 && syncs_in(r).len() >= 5
+    });
     device.set_sync(None).unwrap();
     let end = Instant::now() + PATIENCE;
     while device.counters().unwrap().syncs as usize > syncs_in(&reports).len() {
         device.poll(&mut reports).unwrap();
         assert!(Instant::now() < end, "sync trains were not told");
     }
-    let syncs = syncs_in(&reports);
-    let counts: Vec<u32> = syncs.iter().map(|s| s.0).collect();
-    let wanted: Vec<u32> = (0..counts.len() as u32).collect();
-    assert!(counts.len() >= 6, "{counts:?}");
-    assert_eq!(counts, wanted);
-    let trains = counts.len() + 12;
+    let counts: Vec<u32> = syncs_in(&reports).iter().map(|s| s.0).collect();
+    assert_eq!(counts, (0..counts.len() as u32).collect::<Vec<_>>());
+    let trains = counts.len() + 6;
     let all = without_skew(&edges.take(trains * EDGES_PER_TRAIN, PATIENCE).unwrap());
-    // In order, each a train of its own, none within another.
-    let mut starts: Vec<u64> = syncs.iter().map(|s| s.1.us).collect();
-    starts.extend(marks_in(&reports).iter().map(|m| m.1.us));
-    starts.sort_unstable();
-    for (train, pair) in all
-        .chunks(2 * PULSES_PER_TRAIN as usize)
-        .zip(starts.windows(2))
-    {
-        assert!(pair[1] - pair[0] >= PulseTrain::DURATION_US);
-        assert!(train[0].high);
-    }
     let seen = decode_marks(&trigger_edges(&all, CAMERA_1));
+    assert_eq!((seen.stray_edges, seen.lost_edges), (0, 0));
     let marks: Vec<Mark> = seen.marks.iter().map(|m| m.mark).collect();
-    assert_eq!(marks, (0..12).map(mark).collect::<Vec<_>>());
+    assert_eq!(marks, (0..6).map(mark).collect::<Vec<_>>());
+    let on_the_line: Vec<u32> = seen.syncs.iter().map(|s| s.count).collect();
+    assert_eq!(on_the_line, counts);
+}
+
+#[test]
+fn a_mark_follows_the_sync_train_under_way() {
+    let Some(board) = EmulatedBox::start_or_skip(&free_running()) else {
+        return;
+    };
+    let mut edges = board.edges().unwrap();
+    let mut ask = asker(&board);
+    let sync = |period_ms| Request::Sync {
+        period_ms,
+        first: 1 << 17,
+    };
+    ask(Request::Arm { silence_ms: 0 });
+    assert_eq!(ask(sync(27)).outcome, Outcome::BadArgument);
+    assert_eq!(ask(sync(28)).outcome, Outcome::Done);
+    // Told instants of first edges, and whether the mark had to wait for longer than the rest after another mark.
+    let mut told = Vec::new();
+    let end = Instant::now() + PATIENCE;
+    while told.len() < 40 || !told.iter().any(|&(_, waited)| waited) {
+        let number = told.len() as u32 + 1;
+        let m = Request::Mark {
+            number,
+            mark: mark(number),
+        };
+        let reply = ask(m);
+        if reply.outcome == Outcome::Done {
+            let start = parse_mark(&reply.answers).unwrap().0;
+            told.push((
+                start,
+                start.saturating_sub(reply.at.0) > 2_000 * CYCLES_PER_US,
+            ));
+        }
+        assert!(Instant::now() < end, "no mark met a sync train");
+    }
+    ask(sync(0));
+    let mut status = ask(Request::Status);
+    while status.flags.train() {
+        status = ask(Request::Status);
+        assert!(Instant::now() < end, "a train without end");
+    }
+    let counters = Counters::parse(&status.answers).unwrap();
+    let trains = (counters.marks + counters.syncs) as usize;
+    let all = without_skew(&edges.take(trains * EDGES_PER_TRAIN, PATIENCE).unwrap());
+    let seen = decode_marks(&trigger_edges(&all, CAMERA_1));
+    assert_eq!((seen.stray_edges, seen.lost_edges), (0, 0));
+    assert_eq!(seen.marks.len(), told.len());
+    // The first count was one too many for its 17 bits.
+    assert_eq!(seen.syncs[0].count, 0);
+    let starts: Vec<u64> = all
+        .chunks(2 * PULSES_PER_TRAIN as usize)
+        .map(|train| train[0].cycle)
+        .collect();
+    let train = PulseTrain::DURATION_US * CYCLES_PER_US;
+    assert!(starts.windows(2).all(|pair| pair[1] - pair[0] >= train));
+    let is_mark = |cycle: u64| seen.marks.iter().any(|m| m.t_us == cycle / CYCLES_PER_US);
+    let marks: Vec<u64> = starts.iter().copied().filter(|&c| is_mark(c)).collect();
+    for (&cycle, (ticks, waited)) in marks.iter().zip(&told) {
+        assert_eq!(cycle - marks[0], ticks - told[0].0, "told another instant");
+        let behind = starts.contains(&(cycle - train)) && !is_mark(cycle - train);
+        assert!(behind || !waited, "it waited for nothing");
+    }
 }
 
 fn syncs_in(reports: &[BoxReport]) -> Vec<(u32, BoxTime)> {
@@ -434,7 +487,7 @@ fn a_brown_out_is_told_as_a_reset_and_its_cause_is_kept() {
         return;
     };
     let mut device = open(&board, RealClock::start());
-    device.set_sync(Some(50)).unwrap();
+    device.set_sync(Some(100)).unwrap();
     let mut reports = Vec::new();
     poll_until(&mut device, &mut reports, |r| syncs_in(r).len() > 2);
     let before = syncs_in(&reports).last().unwrap().0;
