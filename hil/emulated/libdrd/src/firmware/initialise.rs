@@ -12,7 +12,7 @@ use crate::config::Fault;
 /// How fast it moves.
 const LIMITS: Limits = Limits {
     amax: 2.0,
-    vmax: 0.1,
+    vmax: 0.2,
     jerk: 50.0,
 };
 

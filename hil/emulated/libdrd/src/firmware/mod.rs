@@ -29,9 +29,9 @@ use crate::wire::{Connection, Reply, Request};
 /// Step of the simulation, us.
 pub const STEP_US: u32 = 250;
 /// How often the arm is taken to the present when nobody asks.
-const WAKE_EVERY: Duration = Duration::from_micros(500);
+const WAKE_EVERY: Duration = Duration::from_micros(250);
 /// How many wake-ups lie between two looks at the driving process.
-const WAKES_PER_LOOK: u32 = 8;
+const WAKES_PER_LOOK: u32 = 16;
 
 /// The arm and the page that shows it.
 #[derive(Debug)]

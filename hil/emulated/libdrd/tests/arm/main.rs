@@ -5,7 +5,10 @@
     reason = "a bench that does not come up must fail its test"
 )]
 
+mod faults;
 mod host_death;
+mod motion;
 mod procedure;
+mod processes;
 mod strictness;
 mod support;
