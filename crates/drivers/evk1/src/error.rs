@@ -95,7 +95,8 @@ pub enum Evk1Error {
     },
     /// A register did not read back as written.
     #[error(
-        "{name} ({address:#06x}): expected {expected:#010x} after writing, found {found:#010x}"
+        "{name} ({address:#06x}): expected {expected:#010x} after writing, found {found:#010x}: power the camera off and \
+         on; an address at which every camera of this kind reads differently goes into `read_back_exceptions`"
     )]
     ReadBack {
         /// Name of the register.

@@ -9,7 +9,8 @@ use skinrig_model::HostDuration;
 
 use crate::access::Registers;
 use crate::error::{Evk1Error, UsbError};
-use crate::registers::{ATIS_CONTROL, FPGA_VERSION, SERIAL_MSB, request};
+use crate::registers::{ATIS_CONTROL, FPGA_VERSION, SERIAL_MSB};
+use crate::requests;
 use crate::usb::{Access, LibUsb, Slot, Transport, bus};
 
 /// What to do when a user may not open the camera.
@@ -200,10 +201,10 @@ pub fn identify(
     };
     match ask16(
         transport,
-        request::BOARD_VERSION,
+        requests::BOARD_VERSION,
         "asking for the board version",
     ) {
-        Ok(request::BOARD_EVK1) => {}
+        Ok(requests::BOARD_EVK1) => {}
         Ok(other) => {
             return Err(not_evk1(
                 "board version 2",
@@ -225,10 +226,10 @@ pub fn identify(
     let mut registers = Registers::new(transport, &[]);
     registers.read(ATIS_CONTROL)?; // The first read after power-up is not to be relied on.
     let serial = registers.read(SERIAL_MSB)?;
-    let system = ask16(transport, request::SYSTEM_ID, "asking for the system ID")?;
-    if system != request::SYSTEM_GEN31 {
+    let system = ask16(transport, requests::SYSTEM_ID, "asking for the system ID")?;
+    if system != requests::SYSTEM_GEN31 {
         let what = match system {
-            request::SYSTEM_GOLDEN => {
+            requests::SYSTEM_GOLDEN => {
                 "the rescue image of the FPGA: the camera's flash needs the maker's update"
                     .to_owned()
             }
@@ -242,7 +243,7 @@ pub fn identify(
     let mut answer = [0; 8];
     ask(
         transport,
-        request::FX3_VERSION,
+        requests::FX3_VERSION,
         &mut answer,
         "asking for the FX3 version",
     )?;
@@ -261,7 +262,7 @@ fn await_fpga(transport: &mut dyn Transport, clock: &mut dyn Clock) -> Result<()
     let end = clock.now() + BOOT_LIMIT;
     while ask16(
         transport,
-        request::FPGA_BOOT_STATE,
+        requests::FPGA_BOOT_STATE,
         "asking whether the FPGA is configured",
     )? == 0
     {

@@ -20,6 +20,7 @@ pub mod inbox;
 pub mod noise_filter;
 pub mod registers;
 pub mod report;
+pub mod requests;
 pub mod roi;
 pub mod sequences;
 pub mod settings;

@@ -5,7 +5,9 @@ use skinrig_model::{SENSOR_HEIGHT, SENSOR_WIDTH};
 
 use crate::access::Registers;
 use crate::error::Evk1Error;
-use crate::registers::{ROI_TD_EN, ROI_TD_SHADOW_TRIGGER, ROI_X_WORDS, ROI_Y_WORDS, roi_x, roi_y};
+use crate::registers::{
+    ROI_TD_EN, ROI_TD_SHADOW_TRIGGER, ROI_X_WORDS, ROI_Y_WORDS, Register, roi_x, roi_y,
+};
 
 /// A pixel is live when both its column's and its row's bit are set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -42,6 +44,13 @@ impl Map {
             columns: bits(roi.x, roi.width),
             rows: bits(roi.y, roi.height),
         })
+    }
+
+    /// The registers of a map.
+    pub fn registers() -> impl Iterator<Item = Register> {
+        (0..ROI_X_WORDS)
+            .map(roi_x)
+            .chain((0..ROI_Y_WORDS).map(roi_y))
     }
 
     /// Writes the map and makes the sensor take it over.

@@ -12,7 +12,7 @@ use super::transfers::Transfers;
 use crate::config::Evk1Config;
 use crate::error::UsbError;
 use crate::inbox::Inbox;
-use crate::registers::{EVENT_ENDPOINT, INTERFACE, TREUZELL_SUBCLASS, USB_IDS};
+use crate::requests::{EVENT_ENDPOINT, INTERFACE, TREUZELL_SUBCLASS, USB_IDS};
 
 /// Longest wait for a control request.
 const CONTROL_LIMIT: Duration = Duration::from_secs(1);

@@ -30,7 +30,7 @@ use skinrig_device::RealClock;
 use crate::config::Evk1Config;
 use crate::error::UsbError;
 use crate::inbox::Inbox;
-use crate::registers::EVENT_ENDPOINT;
+use crate::requests::EVENT_ENDPOINT;
 
 /// Longest wait for cancelled transfers, and for the event thread.
 const STOP_LIMIT: Duration = Duration::from_secs(1);

@@ -83,7 +83,10 @@ camera 1 00001621: td_roi_x (0x040c): expected 0xffffffff after writing, found 0
 fn a_register_known_to_read_differently_is_let_pass_and_still_shown() {
     let bench = Bench::new();
     bench.model().faults.stuck_at_zero = [(r::roi_x(3).address, 1 << 4)].into();
-    bench.open().err().expect("refused without the exception");
+    let refused = bench.open().err().expect("no exception, no camera");
+    insta::assert_snapshot!(refused, @r"
+td_roi_x (0x040c): expected 0xffffffff after writing, found 0xffffffef: power the camera off and on; an address at which every camera of this kind reads differently goes into `read_back_exceptions`
+");
     let mut camera = bench
         .open_with(Evk1Config {
             read_back_exceptions: vec![r::roi_x(3).address],
@@ -94,6 +97,12 @@ fn a_register_known_to_read_differently_is_let_pass_and_still_shown() {
     let roi = read.iter().find(|s| s.name == "roi").unwrap();
     assert_eq!(roi.requested, "all");
     assert_eq!(roi.read_back, "639 columns and 480 rows, not a rectangle");
+    // The exception is for that register alone.
+    let other = (r::EXT_TRIGGERS_ENABLE.address, 1 << 6);
+    bench.model().faults.stuck_at_zero.extend([other]);
+    let settings = sync(SyncMode::Standalone, &[6]);
+    let error = camera.configure(&settings).unwrap_err();
+    assert!(matches!(error, DeviceError::ReadBack { .. }));
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! What is not an EVK1 Gen3.1 that can stream is refused by name, before anything is written.
 
-use skinrig_evk1::registers::request;
+use skinrig_evk1::requests;
 use skinrig_evk1::{Evk1Config, UsbError};
 
 use super::model::Bench;
@@ -22,11 +22,11 @@ fn answering(code: u8, word: u16) -> String {
 #[test]
 fn other_devices_are_refused_by_name() {
     let found = [
-        answering(request::BOARD_VERSION, 3),
-        answering(request::FPGA_BOOT_STATE, 0),
-        answering(request::SYSTEM_ID, 0x11),
-        answering(request::SYSTEM_ID, 0x1a),
-        answering(request::SYSTEM_ID, 0x31),
+        answering(requests::BOARD_VERSION, 3),
+        answering(requests::FPGA_BOOT_STATE, 0),
+        answering(requests::SYSTEM_ID, 0x11),
+        answering(requests::SYSTEM_ID, 0x1a),
+        answering(requests::SYSTEM_ID, 0x31),
         refusal(|b| b.model().faults.read_status = Some(0x12)),
         refusal(|b| b.model().faults.error = Some(UsbError::Gone)),
     ];

@@ -6,7 +6,8 @@ use std::time::Duration;
 
 use skinrig_device::Clock;
 use skinrig_evk1::inbox::Inbox;
-use skinrig_evk1::registers::{self as r, Field, Register, request};
+use skinrig_evk1::registers::{self as r, Field, Register};
+use skinrig_evk1::requests;
 use skinrig_evk1::usb::Transport;
 use skinrig_evk1::{Evk1, Evk1Config, Evk1Error, UsbError};
 use skinrig_formats::evt2::Encoder;
@@ -255,23 +256,23 @@ impl Transport for Bench {
     ) -> Result<usize, UsbError> {
         let mut model = self.model();
         model.check()?;
-        if code == request::READ_REGISTER {
+        if code == requests::READ_REGISTER {
             let address = u32::from(value) | u32::from(index) << 16;
             let word = *model
                 .registers
                 .get(&address)
                 .expect("a register of the map");
             model.steps.push(Step::Read(address, word));
-            let status = model.faults.read_status.unwrap_or(request::READ_OK);
+            let status = model.faults.read_status.unwrap_or(requests::READ_OK);
             answer[..4].copy_from_slice(&[status, 0, 0, 0]);
             answer[4..].copy_from_slice(&word.to_be_bytes());
             return Ok(8);
         }
         let default = match code {
-            request::BOARD_VERSION => request::BOARD_EVK1,
-            request::FPGA_BOOT_STATE => 1,
-            request::SYSTEM_ID => request::SYSTEM_GEN31,
-            request::FX3_VERSION => {
+            requests::BOARD_VERSION => requests::BOARD_EVK1,
+            requests::FPGA_BOOT_STATE => 1,
+            requests::SYSTEM_ID => requests::SYSTEM_GEN31,
+            requests::FX3_VERSION => {
                 model.other("ask 79");
                 answer.copy_from_slice(&[2, 3, 1, 0, 0, 0, 0, 0]);
                 return Ok(8);
@@ -295,7 +296,7 @@ impl Transport for Bench {
         model.check()?;
         assert_eq!(
             code,
-            request::WRITE_REGISTER,
+            requests::WRITE_REGISTER,
             "no other request may change anything"
         );
         let address = u32::from(value) | u32::from(index) << 16;
