@@ -142,6 +142,9 @@ pub struct Motion {
     pub max_step_mm: f64,
     /// Largest distance of the set point ahead of the measured tip, mm. Set point times stiffness is force.
     pub max_lead_mm: f64,
+    /// Rate at which a resting set point is moved on until the tip itself is there, 1/s; 0: not at all, and the tip
+    /// stops short by force divided by stiffness. Must be slow against the regulation.
+    pub correction_per_s: f64,
     /// The regulation's own filter is given this many times our speed, acceleration and jerk, so that it rounds but
     /// does not delay. Never the library's defaults, which reach 1 m/s.
     pub filter_headroom: f64,
@@ -156,6 +159,7 @@ impl Default for Motion {
             parked_hz: 200.0,
             max_step_mm: 0.1,
             max_lead_mm: 2.0,
+            correction_per_s: 5.0,
             filter_headroom: 2.0,
         }
     }
@@ -326,6 +330,7 @@ impl OmegaConfig {
         within("envelope.least_ratio", e.least_ratio, 0.0, e.max_ratio)?;
         within("motion.cycle_hz", m.cycle_hz, 1000.0, 4000.0)?;
         within("motion.parked_hz", m.parked_hz, 20.0, 1000.0)?;
+        within("motion.correction_per_s", m.correction_per_s, 0.0, 50.0)?;
         within("motion.filter_headroom", m.filter_headroom, 1.0, 10.0)?;
         within("trips.hard_force_factor", t.hard_force_factor, 1.0, 3.0)?;
         let angle = self.mount.device_angle_deg;

@@ -9,6 +9,7 @@ use skinrig_model::{DeviceRole, HostDuration, HostTime, Point3, Robot, Setting};
 
 use crate::brake::{MayBeLive, brake};
 use crate::config::{OmegaConfig, Trips};
+use crate::correction::Correction;
 use crate::monitor::{Freshness, Monitor, Trip};
 use crate::open::{NotSet, Opened};
 use crate::regulation;
@@ -44,6 +45,7 @@ enum State {
 struct Armed {
     trajectory: Trajectory,
     monitor: Monitor,
+    correction: Correction,
     freshness: Freshness,
     tare: Tare,
     last: HostTime,
@@ -257,6 +259,7 @@ impl<C: Clock> Engine<C> {
         self.state = State::Armed(Box::new(Armed {
             trajectory: Trajectory::at_rest(self.config.motion, tip),
             monitor: Monitor::new(self.config.trips, *limits, now, tip.to_array()),
+            correction: Correction::none(self.config.motion, tip.to_array()),
             freshness,
             tare: Tare::Taking(Weighing::begin(now)),
             last: now,
@@ -511,9 +514,9 @@ impl<C: Clock> Engine<C> {
 
         let dt_s = (now - armed.last).as_secs_f64().min(LONGEST_CYCLE_S);
         armed.last = now;
-        armed.trajectory.step(dt_s, tip);
-        let target = axes.metres_from_point(armed.trajectory.set_point());
-        sdk.track(id, target).map_err(Trip::Call)?;
+        let target = armed.advance(dt_s);
+        sdk.track(id, axes.metres_from_point(target))
+            .map_err(Trip::Call)?;
 
         if new {
             armed.heard = now;
@@ -532,6 +535,21 @@ impl<C: Clock> Engine<C> {
 }
 
 impl Armed {
+    /// Moves the set point on; gives what the regulation is told.
+    fn advance(&mut self, dt_s: f64) -> Point3<Robot> {
+        let tip = self.tip.to_array();
+        let [x, y, z] = self.correction.without(tip);
+        self.trajectory.step(dt_s, Point3::new(x, y, z));
+        // Above the force limit nothing is added.
+        let resting = match self.trajectory.is_still() {
+            true if self.overloaded || self.must_rise => None,
+            still => Some(still),
+        };
+        let set_point = self.trajectory.set_point().to_array();
+        let [x, y, z] = self.correction.target(set_point, tip, resting, dt_s);
+        Point3::new(x, y, z)
+    }
+
     /// Checks the force with which the motors push the tip (robot frame, N). Gives the force with which the world
     /// pushes the tip up: opposite, and without what the arm needs to hang still; NaN while that is not known.
     fn weigh(

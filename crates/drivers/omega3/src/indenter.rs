@@ -48,7 +48,7 @@ impl Omega {
 
     /// Opens the robot behind any implementation of the calls; `library` is what a supervisor loads, `words` tells
     /// people about it.
-    fn with_sdk(
+    pub(crate) fn with_sdk(
         sdk: Arc<dyn Sdk>,
         config: OmegaConfig,
         library: std::path::PathBuf,

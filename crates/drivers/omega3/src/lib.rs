@@ -14,6 +14,7 @@
 pub mod axes;
 pub mod brake;
 pub mod config;
+mod correction;
 mod engine;
 pub mod enumerate;
 pub mod error;

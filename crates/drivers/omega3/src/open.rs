@@ -6,6 +6,7 @@ use skinrig_drd_abi::{
 };
 use skinrig_model::Setting;
 
+use crate::brake::brake;
 use crate::config::{Initialise, OmegaConfig, Watchdog};
 use crate::enumerate::{self, Found};
 use crate::error::OmegaError;
@@ -210,6 +211,17 @@ impl Procedure<'_> {
         if status.get(StatusField::Redundancy) == Some(0) {
             let next = "have the robot serviced";
             return self.unfit("encoders that agree", "redundant ones that do not", next);
+        }
+        if status.is(StatusField::Force) {
+            // Left behind by a program that died.
+            let wait = std::thread::sleep;
+            if let Err(live) = brake(self.sdk, self.id, &self.config.patience, wait) {
+                let next = "press the force button on its base or switch it off at the mains";
+                return self.unfit("motors off", live.to_string(), next);
+            }
+            opened
+                .remarks
+                .push("the motors were live when the robot was opened; it was braked".to_owned());
         }
         if let Some(cause) = status
             .force_off_cause()

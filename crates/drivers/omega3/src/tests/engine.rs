@@ -11,6 +11,7 @@ use skinrig_model::{DeviceIdentity, HostDuration, HostTime, Point3, Robot, Setti
 
 use super::scripted::Scripted;
 use crate::OmegaConfig;
+use crate::axes::{Axes, Axis};
 use crate::engine::Engine;
 use crate::indenter::{capabilities, check_wanted};
 use crate::open::open;
@@ -404,6 +405,37 @@ fn a_stuck_arm_pulls_no_further_than_the_lead() {
             "{lead} mm"
         );
     }
+}
+
+#[test]
+fn a_robot_that_presses_to_its_front_has_the_robot_frame_turned() {
+    let mut config = OmegaConfig::default();
+    // Robot z, away from the sample, is the device's -x.
+    config.mount.axes = Axes::new([Axis::PlusZ, Axis::PlusY, Axis::MinusX]).unwrap();
+    config.envelope.min_mm = [-40.0; 3];
+    config.envelope.max_mm = [40.0; 3];
+    let bench = Bench::with(config);
+    let limits = MotionLimits {
+        min_mm: [-30.0; 3],
+        max_mm: [30.0; 3],
+        ..LIMITS
+    };
+    bench.ask(|e| e.configure(&limits)).unwrap();
+    bench.sdk.with(|s| s.force_n = [0.0; 3]);
+    bench.ask(Engine::arm).unwrap();
+    bench.go([5.0, -3.0, -25.0], 20.0).unwrap();
+    bench.run_ms(2000);
+    let at = bench.sdk.with(|s| s.position_m);
+    let off: f64 = (0..3)
+        .map(|i| (at[i] - [0.025, -0.003, 0.005][i]).abs())
+        .sum();
+    assert!(off < 1e-6, "{at:?}");
+    // The motors push along +x, into the sample: it pushes back along robot +z.
+    bench.sdk.with(|s| s.force_n = [1.5, 0.0, 0.0]);
+    bench.run_ms(2);
+    let (samples, _) = bench.poll();
+    let last = samples.last().unwrap();
+    assert!((last.force_n - 1.5).abs() < 1e-9, "{last:?}");
 }
 
 #[test]

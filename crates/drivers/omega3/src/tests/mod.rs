@@ -2,4 +2,5 @@
 
 mod engine;
 mod open;
+mod owner;
 mod scripted;

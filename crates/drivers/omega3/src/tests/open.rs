@@ -156,3 +156,12 @@ fn a_list_names_what_is_busy_or_forbidden_and_touches_no_motor() {
         "{log:?}"
     );
 }
+
+#[test]
+fn motors_left_live_by_a_dead_program_are_braked_first() {
+    let sdk = Scripted::default();
+    sdk.with(|s| s.live = true);
+    let opened = open(&sdk, &OmegaConfig::default()).unwrap();
+    assert!(!sdk.with(|s| s.live));
+    assert!(opened.remarks.iter().any(|r| r.contains("were live")));
+}

@@ -40,6 +40,8 @@ pub struct Script {
     pub values: BTreeMap<&'static str, f64>,
     pub paces: [Pace; 2],
     pub status: BTreeMap<usize, i32>,
+    /// A call that never returns.
+    pub hangs: Option<&'static str>,
 }
 
 impl Default for Scripted {
@@ -72,6 +74,7 @@ impl Default for Scripted {
             values: BTreeMap::new(),
             paces: [fast; 2],
             status: BTreeMap::new(),
+            hangs: None,
         };
         Self {
             script: Mutex::new(script),
@@ -101,6 +104,9 @@ impl Scripted {
     }
 
     fn read<T>(&self, call: &'static str, look: impl FnOnce(&mut Script) -> T) -> Answer<T> {
+        while self.with(|s| s.hangs == Some(call)) {
+            std::thread::park_timeout(std::time::Duration::from_millis(10));
+        }
         self.with(|s| {
             if let Some((code, left)) = s.fail.get_mut(call)
                 && *left > 0
@@ -248,8 +254,10 @@ impl Sdk for Scripted {
         self.read("pace", |s| s.paces[generator as usize])
     }
     fn track(&self, _: DeviceId, target_m: [f64; 3]) -> Answer<()> {
+        if !self.with(|s| s.running) {
+            self.fail("drdTrackPos", ErrorCode::NO_REGULATION);
+        }
         self.read("drdTrackPos", |s| {
-            assert!(s.running, "a target without regulation");
             if s.log.last().is_none_or(|call| call != "drdTrackPos") {
                 s.log.push("drdTrackPos".to_owned());
             }

@@ -115,6 +115,40 @@ fn the_watchdog_brakes_the_arm_of_a_killed_program() {
 }
 
 #[test]
+fn the_watchdog_brakes_the_arm_of_a_program_that_hangs() {
+    let arm = arm();
+    let child = victim(&arm, 20.0, false);
+    let stopped = Command::new("kill")
+        .args(["-STOP", &child.id().to_string()])
+        .status();
+    assert!(stopped.is_ok_and(|s| s.success()));
+    let braked = arm.wait_until(PATIENCE, |s| s.mode == Mode::Brake);
+    kill(child);
+    braked.expect("is braked");
+}
+
+#[test]
+fn a_supervisor_that_ends_takes_the_arm_down_with_it() {
+    let arm = arm();
+    let mut config = config(&arm);
+    config.supervisor = Some(SupervisorCommand {
+        program: "sh".into(),
+        arguments: vec![
+            "-c".to_owned(),
+            "echo ready; read go; read on; read end; sleep 1".to_owned(),
+        ],
+    });
+    let mut omega = armed_with(config);
+    let error = poll_until(&mut omega, |_| false).expect_err("is told");
+    assert!(
+        error.to_string().contains("supervisor process ended"),
+        "{error}"
+    );
+    arm.wait_until(PATIENCE, |s| s.mode == Mode::Brake)
+        .expect("is braked");
+}
+
+#[test]
 fn the_supervisor_brakes_the_arm_of_a_killed_program() {
     let arm = arm();
     let child = victim(&arm, 0.0, true);
@@ -149,6 +183,10 @@ fn without_both_the_stand_in_keeps_its_force() {
     arm.wait_until(PATIENCE, |s| !s.held).expect("is let go");
     std::thread::sleep(Duration::from_millis(100));
     assert_eq!(arm.state().expect("lives").mode, Mode::Force);
+    // Whoever opens it next brakes it first.
+    let omega = open(&arm);
+    assert!(omega.remarks().iter().any(|r| r.contains("were live")));
+    assert_eq!(arm.state().expect("lives").mode, Mode::Brake);
 }
 
 #[test]

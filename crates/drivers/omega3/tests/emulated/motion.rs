@@ -158,3 +158,54 @@ fn at_the_force_limit_it_stops_and_only_rises() {
     go(&mut omega, START, 20.0);
     assert_eq!(arm.state().expect("lives").mode, Mode::Force);
 }
+
+#[test]
+fn the_tip_itself_arrives_in_soft_ground_and_only_with_the_correction() {
+    for corrected in [true, false] {
+        let arm = arm_like(&ArmConfig {
+            contact: Some(Contact::horizontal(0.015)),
+            ..ArmConfig::default()
+        });
+        let mut config = config(&arm);
+        if !corrected {
+            config.motion.correction_per_s = 0.0;
+        }
+        let mut omega = armed_with(config);
+        let deep = point([12.5, 0.0, 13.0]);
+        omega.command(deep, 10.0).expect("goes");
+        let off = |s: &skinrig_device::RobotSample| s.measured.distance_mm(deep);
+        let samples = if corrected {
+            poll_until(&mut omega, |s| off(s) < 0.03).expect("arrives")
+        } else {
+            poll_until(&mut omega, |s| s.commanded == deep).expect("arrives")
+        };
+        let last = samples.last().expect("some");
+        if corrected {
+            // 1 N/mm times 2 mm.
+            assert!((last.force_n - 2.0).abs() < 0.3, "{last:?}");
+        } else {
+            assert!(off(last) > 0.2, "{last:?}");
+        }
+    }
+}
+
+#[test]
+fn a_loop_slower_than_the_driver_gives_each_reading_once() {
+    let arm = arm_like(&ArmConfig {
+        loop_khz: 1.0,
+        ..ArmConfig::default()
+    });
+    let mut omega = armed(&arm);
+    let target = [15.0, 0.0, 18.0];
+    let samples = go(&mut omega, target, 10.0);
+    assert!(samples.windows(2).all(|w| w[0].t < w[1].t));
+    drop(omega);
+    let journal = arm.journal().expect("is readable");
+    let cached = journal
+        .calls("drdGetPositionAndOrientation")
+        .filter(|e| e.result == 1.0)
+        .count();
+    assert!(cached > 50, "the library repeated itself {cached} times");
+    let targets = journal.calls("drdTrackPos").count();
+    assert!(samples.len() < targets, "{} of {targets}", samples.len());
+}

@@ -1,0 +1,54 @@
+//! The thread that owns the library, when a call does not come back.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use skinrig_device::{DeviceError, Indenter, MotionLimits, RealClock};
+
+use super::scripted::Scripted;
+use crate::{Omega, OmegaConfig, OmegaError};
+
+const LIMITS: MotionLimits = MotionLimits {
+    min_mm: [0.0, -10.0, 0.0],
+    max_mm: [40.0, 10.0, 30.0],
+    max_speed_mm_s: 20.0,
+    max_force_n: 4.0,
+};
+
+fn open(sdk: &Arc<Scripted>) -> Result<Omega, OmegaError> {
+    let mut config = OmegaConfig::default();
+    config.trips.tare = Duration::from_millis(20);
+    config.patience.reply = Duration::from_millis(300);
+    config.patience.brake_retry = Duration::from_millis(1);
+    config.patience.open = Duration::from_millis(500);
+    let path = "scripted".into();
+    Omega::with_sdk(sdk.clone(), config, path, "scripted", RealClock::start())
+}
+
+#[test]
+fn a_call_that_never_returns_is_given_up_and_the_arm_braked_from_elsewhere() {
+    let sdk = Arc::new(Scripted::default());
+    let mut omega = open(&sdk).unwrap();
+    omega.configure(&LIMITS).unwrap();
+    omega.arm().unwrap();
+    sdk.with(|s| s.hangs = Some("dhdGetForce"));
+    let error = omega.hold().unwrap_err();
+    assert!(matches!(error, DeviceError::Lost { .. }), "{error}");
+    let text = error.to_string();
+    for word in ["did not return", "braked from another thread"] {
+        assert!(text.contains(word), "{word} is not in {text}");
+    }
+    assert!(!sdk.with(|s| s.live));
+    // Every later request fails at once, and says the same.
+    assert_eq!(omega.arm(), Err(error));
+    sdk.with(|s| s.hangs = None);
+}
+
+#[test]
+fn an_open_that_never_returns_is_given_up() {
+    let sdk = Arc::new(Scripted::default());
+    sdk.with(|s| s.hangs = Some("dhdGetStatus"));
+    let error = open(&sdk).err().unwrap();
+    assert!(matches!(error, OmegaError::Late { .. }), "{error}");
+    sdk.with(|s| s.hangs = None);
+}
