@@ -255,8 +255,29 @@ impl<'a> Accumulator<'a> {
             rates.add_in_order(inside);
         }
         self.held.take_if(|held| !held.add(inside));
-        let mut rest = inside;
-        while let Some(first) = rest.first() {
+        self.take_inside(inside);
+        self.inside = room;
+        if let Some(last) = events.last() {
+            self.newest_us = self.newest_us.max(last.t_us);
+        }
+    }
+
+    /// Takes all the events that another pass has held.
+    pub fn take_held(&mut self, held: &Held) {
+        if held.in_order() {
+            // They were looked at by the pass that held them.
+            held.for_each_slice(|events| self.take_inside(events));
+        } else {
+            held.for_each_slice(|events| self.take(events));
+        }
+    }
+
+    /// Takes events of the crop by time.
+    fn take_inside(&mut self, events: &[CdEvent]) {
+        let mut rest = events;
+        while let Some(first) = rest.first()
+            && self.error.is_none()
+        {
             self.newest_us = self.newest_us.max(first.t_us);
             if self.newest_us >= self.quiet_until_us {
                 self.move_on();
@@ -265,7 +286,6 @@ impl<'a> Accumulator<'a> {
             self.count(quiet);
             rest = later;
         }
-        self.inside = room;
         if let Some(last) = events.last() {
             self.newest_us = self.newest_us.max(last.t_us);
         }

@@ -313,7 +313,7 @@ fn camera_pass(
             let mut accumulator = Accumulator::new(camera, settings, wanted);
             let mut done = match held {
                 Some(held) => {
-                    held.for_each_slice(|events| accumulator.take(events));
+                    accumulator.take_held(&held);
                     accumulator.finish()?
                 }
                 None => pass(source, camera, accumulator)?,

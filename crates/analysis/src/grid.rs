@@ -123,6 +123,11 @@ impl PixelGrid {
         self.counts[index as usize]
     }
 
+    /// The pixels with events of one row, counted from the crop's first: the first 64 in the first word.
+    pub(crate) fn occupied(&self, row: usize) -> &[u64] {
+        self.occupied.row(row)
+    }
+
     /// Counts of one row, counted from the crop's first.
     #[must_use]
     pub fn row(&self, row: usize) -> &[u32] {

@@ -19,26 +19,35 @@ pub struct Held {
     packed: Vec<u64>,
     /// What times are counted from: half of what they can tell lies before the first event.
     start_us: u64,
+    newest_us: u64,
+    /// Some came after newer ones.
+    in_disorder: bool,
 }
 
 impl Held {
-    /// Takes the next events, all of them or none: false when there is no room, or an event cannot be packed.
+    /// Takes the next events, which lie on the sensor and are in order of time among themselves, all of them or none:
+    /// false when there is no room, or a time cannot be told.
     pub fn add(&mut self, events: &[CdEvent]) -> bool {
-        if self.packed.is_empty()
-            && let Some(first) = events.first()
-        {
+        let (Some(first), Some(last)) = (events.first(), events.last()) else {
+            return true;
+        };
+        debug_assert!(events.is_sorted_by_key(|e| e.t_us));
+        debug_assert!(
+            events
+                .iter()
+                .all(|e| e.x < SENSOR_WIDTH && e.y < SENSOR_HEIGHT)
+        );
+        if self.packed.is_empty() {
             self.start_us = first.t_us.saturating_sub(TIME_END_US / 2);
         }
         let start_us = self.start_us;
-        let packs = |e: &CdEvent| {
-            (e.t_us.wrapping_sub(start_us) < TIME_END_US)
-                & (e.x < SENSOR_WIDTH)
-                & (e.y < SENSOR_HEIGHT)
-        };
+        let tells = |e: &CdEvent| e.t_us.wrapping_sub(start_us) < TIME_END_US;
         let fits = events.len() <= MAX_EVENTS - self.packed.len();
-        if !fits || !events.iter().fold(true, |all, e| all & packs(e)) {
+        if !fits || !tells(first) || !tells(last) {
             return false;
         }
+        self.in_disorder |= first.t_us < self.newest_us;
+        self.newest_us = self.newest_us.max(last.t_us);
         self.packed.extend(events.iter().map(|e| {
             (e.t_us - start_us) << TIME_SHIFT
                 | u64::from(e.polarity == Polarity::On) << POLARITY_SHIFT
@@ -46,6 +55,11 @@ impl Held {
                 | u64::from(e.x)
         }));
         true
+    }
+
+    /// True when no event is older than one before it.
+    pub const fn in_order(&self) -> bool {
+        !self.in_disorder
     }
 
     /// Calls `each` with consecutive slices of the events, all of them, once.
@@ -82,12 +96,14 @@ mod tests {
             for slice in slices {
                 let event =
                     |(t, x, y, on)| CdEvent { t_us: from_us + t, x, y, polarity: Polarity::from_bit(on) };
-                let events: Vec<CdEvent> = slice.into_iter().map(event).collect();
+                let mut events: Vec<CdEvent> = slice.into_iter().map(event).collect();
+                events.sort_by_key(|e| e.t_us);
                 prop_assert!(held.add(&events));
                 all.extend(events);
             }
             let mut back = Vec::new();
             held.for_each_slice(|events| back.extend_from_slice(events));
+            prop_assert_eq!(held.in_order(), all.is_sorted_by_key(|e: &CdEvent| e.t_us));
             prop_assert_eq!(back, all);
         }
     }
@@ -104,14 +120,8 @@ mod tests {
         let earliest = TIME_END_US / 2;
         let mut held = Held::default();
         assert!(held.add(&[first]));
-        for bad in [
-            event(earliest + TIME_END_US, 0, 0),
-            event(earliest - 1, 0, 0),
-            event(TIME_END_US, 640, 0),
-            event(TIME_END_US, 0, 480),
-        ] {
-            assert!(!held.add(&[first, bad]));
-        }
+        assert!(!held.add(&[first, event(earliest + TIME_END_US, 0, 0)]));
+        assert!(!held.add(&[event(earliest - 1, 0, 0), first]));
         assert_eq!(held.packed.len(), 1);
         assert!(held.add(&[
             event(earliest, 0, 0),

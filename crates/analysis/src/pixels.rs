@@ -1,4 +1,4 @@
-//! A set of pixels, one bit each, that is walked in order and searched along its rows.
+//! A set of pixels, one bit each, that is walked in order.
 
 use skinrig_model::SENSOR_WIDTH;
 
@@ -35,11 +35,6 @@ impl PixelSet {
         self.words[index / BITS] |= 1 << (index % BITS);
     }
 
-    /// True when the pixel is in the set.
-    pub fn contains(&self, index: usize) -> bool {
-        self.words[index / BITS] >> (index % BITS) & 1 == 1
-    }
-
     /// The indices in the set, ascending: row by row, each from left to right.
     pub fn iter(&self) -> impl Iterator<Item = usize> {
         ones(&self.words)
@@ -56,45 +51,8 @@ impl PixelSet {
         }
     }
 
-    /// The columns in the set of one row, ascending.
-    pub fn columns(&self, row: usize) -> impl Iterator<Item = usize> {
-        ones(self.row(row))
-    }
-
-    /// The column in `row` nearest to `column` and at most `reach` away; the left one of two.
-    pub fn nearest(&self, row: usize, column: usize, reach: usize) -> Option<usize> {
-        let (left, right) = if reach < BITS {
-            self.around(row * WIDTH + column)
-        } else {
-            let columns = || self.columns(row);
-            let left = columns().take_while(|c| *c <= column).last();
-            let right = columns().find(|c| *c >= column);
-            (
-                left.map_or(usize::MAX, |c| column - c),
-                right.map_or(usize::MAX, |c| c - column),
-            )
-        };
-        // What lies beyond the ends of the row belongs to the rows above and below.
-        let left_counts = left <= reach.min(column);
-        let right_counts = right <= reach.min(WIDTH - 1 - column);
-        if left_counts && (left <= right || !right_counts) {
-            Some(column - left)
-        } else {
-            right_counts.then(|| column + right)
-        }
-    }
-
-    /// Distances, in indices, from `index` down and up to the nearest members, 0 for itself; right when less than 64.
-    fn around(&self, index: usize) -> (usize, usize) {
-        let (at, bit) = (index / BITS, index % BITS);
-        let word = |at: usize| u128::from(self.words.get(at).copied().unwrap_or(0));
-        let here = word(at);
-        let down = (here << BITS | word(at.wrapping_sub(1))) << (BITS - 1 - bit);
-        let up = (word(at + 1) << BITS | here) >> bit;
-        (down.leading_zeros() as usize, up.trailing_zeros() as usize)
-    }
-
-    fn row(&self, row: usize) -> &[u64] {
+    /// The words of one row.
+    pub fn row(&self, row: usize) -> &[u64] {
         &self.words[row * ROW_WORDS..(row + 1) * ROW_WORDS]
     }
 }
@@ -119,25 +77,13 @@ mod tests {
 
     proptest! {
         #[test]
-        fn members_come_in_order_and_the_nearest_is_the_nearest(
-            members in btree_set(0usize..2 * WIDTH, 0..40), column in 0usize..WIDTH, reach in 0usize..WIDTH,
-        ) {
+        fn members_come_in_order(members in btree_set(0usize..2 * WIDTH, 0..40)) {
             let mut set = PixelSet::new(2);
             members.iter().for_each(|m| set.insert(*m));
             prop_assert!(set.iter().eq(members.iter().copied()));
             let mut indices = Vec::new();
             set.append_to(&mut indices);
             prop_assert!(indices.iter().map(|i| *i as usize).eq(members.iter().copied()));
-            for row in 0..2 {
-                let columns: Vec<usize> =
-                    members.iter().filter(|m| *m / WIDTH == row).map(|m| m % WIDTH).collect();
-                prop_assert!(set.columns(row).eq(columns.iter().copied()));
-                prop_assert_eq!(set.contains(row * WIDTH + column), columns.contains(&column));
-                // The first of the least distances is the left one.
-                let nearest = columns.iter().copied().min_by_key(|c| c.abs_diff(column));
-                let expected = nearest.filter(|c| c.abs_diff(column) <= reach);
-                prop_assert_eq!(set.nearest(row, column, reach), expected);
-            }
             set.reset(1);
             prop_assert_eq!(set.iter().next(), None);
         }

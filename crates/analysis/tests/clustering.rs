@@ -194,7 +194,7 @@ proptest! {
     #[test]
     fn pixel_counts_give_what_the_definition_gives(
         events in scenes(),
-        eps in prop_oneof![Just(10.0), Just(1.0), Just(0.5), Just(50.0), 0.1f64..50.0],
+        eps in prop_oneof![Just(10.0), Just(1.0), Just(0.5), Just(50.0), 0.1f64..50.0, 50.0f64..300.0],
         min_samples in prop_oneof![Just(10u32), Just(1), 1u32..40],
     ) {
         let wanted = reference(&events, eps, min_samples);

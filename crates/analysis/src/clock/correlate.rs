@@ -4,9 +4,18 @@ use std::f64::consts::TAU;
 
 type Complex = (f64, f64);
 
-/// In-place radix-2 transform (Cooley and Tukey 1965) of a power-of-two length; unscaled. `inverse` flips the
-/// sign of the exponent.
-fn transform(data: &mut [Complex], inverse: bool) {
+/// The roots of unity of which a transform of length `n` makes use, by falling angle.
+fn roots(n: usize) -> Vec<Complex> {
+    let root = |k| {
+        let (sin, cos) = libm::sincos(-TAU * k as f64 / n as f64);
+        (cos, sin)
+    };
+    (0..n / 2).map(root).collect()
+}
+
+/// In-place radix-2 transform (Cooley and Tukey 1965) of a power-of-two length, for which the roots are; unscaled.
+/// `inverse` flips the sign of the exponent.
+fn transform(data: &mut [Complex], roots: &[Complex], inverse: bool) {
     let n = data.len();
     let bits = n.trailing_zeros();
     for i in 0..n {
@@ -15,20 +24,15 @@ fn transform(data: &mut [Complex], inverse: bool) {
             data.swap(i, j);
         }
     }
-    let sign = if inverse { 1.0 } else { -1.0 };
-    let roots: Vec<Complex> = (0..n / 2)
-        .map(|k| {
-            let (sin, cos) = libm::sincos(sign * TAU * k as f64 / n as f64);
-            (cos, sin)
-        })
-        .collect();
+    let sign = if inverse { -1.0 } else { 1.0 };
     let mut half = 1;
     while half < n {
         let stride = n / (2 * half);
         for block in data.chunks_exact_mut(2 * half) {
             let (low, high) = block.split_at_mut(half);
-            for (k, (a, b)) in low.iter_mut().zip(high).enumerate() {
-                let t = product(*b, roots[k * stride]);
+            let roots = roots.iter().step_by(stride);
+            for ((a, b), root) in low.iter_mut().zip(high).zip(roots) {
+                let t = product(*b, (root.0, sign * root.1));
                 *b = (a.0 - t.0, a.1 - t.1);
                 *a = (a.0 + t.0, a.1 + t.1);
             }
@@ -44,6 +48,7 @@ fn product(a: Complex, b: Complex) -> Complex {
 /// One series, transformed once, to be correlated with several templates.
 pub struct Correlator {
     transformed: Vec<Complex>,
+    roots: Vec<Complex>,
     length: usize,
     longest_template: usize,
 }
@@ -56,9 +61,11 @@ impl Correlator {
         for (to, from) in transformed.iter_mut().zip(series) {
             to.0 = *from;
         }
-        transform(&mut transformed, false);
+        let roots = roots(size);
+        transform(&mut transformed, &roots, false);
         Self {
             transformed,
+            roots,
             length: series.len(),
             longest_template,
         }
@@ -73,11 +80,11 @@ impl Correlator {
         for (to, from) in work.iter_mut().zip(template) {
             to.0 = *from;
         }
-        transform(&mut work, false);
+        transform(&mut work, &self.roots, false);
         for (w, s) in work.iter_mut().zip(&self.transformed) {
             *w = product(*s, (w.0, -w.1));
         }
-        transform(&mut work, true);
+        transform(&mut work, &self.roots, true);
         let behind = template.len().saturating_sub(1) as i64;
         let mut best = (0, f64::NEG_INFINITY);
         for lag in -behind..self.length as i64 {

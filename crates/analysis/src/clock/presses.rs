@@ -429,6 +429,29 @@ fn onset_us(activity: &Activity, presses: &[PressSpan], map: Map) -> f64 {
     profile.from_us + (before as f64 + part) * activity.bin_us
 }
 
+/// The sum of the products of a template with the samples, from each sample on after which there are enough.
+fn products(template: &[f64], samples: &[f64]) -> Vec<f64> {
+    /// Sums that are made side by side: none has to wait for another.
+    const LANES: usize = 4;
+    let n = (samples.len() + 1).saturating_sub(template.len());
+    // The last sums may have neighbours that are not wanted.
+    let mut samples = samples.to_vec();
+    samples.resize(samples.len() + LANES - 1, 0.0);
+    let mut sums = vec![0.0; n.next_multiple_of(LANES)];
+    for (first, sums) in sums.chunks_exact_mut(LANES).enumerate() {
+        let mut side_by_side = [0.0; LANES];
+        let rest = &samples[first * LANES..];
+        for (t, samples) in template.iter().zip(rest.windows(LANES)) {
+            for (sum, sample) in side_by_side.iter_mut().zip(samples) {
+                *sum += t * sample;
+            }
+        }
+        sums.copy_from_slice(&side_by_side);
+    }
+    sums.truncate(n);
+    sums
+}
+
 /// For each press that stands out, its predicted contact moved by its own lag against the profile.
 fn lags(
     activity: &Activity,
@@ -449,15 +472,7 @@ fn lags(
         let samples: Vec<f64> = (-steps - 1..=steps + profile.values.len() as i64)
             .map(|k| activity.at(start + k as f64 * activity.bin_us))
             .collect();
-        let matches: Vec<f64> = (0..=(2 * steps + 2) as usize)
-            .map(|lag| {
-                template
-                    .iter()
-                    .zip(&samples[lag.min(samples.len() - template.len())..])
-                    .map(|(t, s)| t * s)
-                    .sum()
-            })
-            .collect();
+        let matches = products(&template, &samples);
         let inner = 1..matches.len() - 1;
         let Some(best) = inner.max_by(|a, b| matches[*a].total_cmp(&matches[*b])) else {
             continue;

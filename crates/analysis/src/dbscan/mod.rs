@@ -1,0 +1,433 @@
+//! DBSCAN as scikit-learn defines it, computed on pixel counts instead of events.
+//!
+//! Events are integer pixels, so a press is a grid of counts and every question about neighbours becomes a
+//! question about discs on that grid: an event is *core* when the disc of radius eps about it (border
+//! included) holds at least `min_samples` events, itself and duplicates counted. Core pixels within eps of
+//! each other are one cluster. A *border* event is not core but within eps of a core pixel. Everything else is
+//! noise. Core, border and noise are exactly scikit-learn's.
+//!
+//! Where two clusters reach the same border event, scikit-learn gives it to the one that its input order
+//! happened to expand first. There is no input order here; the rule is: **the border event belongs to the
+//! cluster of its nearest core pixel; of equally near ones the first by row, then column, decides.** Clusters
+//! are numbered by their first core pixel in the same order.
+//!
+//! Distances are compared squared (`dx² + dy² <= eps * eps`), as scikit-learn's trees do.
+
+mod tiles;
+
+use self::tiles::{SIDE, Tiles, ones};
+use crate::grid::PixelGrid;
+
+/// The label of events that belong to no cluster.
+pub const NOISE: u32 = u32::MAX;
+
+const WIDTH: usize = PixelGrid::WIDTH;
+
+/// One cluster.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Cluster {
+    /// Events in it, core and border.
+    pub events: u64,
+    /// Sum of their columns, px.
+    pub sum_u: u64,
+    /// Sum of their rows on the sensor, px.
+    pub sum_v: u64,
+}
+
+impl Cluster {
+    /// Mean column and row, px; `None` without events.
+    #[must_use]
+    pub fn centroid(&self) -> Option<(f64, f64)> {
+        (self.events > 0).then(|| {
+            let n = self.events as f64;
+            (self.sum_u as f64 / n, self.sum_v as f64 / n)
+        })
+    }
+
+    /// Both together.
+    #[must_use]
+    pub const fn merged(self, other: Self) -> Self {
+        Self {
+            events: self.events + other.events,
+            sum_u: self.sum_u + other.sum_u,
+            sum_v: self.sum_v + other.sum_v,
+        }
+    }
+}
+
+/// The algorithm with its buffers, to be used for press after press.
+///
+/// The pixels are handled in tiles of 8 by 8, each a word of bits. What a disc covers of the tiles about it is a mask
+/// for each of them, so that counting the events near a pixel, joining core pixels and finding borders take a few
+/// words each.
+#[derive(Debug, Clone)]
+pub struct Dbscan {
+    min_samples: u32,
+    tiles: Tiles,
+    /// True when all pixels of a tile lie within eps of each other.
+    tile_is_near: bool,
+    /// Per tile, frame included, what is known of it.
+    all: Vec<Tile>,
+    /// The tiles with events.
+    occupied: Vec<usize>,
+    groups: Vec<Group>,
+    /// Rows of the grid.
+    height: usize,
+    clusters: Vec<Cluster>,
+}
+
+#[derive(Debug, Clone, Copy, Default)]
+struct Tile {
+    /// Pixels with events.
+    occupied: u64,
+    /// Core pixels.
+    core: u64,
+    /// Events.
+    events: u32,
+    /// Its groups: the first and the one after the last.
+    groups: (u32, u32),
+}
+
+/// Core pixels of one tile that are one cluster without the help of others.
+#[derive(Debug, Clone, Copy)]
+struct Group {
+    tile: usize,
+    core: u64,
+    /// Index of its first pixel.
+    first: u32,
+    /// Another group of its cluster, with an earlier first pixel; or itself.
+    parent: u32,
+    label: u32,
+}
+
+impl Dbscan {
+    /// DBSCAN with radius `eps_px` (0..=640 px) and core threshold `min_samples` (at least 1).
+    #[must_use]
+    pub fn new(eps_px: f64, min_samples: u32) -> Self {
+        let tiles = Tiles::new(eps_px);
+        let own = |at| tiles.masks(at).first() == Some(&u64::MAX);
+        Self {
+            min_samples,
+            tile_is_near: (0..SIDE * SIDE).all(own),
+            tiles,
+            all: Vec::new(),
+            occupied: Vec::new(),
+            groups: Vec::new(),
+            height: 0,
+            clusters: Vec::new(),
+        }
+    }
+
+    /// Clusters the events of `grid`; the result lasts until the next call.
+    pub fn run(&mut self, grid: &PixelGrid) -> &[Cluster] {
+        self.load(grid);
+        self.find_core(grid);
+        self.join();
+        self.number();
+        self.sum(grid);
+        &self.clusters
+    }
+
+    /// The clusters of the last run.
+    #[must_use]
+    pub fn clusters(&self) -> &[Cluster] {
+        &self.clusters
+    }
+
+    /// (index of the pixel as in [`PixelGrid::sorted_pixels`], its cluster or [`NOISE`]) of the last run.
+    pub fn labels(&self) -> impl Iterator<Item = (u32, u32)> {
+        self.pixels(|tile| tile.occupied)
+            .map(|(index, tile, at)| (index, self.label(tile, at).unwrap_or(NOISE)))
+    }
+
+    /// Indices of the core pixels of the last run, ascending; every event of such a pixel is core.
+    pub fn core_pixels(&self) -> impl Iterator<Item = u32> {
+        self.pixels(|tile| tile.core).map(|(index, ..)| index)
+    }
+
+    /// The largest cluster of the last run, the first of equal ones, with its number.
+    #[must_use]
+    pub fn largest(&self) -> Option<(u32, Cluster)> {
+        let mut best: Option<(u32, Cluster)> = None;
+        for (i, c) in self.clusters.iter().enumerate() {
+            if best.is_none_or(|(_, b)| c.events > b.events) {
+                best = Some((i as u32, *c));
+            }
+        }
+        best
+    }
+
+    /// (index, tile, place in the tile) of some pixels, ascending.
+    fn pixels(&self, of: fn(&Tile) -> u64) -> impl Iterator<Item = (u32, usize, usize)> {
+        (0..self.height).flat_map(move |row| {
+            let first = self.tiles.first(row);
+            let start = row % SIDE * SIDE;
+            (0..WIDTH / SIDE).flat_map(move |i| {
+                let bits = of(&self.all[first + i]) >> start & 0xff;
+                let index = row * WIDTH + i * SIDE;
+                ones(bits).map(move |bit| ((index + bit) as u32, first + i, start + bit))
+            })
+        })
+    }
+
+    /// Index of the first pixel of a tile.
+    fn corner(&self, tile: usize) -> usize {
+        let (row, column) = self.tiles.corner(tile);
+        row * WIDTH + column
+    }
+
+    /// The pixels and events of each tile.
+    fn load(&mut self, grid: &PixelGrid) {
+        self.height = grid.height();
+        for tile in self.occupied.drain(..) {
+            self.all[tile] = Tile::default();
+        }
+        let count = self.tiles.count(self.height);
+        self.all.resize(count, Tile::default());
+        for row in 0..self.height {
+            let (first, start) = (self.tiles.first(row), row % SIDE * SIDE);
+            let (counts, _) = grid.row(row).as_chunks::<SIDE>();
+            for (i, word) in grid.occupied(row).iter().enumerate() {
+                let mut left = *word;
+                while left != 0 {
+                    let k = left.trailing_zeros() as usize / SIDE;
+                    let bits = left >> (k * SIDE) & 0xff;
+                    left ^= bits << (k * SIDE);
+                    let at = i * SIDE + k;
+                    let tile = &mut self.all[first + at];
+                    if tile.occupied == 0 {
+                        self.occupied.push(first + at);
+                    }
+                    tile.occupied |= bits << start;
+                    tile.events += counts[at].iter().sum::<u32>();
+                }
+            }
+        }
+    }
+
+    fn find_core(&mut self, grid: &PixelGrid) {
+        self.groups.clear();
+        for &index in &self.occupied {
+            let tile = self.all[index];
+            let corner = self.corner(index);
+            let core = if self.tile_is_near && tile.events >= self.min_samples {
+                tile.occupied
+            } else {
+                ones(tile.occupied)
+                    .filter(|at| self.is_core(grid, index, corner, *at))
+                    .fold(0, |all, at| all | 1 << at)
+            };
+            if core == 0 {
+                continue;
+            }
+            let from = self.groups.len() as u32;
+            let mut left = core;
+            while left != 0 {
+                let first = left.trailing_zeros() as usize;
+                let core = self.connected(first, left);
+                left &= !core;
+                self.groups.push(Group {
+                    tile: index,
+                    core,
+                    first: (corner + offset(first)) as u32,
+                    parent: self.groups.len() as u32,
+                    label: 0,
+                });
+            }
+            self.all[index].core = core;
+            self.all[index].groups = (from, self.groups.len() as u32);
+        }
+    }
+
+    /// True when enough events lie in the disc about a pixel of a tile whose first pixel has the index `corner`.
+    #[inline]
+    fn is_core(&self, grid: &PixelGrid, tile: usize, corner: usize, at: usize) -> bool {
+        let mut events = 0;
+        for (step, mask) in self.tiles.steps().iter().zip(self.tiles.masks(at)) {
+            let near = &self.all[tile.wrapping_add(step.by)];
+            let mut within = near.occupied & mask;
+            if within == near.occupied {
+                events += near.events;
+            } else {
+                let corner = corner.wrapping_add(step.pixels);
+                while within != 0 {
+                    events +=
+                        grid.count((corner + offset(within.trailing_zeros() as usize)) as u32);
+                    within &= within - 1;
+                }
+            }
+            if events >= self.min_samples {
+                return true;
+            }
+        }
+        false
+    }
+
+    /// Those of the core pixels of a tile that are one cluster with the one at `first`.
+    fn connected(&self, first: usize, core: u64) -> u64 {
+        if self.tile_is_near {
+            return core;
+        }
+        let (mut all, mut fresh) = (0, 1 << first);
+        while fresh != 0 {
+            all |= fresh;
+            let near = ones(fresh).filter_map(|at| self.tiles.masks(at).first());
+            fresh = near.fold(0, |near, mask| near | mask) & core & !all;
+        }
+        all
+    }
+
+    /// Joins the groups that have pixels within eps of each other.
+    fn join(&mut self) {
+        let steps = self.tiles.steps().iter().enumerate();
+        let forward = steps.filter(|(_, step)| step.is_forward());
+        for a in 0..self.groups.len() {
+            let Group { tile, core, .. } = self.groups[a];
+            let mut root = find(&mut self.groups, a);
+            // Near tiles first: what they join need not be looked at again.
+            for (k, step) in forward.clone() {
+                let able = core & step.able;
+                if able == 0 {
+                    continue;
+                }
+                let (from, to) = self.all[tile.wrapping_add(step.by)].groups;
+                for b in from as usize..to as usize {
+                    let found = find(&mut self.groups, b);
+                    let others = self.groups[b].core;
+                    let touch = |at| self.tiles.masks(at)[k] & others != 0;
+                    if found != root && ones(able).any(touch) {
+                        let (early, late) = if self.groups[found].first < self.groups[root].first {
+                            (found, root)
+                        } else {
+                            (root, found)
+                        };
+                        self.groups[late].parent = early as u32;
+                        root = early;
+                    }
+                }
+            }
+        }
+    }
+
+    /// Numbers the clusters by their first core pixel.
+    fn number(&mut self) {
+        let roots = self
+            .groups
+            .iter()
+            .enumerate()
+            .filter(|(i, g)| g.parent as usize == *i);
+        let mut roots: Vec<(u32, usize)> = roots.map(|(i, g)| (g.first, i)).collect();
+        roots.sort_unstable();
+        for (label, (_, root)) in (0..).zip(&roots) {
+            self.groups[*root].label = label;
+        }
+        for i in 0..self.groups.len() {
+            let root = find(&mut self.groups, i);
+            self.groups[i].label = self.groups[root].label;
+        }
+        self.clusters.clear();
+        self.clusters.resize(roots.len(), Cluster::default());
+    }
+
+    /// Sums of the clusters.
+    fn sum(&mut self, grid: &PixelGrid) {
+        let mut clusters = std::mem::take(&mut self.clusters);
+        let top = u64::from(grid.rows().0);
+        for &index in &self.occupied {
+            let tile = &self.all[index];
+            let (row, column) = self.tiles.corner(index);
+            let corner = row * WIDTH + column;
+            let mut add = |label: u32, pixels: u64| {
+                let (mut n, mut right, mut down) = (0, 0, 0);
+                for at in ones(pixels) {
+                    let count = u64::from(grid.count((corner + offset(at)) as u32));
+                    n += count;
+                    right += count * (at % SIDE) as u64;
+                    down += count * (at / SIDE) as u64;
+                }
+                let cluster = &mut clusters[label as usize];
+                cluster.events += n;
+                cluster.sum_u += n * column as u64 + right;
+                cluster.sum_v += n * (row as u64 + top) + down;
+            };
+            for group in self.groups_of(index) {
+                add(group.label, group.core);
+            }
+            let rest = tile.occupied & !tile.core;
+            if rest != 0 && self.is_near_core(index) {
+                for at in ones(rest) {
+                    if let Some(label) = self.border(index, at) {
+                        add(label, 1 << at);
+                    }
+                }
+            }
+        }
+        self.clusters = clusters;
+    }
+
+    /// True when a disc about a pixel of a tile may hold core pixels.
+    fn is_near_core(&self, tile: usize) -> bool {
+        let core = |by| self.all[tile.wrapping_add(by)].core;
+        self.tiles.steps().iter().any(|step| core(step.by) != 0)
+    }
+
+    /// The cluster of a pixel with events.
+    fn label(&self, tile: usize, at: usize) -> Option<u32> {
+        self.core_label(tile, at).or_else(|| self.border(tile, at))
+    }
+
+    /// The cluster of a core pixel.
+    fn core_label(&self, tile: usize, at: usize) -> Option<u32> {
+        let mut groups = self.groups_of(tile).iter();
+        groups.find(|g| g.core >> at & 1 == 1).map(|g| g.label)
+    }
+
+    /// The cluster of the core pixel that is nearest to one that is not core and within eps; of equally near ones the
+    /// first by row, then column, counts.
+    #[inline]
+    fn border(&self, tile: usize, at: usize) -> Option<u32> {
+        let masks = self.tiles.steps().iter().zip(self.tiles.masks(at));
+        let met = masks.filter_map(|(step, mask)| {
+            let other = tile.wrapping_add(step.by);
+            let within = self.all[other].core & mask;
+            (within != 0).then_some((step, other, within))
+        });
+        let mut labels = met.clone().flat_map(|(_, other, within)| {
+            let groups = self.groups_of(other).iter();
+            groups
+                .filter(move |g| g.core & within != 0)
+                .map(|g| g.label)
+        });
+        let label = labels.next()?;
+        if labels.all(|other| other == label) {
+            return Some(label);
+        }
+        let pixels = met.flat_map(|(step, other, within)| {
+            let corner = self.corner(other);
+            ones(within).map(move |to| (step.squared(at, to), corner + offset(to), other, to))
+        });
+        // No two of them have the same index.
+        let (.., other, to) = pixels.min()?;
+        self.core_label(other, to)
+    }
+
+    fn groups_of(&self, tile: usize) -> &[Group] {
+        let (from, to) = self.all[tile].groups;
+        &self.groups[from as usize..to as usize]
+    }
+}
+
+/// What is added to the index of a tile's first pixel for the pixel at a place.
+#[inline]
+const fn offset(at: usize) -> usize {
+    at / SIDE * WIDTH + at % SIDE
+}
+
+/// The first group of a group's cluster, as far as it is known.
+fn find(groups: &mut [Group], mut i: usize) -> usize {
+    while groups[i].parent as usize != i {
+        groups[i].parent = groups[groups[i].parent as usize].parent;
+        i = groups[i].parent as usize;
+    }
+    i
+}

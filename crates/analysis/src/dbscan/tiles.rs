@@ -1,0 +1,207 @@
+//! Tiles of 8 by 8 pixels, each a word of bits, and discs as masks of tiles: a disc meets a few tiles only.
+
+use super::WIDTH;
+
+/// Pixels along a side of a tile.
+pub(super) const SIDE: usize = 8;
+/// Tiles in a row of tiles.
+const ACROSS: usize = WIDTH / SIDE;
+const _: () = assert!(WIDTH.is_multiple_of(SIDE) && SIDE * SIDE == u64::BITS as usize);
+
+/// The way from a tile to one that discs about its pixels may meet.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Step {
+    /// To be added to the index of the tile, wrapping.
+    pub by: usize,
+    /// To be added to the index of a pixel, wrapping.
+    pub pixels: usize,
+    /// The pixels of the tile of which the discs meet the other, by their places.
+    pub able: u64,
+    /// Tiles down and to the right.
+    rows: isize,
+    columns: isize,
+}
+
+impl Step {
+    /// True for half of the steps to other tiles, one of each two that lead there and back.
+    pub fn is_forward(&self) -> bool {
+        (self.rows, self.columns) > (0, 0)
+    }
+
+    /// The squared distance of a pixel of the tile, by its place, from one of the other.
+    pub fn squared(&self, from: usize, to: usize) -> usize {
+        let apart = |tiles: isize, from: usize, to: usize| {
+            (tiles * SIDE as isize + to as isize).abs_diff(from as isize)
+        };
+        let dy = apart(self.rows, from / SIDE, to / SIDE);
+        let dx = apart(self.columns, from % SIDE, to % SIDE);
+        dx * dx + dy * dy
+    }
+}
+
+/// The tiles of a grid, in a frame of empty ones as wide as discs reach, and the steps between them.
+#[derive(Debug, Clone)]
+pub(super) struct Tiles {
+    /// Width of the frame.
+    margin: usize,
+    /// Tiles from one row of tiles to the next.
+    stride: usize,
+    /// Near tiles first, the tile itself the very first. None when no disc holds even its own pixel.
+    steps: Vec<Step>,
+    /// For each pixel of a tile, what the disc about it covers of the tile at each step.
+    masks: Vec<u64>,
+}
+
+impl Tiles {
+    /// For discs of radius `eps_px`, border included, of which no more than the sensor's width counts.
+    pub fn new(eps_px: f64) -> Self {
+        let eps_sq = eps_px * eps_px;
+        let fits = |dx: usize, dy: usize| (dx * dx + dy * dy) as f64 <= eps_sq;
+        // Half width at each row distance.
+        let half: Vec<usize> = (0..WIDTH)
+            .take_while(|&dy| fits(0, dy))
+            .map(|dy| (0..WIDTH).take_while(|&dx| fits(dx, dy)).count() - 1)
+            .collect();
+        let margin = half.first().map_or(0, |reach| reach.div_ceil(SIDE));
+        let stride = ACROSS + 2 * margin;
+        let most = margin as isize;
+        let all = (-most..=most).flat_map(|rows| (-most..=most).map(move |c| (rows, c)));
+        let mut steps: Vec<(Step, [u64; SIDE * SIDE])> = all
+            .map(|(rows, columns)| {
+                let masks = masks(&half, rows, columns);
+                let down = rows * (SIDE * WIDTH) as isize;
+                let meets = |at: &usize| masks[*at] != 0;
+                let step = Step {
+                    by: (rows * stride as isize + columns) as usize,
+                    pixels: (down + columns * SIDE as isize) as usize,
+                    able: (0..SIDE * SIDE)
+                        .filter(meets)
+                        .fold(0, |all, at| all | 1 << at),
+                    rows,
+                    columns,
+                };
+                (step, masks)
+            })
+            .filter(|(step, _)| step.able != 0)
+            .collect();
+        steps.sort_by_key(|(s, _)| s.rows * s.rows + s.columns * s.columns);
+        Self {
+            margin,
+            stride,
+            masks: (0..SIDE * SIDE)
+                .flat_map(|at| steps.iter().map(move |(_, masks)| masks[at]))
+                .collect(),
+            steps: steps.into_iter().map(|(step, _)| step).collect(),
+        }
+    }
+
+    /// The steps to all tiles that a disc about some pixel of a tile meets.
+    pub fn steps(&self) -> &[Step] {
+        &self.steps
+    }
+
+    /// What the disc about a pixel of a tile, by its place, covers at each step.
+    #[inline]
+    pub fn masks(&self, at: usize) -> &[u64] {
+        let n = self.steps.len();
+        &self.masks[at * n..(at + 1) * n]
+    }
+
+    /// How many tiles there are for so many rows of pixels, with the frame.
+    pub const fn count(&self, height: usize) -> usize {
+        (height.div_ceil(SIDE) + 2 * self.margin) * self.stride
+    }
+
+    /// Index of the tile of a row's first pixel.
+    #[inline]
+    pub const fn first(&self, row: usize) -> usize {
+        (row / SIDE + self.margin) * self.stride + self.margin
+    }
+
+    /// (row, column) of the first pixel of a tile that is none of the frame.
+    pub const fn corner(&self, tile: usize) -> (usize, usize) {
+        let (row, column) = (tile / self.stride, tile % self.stride);
+        ((row - self.margin) * SIDE, (column - self.margin) * SIDE)
+    }
+}
+
+/// For each pixel of a tile, what the disc about it covers of the tile so many tiles away.
+fn masks(half: &[usize], rows: isize, columns: isize) -> [u64; SIDE * SIDE] {
+    let side = SIDE as isize;
+    let mut masks = [0; SIDE * SIDE];
+    for (at, mask) in masks.iter_mut().enumerate() {
+        let (row, column) = ((at / SIDE) as isize, (at % SIDE) as isize);
+        for other in 0..side {
+            let Some(half) = half.get((rows * side + other - row).unsigned_abs()) else {
+                continue;
+            };
+            // The columns of the other tile that lie within.
+            let middle = column - columns * side;
+            let first = (middle - *half as isize).max(0);
+            let last = (middle + *half as isize).min(side - 1);
+            if first <= last {
+                let columns = (1_u64 << (last - first + 1)) - 1;
+                *mask |= columns << first << (other * side);
+            }
+        }
+    }
+    masks
+}
+
+/// The places of the ones in a word, ascending.
+#[inline]
+pub(super) fn ones(mut word: u64) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let bit = word.trailing_zeros() as usize;
+        let found = (word != 0).then_some(bit);
+        word &= word.wrapping_sub(1);
+        found
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn masks_are_discs_and_all_of_them() {
+        for eps in [0.0, 0.9, 1.0, 1.5, 7.0, 8.0, 9.0, 10.0, 16.5, 40.0] {
+            let tiles = Tiles::new(eps);
+            assert_eq!((tiles.steps[0].rows, tiles.steps[0].columns), (0, 0));
+            for at in 0..SIDE * SIDE {
+                let mut covered = 0;
+                for (step, mask) in tiles.steps.iter().zip(tiles.masks(at)) {
+                    for to in 0..SIDE * SIDE {
+                        let within = step.squared(at, to) as f64 <= eps * eps;
+                        assert_eq!(mask >> to & 1 == 1, within, "eps {eps}: {at}, {to}");
+                    }
+                    covered += mask.count_ones();
+                }
+                let range = -41..=41_i32;
+                let all = range
+                    .clone()
+                    .flat_map(|x| range.clone().map(move |y| x * x + y * y));
+                let disc = all
+                    .filter(|squared| f64::from(*squared) <= eps * eps)
+                    .count();
+                assert_eq!(covered as usize, disc, "eps {eps}: {at}");
+            }
+        }
+        assert!(Tiles::new(f64::NAN).steps.is_empty());
+    }
+
+    #[test]
+    fn tiles_know_their_places_and_steps_do_not_leave_them() {
+        let tiles = Tiles::new(10.0);
+        for (row, column) in [(0, 0), (7, 639), (8, 8), (175, 320)] {
+            let tile = tiles.first(row) + column / SIDE;
+            assert_eq!(
+                tiles.corner(tile),
+                (row / SIDE * SIDE, column / SIDE * SIDE)
+            );
+            for step in &tiles.steps {
+                assert!(tile.wrapping_add(step.by) < tiles.count(176));
+            }
+        }
+    }
+}
