@@ -1,6 +1,7 @@
-//! A whole campaign in one run: simulate and record, verify, analyse; seconds and memory of each.
+//! A whole campaign: simulate and record, verify, analyse; seconds and memory of each, and how they grow with the events.
 //!
-//! `SKINRIG_BENCH_REPETITIONS` sets how many of the published ten repetitions are run; 1 when absent.
+//! `SKINRIG_BENCH_REPETITIONS` says how many of the published ten repetitions are run, one campaign for each number;
+//! `1,3,10` when absent.
 #![expect(clippy::print_stdout, reason = "a bench prints its table")]
 
 use std::ffi::OsString;
@@ -10,7 +11,8 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use skinrig::exit::Exit;
-use skinrig_bench::memory::{peak_mb, reset_peak};
+use skinrig_bench::memory::{bytes_read, peak_mb, reset_peak};
+use skinrig_recorder::SessionReader;
 
 const PROTOCOL: &str = concat!(
     env!("CARGO_MANIFEST_DIR"),
@@ -23,16 +25,27 @@ struct Stage {
     seconds: f64,
     /// Largest resident memory during the part; `None` where the system does not say.
     peak_mb: Option<f64>,
+    /// Bytes that the process asked the system for during the part; `None` where the system does not say.
+    read: Option<u64>,
+}
+
+/// What one campaign took to be analysed.
+struct Campaign {
+    events: u64,
+    bytes: u64,
+    analysing: Stage,
 }
 
 fn stage(what: &'static str, work: impl FnOnce()) -> Stage {
     reset_peak();
+    let read = bytes_read();
     let start = Instant::now();
     work();
     Stage {
         what,
         seconds: start.elapsed().as_secs_f64(),
         peak_mb: peak_mb(),
+        read: bytes_read().zip(read).map(|(now, before)| now - before),
     }
 }
 
@@ -83,12 +96,49 @@ fn plain_write(source: &Path, target: &Path) -> f64 {
 }
 
 fn main() {
-    let repetitions = match std::env::var("SKINRIG_BENCH_REPETITIONS") {
-        Ok(text) => text
-            .parse()
-            .expect("SKINRIG_BENCH_REPETITIONS: a number from 1 to 10"),
-        Err(_) => 1,
+    let wanted = std::env::var("SKINRIG_BENCH_REPETITIONS").unwrap_or_else(|_| "1,3,10".to_owned());
+    let number = |text: &str| match text.trim().parse() {
+        Ok(n @ 1..=10) => n,
+        _ => panic!("SKINRIG_BENCH_REPETITIONS: numbers from 1 to 10, as 1,3,10; not {text:?}"),
     };
+    let campaigns: Vec<Campaign> = wanted.split(',').map(number).map(campaign).collect();
+    growth(&campaigns);
+}
+
+/// How the analysis grows with the events.
+fn growth(campaigns: &[Campaign]) {
+    println!("\nanalyse and report, by the events of a session");
+    for (i, c) in campaigns.iter().enumerate() {
+        let (mev, ms) = (c.events as f64 / 1e6, 1e3 * c.analysing.seconds);
+        let memory = c
+            .analysing
+            .peak_mb
+            .map_or(String::new(), |mb| format!("  peak {mb:.0} MB"));
+        let times_read =
+            |read: u64| format!("  {:.2} x the session read", read as f64 / c.bytes as f64);
+        let read = c.analysing.read.map_or(String::new(), times_read);
+        // From the campaign before to this one: what each further event costs, and the power of the events that time
+        // goes with, 1 when it is proportional.
+        let grown = i
+            .checked_sub(1)
+            .and_then(|before| campaigns.get(before))
+            .map(|before| {
+                let further = c.events as f64 - before.events as f64;
+                let power = (c.analysing.seconds / before.analysing.seconds).ln()
+                    / (c.events as f64 / before.events as f64).ln();
+                let each = 1e9 * (c.analysing.seconds - before.analysing.seconds) / further;
+                format!("  {each:.0} ns per further event, power {power:.2}")
+            });
+        println!(
+            "  {mev:>8.1} Mev  {ms:>8.0} ms  {:>6.0} ns per event{memory}{read}{}",
+            ms / mev,
+            grown.unwrap_or_default()
+        );
+    }
+}
+
+/// One campaign of so many repetitions.
+fn campaign(repetitions: u32) -> Campaign {
     let overrides = overrides(repetitions);
     let checked = skinrig::check::load(Path::new(PROTOCOL), &overrides)
         .unwrap_or_else(|failure| panic!("{}", failure.message));
@@ -120,12 +170,14 @@ fn main() {
         what: "all",
         seconds: recording.seconds + verifying.seconds + analysing.seconds,
         peak_mb: None,
+        read: None,
     };
     for Stage {
         what,
         seconds,
         peak_mb,
-    } in [recording, verifying, analysing, total]
+        ..
+    } in [&recording, &verifying, &analysing, &total]
     {
         let memory = peak_mb.map_or(String::new(), |mb| format!("  peak {mb:.0} MB resident"));
         println!(
@@ -143,4 +195,10 @@ fn main() {
         "  method: one run of the commands run, verify and analyze in one process, the file system as it is; the \
          plain write is of the session's own bytes"
     );
+    let reader = SessionReader::open(&session).expect("the session");
+    Campaign {
+        events: reader.totals().expect("the session").cd_events,
+        bytes,
+        analysing,
+    }
 }

@@ -31,9 +31,16 @@ fn main() {
     let kept = std::env::var_os("SKINRIG_BENCH_INPUTS").map(PathBuf::from);
     let folder = kept.as_deref().unwrap_or(folder.path());
     fs::create_dir_all(folder).expect("a folder");
-    clustering(folder);
-    repetition(folder);
-    studies(folder);
+    match std::env::var("SKINRIG_BENCH_PART").as_deref() {
+        Ok("clustering") => clustering(folder),
+        Ok("repetition") => repetition(folder),
+        Ok(part) => panic!("SKINRIG_BENCH_PART: clustering or repetition, not {part}"),
+        Err(_) => {
+            clustering(folder);
+            repetition(folder);
+            studies(folder);
+        }
+    }
 }
 
 fn start(script: &str, folder: &Path) -> Option<RefCell<Python>> {
@@ -87,7 +94,7 @@ fn clustering(folder: &Path) {
             table.told(what, kev, || seconds(python, task));
         }
     }
-    table.row("this crate", kev, || {
+    table.ours("this crate", kev, || {
         cluster(&mut dbscan, &mut grid, &events);
     });
     println!("{}", table.run(7));
@@ -167,21 +174,18 @@ fn repetition(folder: &Path) {
             seconds(published, "clustering")
         });
         for (what, task) in [
-            ("h5py, discs by FFT, scipy; one process", "one_process_fft"),
-            ("the same, a process per camera", "two_processes_fft"),
-            (
-                "h5py, discs by sums along rows, scipy; one process",
-                "one_process",
-            ),
-            ("the same, a process per camera", "two_processes"),
+            ("h5py, discs by FFT, scipy: one process", "one_process_fft"),
+            ("h5py, discs by FFT: two processes", "two_processes_fft"),
+            ("h5py, discs by sums, scipy: one process", "one_process"),
+            ("h5py, discs by sums: two processes", "two_processes"),
         ] {
             table.told(what, mev, || seconds(assembled, task));
         }
     }
-    table.row("this crate", mev, || {
+    table.ours("this crate", mev, || {
         std::hint::black_box(analyze(&input, &files).map(|a| a.counts).ok());
     });
-    println!("{}", table.run(5));
+    println!("{}", table.run(7));
 }
 
 /// The detection latency of all presses of the repetition that [`repetition`] left in the folder.
@@ -210,7 +214,7 @@ fn studies(folder: &Path) {
             thresholds * seconds(python, "latency")
         });
     }
-    table.row("this crate", presses, || {
+    table.ours("this crate", presses, || {
         std::hint::black_box(latency::study(&done, &kept));
     });
     println!("{}", table.run(3));

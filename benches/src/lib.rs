@@ -21,7 +21,29 @@ struct Row<'a> {
     work: Box<dyn FnMut() -> f64 + 'a>,
     units: f64,
     is_baseline: bool,
-    best_s: f64,
+    /// The rows are set beside this one.
+    is_ours: bool,
+    /// Of each round but the first.
+    seconds: Vec<f64>,
+}
+
+impl Row<'_> {
+    fn best_s(&self) -> f64 {
+        self.seconds.iter().copied().fold(f64::INFINITY, f64::min)
+    }
+
+    /// How many times longer this took than `other`: the median over the rounds.
+    fn times(&self, other: &Self) -> f64 {
+        let rounds = self.seconds.iter().zip(&other.seconds);
+        let mut ratios: Vec<f64> = rounds.map(|(a, b)| a / b).collect();
+        ratios.sort_by(f64::total_cmp);
+        let middle = ratios.len() / 2;
+        match ratios.len() {
+            0 => f64::NAN,
+            n if n % 2 == 1 => ratios[middle],
+            _ => f64::midpoint(ratios[middle - 1], ratios[middle]),
+        }
+    }
 }
 
 /// A table of things that do the same work in different ways.
@@ -47,6 +69,16 @@ impl<'a> Table<'a> {
     /// Adds a row whose `work` handles `units` (in the table's unit) in one call.
     pub fn row(&mut self, what: &str, units: f64, work: impl FnMut() + 'a) -> &mut Self {
         self.push(what, units, false, timed(work))
+    }
+
+    /// Adds the row that all others are set beside: for each of them the table says how many times longer it took, round
+    /// by round, in the median.
+    pub fn ours(&mut self, what: &str, units: f64, work: impl FnMut() + 'a) -> &mut Self {
+        self.push(what, units, false, timed(work));
+        if let Some(row) = self.rows.last_mut() {
+            row.is_ours = true;
+        }
+        self
     }
 
     /// Adds a row whose `work` says itself how many seconds it took: another process, or something that is known.
@@ -81,7 +113,8 @@ impl<'a> Table<'a> {
             work: Box::new(work),
             units,
             is_baseline,
-            best_s: f64::INFINITY,
+            is_ours: false,
+            seconds: Vec::new(),
         });
         self
     }
@@ -93,7 +126,7 @@ impl<'a> Table<'a> {
             let mut measure = |row: &mut Row<'_>| {
                 let taken_s = (row.work)();
                 if round > 0 {
-                    row.best_s = row.best_s.min(taken_s);
+                    row.seconds.push(taken_s);
                 }
             };
             if round % 2 == 0 {
@@ -102,8 +135,9 @@ impl<'a> Table<'a> {
                 self.rows.iter_mut().rev().for_each(&mut measure);
             }
         }
-        let rate = |row: &Row<'_>| row.units / row.best_s;
+        let rate = |row: &Row<'_>| row.units / row.best_s();
         let baseline = self.rows.iter().find(|r| r.is_baseline).map(rate);
+        let ours = self.rows.iter().find(|r| r.is_ours);
         let width = self.rows.iter().map(|r| r.what.chars().count()).max();
         let width = width.unwrap_or(0).max(4);
         let mut text = format!("\n{}\n", self.title);
@@ -113,16 +147,27 @@ impl<'a> Table<'a> {
                 Some(base) => format!("{:.2} x", rate(row) / base),
                 None => String::new(),
             };
+            let beside = match ours {
+                Some(ours) if !row.is_ours => {
+                    format!("  {} is {:.1} times faster", ours.what, row.times(ours))
+                }
+                _ => String::new(),
+            };
             let _ = writeln!(
                 text,
-                "  {:width$}  {:>10.1} {}/s  {:>9.4} s  {ratio}",
+                "  {:width$}  {:>10.1} {}/s  {:>9.4} s  {ratio:>10}{beside}",
                 row.what,
                 rate(row),
                 self.unit,
-                row.best_s,
+                row.best_s(),
             );
         }
-        let _ = writeln!(text, "  method: {}; best of {rounds}", self.method);
+        let faster = if ours.is_some() {
+            ", times faster: median of the rounds"
+        } else {
+            ""
+        };
+        let _ = writeln!(text, "  method: {}; best of {rounds}{faster}", self.method);
         text
     }
 }
@@ -160,6 +205,19 @@ mod tests {
         ] {
             assert!(text.contains(part), "{part} in {text}");
         }
+    }
+
+    #[test]
+    fn the_others_are_set_beside_ours_round_by_round() {
+        let mut table = Table::new("race", "op", "told");
+        // The first round warms up.
+        let mut told = [9.0, 1.0, 8.0, 3.0].into_iter();
+        table.told("theirs", 1.0, move || told.next().unwrap());
+        table.ours("ours", 1.0, || ());
+        table.rows[1].work = Box::new(|| 0.5);
+        let text = table.run(3);
+        assert!(text.contains("ours is 6.0 times faster"), "{text}");
+        assert!(text.contains("1.0000 s"), "the best round: {text}");
     }
 
     #[test]
