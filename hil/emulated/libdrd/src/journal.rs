@@ -135,8 +135,9 @@ impl Journal {
 /// Whether a function only reads.
 #[must_use]
 pub fn is_reading(name: &str) -> bool {
-    let verbs = ["Get", "Is", "Error"];
-    verbs.iter().any(|verb| name[3..].starts_with(verb)) || name == "drdWaitForTick"
+    // Behind the prefix, `dhd` or `drd`.
+    let verb = name.get(3..).unwrap_or_default();
+    ["Get", "Is", "Error"].iter().any(|v| verb.starts_with(v)) || name == "drdWaitForTick"
 }
 
 fn parse(line: &str) -> Option<Entry> {
