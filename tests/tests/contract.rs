@@ -108,6 +108,7 @@ const OPTIONS: IndenterContract = IndenterContract {
     speed_mm_s: 80.0,
     tolerance_mm: 0.05,
     patience: HostDuration::from_millis(1_500),
+    rate_share: 0.9,
 };
 
 /// What the contract does with a simulated robot is recorded into session files, one for each robot that it asks

@@ -21,6 +21,7 @@ const OPTIONS: IndenterContract = IndenterContract {
     speed_mm_s: 80.0,
     tolerance_mm: 0.05,
     patience: HostDuration::from_millis(1_500),
+    rate_share: 0.9,
 };
 
 fn replay_of(log: &Log) -> Rig {

@@ -169,6 +169,7 @@ fn keeps_the_contract() {
         speed_mm_s: 30.0,
         tolerance_mm: 0.05,
         patience: HostDuration::from_millis(2_000),
+        rate_share: 0.9,
     };
     contract::indenter(
         &mut || {
