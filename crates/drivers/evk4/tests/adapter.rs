@@ -1,0 +1,194 @@
+//! The adapter over a scripted link: nothing here knows a camera.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicI64, Ordering};
+use std::time::Duration;
+
+use skinrig_device::{CameraSettings, Clock, DeviceError, EventCamera, SyncMode};
+use skinrig_evk4::{Evk4, Link, LinkError, Packet, Packets, TimeBase, Wanted};
+use skinrig_model::{CameraId, HostTime, RawChunk};
+
+const PACKET: usize = 128 << 10;
+const MS: i64 = 1_000_000;
+
+/// A clock that jumps.
+#[derive(Clone, Default)]
+struct Jumping(Arc<AtomicI64>);
+
+impl Clock for Jumping {
+    fn now(&self) -> HostTime {
+        HostTime(self.0.load(Ordering::Relaxed))
+    }
+
+    fn wait_until(&mut self, t: HostTime) {
+        self.0.fetch_max(t.0, Ordering::Relaxed);
+    }
+}
+
+/// A camera that sends a packet every millisecond: a time, a row, an event and a trigger edge. Its time goes on.
+#[derive(Clone, Default)]
+struct Script {
+    clock: Jumping,
+    /// Packets from this one to the next are dropped.
+    drops: Option<(i64, i64)>,
+    /// The cable is pulled before this packet.
+    ends: Option<i64>,
+}
+
+struct Running {
+    script: Script,
+    next_ms: i64,
+    dropped: u64,
+}
+
+impl Link for Script {
+    fn packet_bytes(&self) -> usize {
+        PACKET
+    }
+
+    fn stream(&mut self, wanted: &Wanted) -> Result<Box<dyn Packets>, LinkError> {
+        assert_eq!(wanted.time_base, TimeBase::Given);
+        Ok(Box::new(Running {
+            next_ms: self.clock.now().0 / MS,
+            script: self.clone(),
+            dropped: 0,
+        }))
+    }
+}
+
+impl Packets for Running {
+    fn next(&mut self, take: &mut dyn FnMut(Packet<'_>)) -> Result<bool, LinkError> {
+        let now = self.script.clock.now().0;
+        let mut after_loss = false;
+        if let Some((from, to)) = self.script.drops
+            && (from..to).contains(&self.next_ms)
+            && now / MS >= to
+        {
+            self.dropped += (to - self.next_ms) as u64;
+            (self.next_ms, after_loss) = (to, true);
+        }
+        if (self.next_ms + 1) * MS > now {
+            return Ok(false);
+        }
+        if self.script.ends.is_some_and(|end| self.next_ms >= end) {
+            return Err(LinkError("no device".into()));
+        }
+        let us = self.next_ms as u32 * 1_000;
+        // TIME_HIGH, TIME_LOW, row 700, column 1279 ON, rising edge of channel 0.
+        let words = [
+            0x8000 | (us >> 12) as u16,
+            0x6000 | (us & 0xfff) as u16,
+            700,
+            0x2800 | 1279,
+            0xa001,
+        ];
+        let bytes: Vec<u8> = words.iter().flat_map(|w| w.to_le_bytes()).collect();
+        self.next_ms += 1;
+        take(Packet {
+            bytes: &bytes,
+            age: Duration::from_nanos((now - self.next_ms * MS) as u64),
+            after_loss,
+        });
+        Ok(true)
+    }
+
+    fn dropped(&self) -> u64 {
+        self.dropped
+    }
+}
+
+fn settings() -> CameraSettings {
+    CameraSettings {
+        sync: SyncMode::Master,
+        biases: [("fo".to_owned(), -20)].into(),
+        trigger_channels: vec![0],
+        ..CameraSettings::default()
+    }
+}
+
+fn started(script: &Script) -> Evk4 {
+    let clock = Box::new(script.clock.clone());
+    let mut camera = Evk4::new(Box::new(script.clone()), "00ABCDEF", CameraId::Two, clock);
+    camera.configure(&settings()).expect("settings");
+    camera.start().expect("start");
+    camera
+}
+
+#[test]
+fn the_adapter_keeps_the_contract() {
+    let mut make = || -> (Box<dyn EventCamera>, Box<dyn Clock>) {
+        let script = Script::default();
+        let clock = Box::new(script.clock.clone());
+        let camera = Evk4::new(
+            Box::new(script.clone()),
+            "00ABCDEF",
+            CameraId::One,
+            clock.clone(),
+        );
+        (Box::new(camera), clock)
+    };
+    skinrig_device::contract::event_camera(&mut make, &settings());
+}
+
+#[test]
+fn chunks_hold_the_facts_of_their_words() {
+    let script = Script::default();
+    let mut camera = started(&script);
+    script.clock.clone().wait_until(HostTime(10 * MS));
+    let mut chunks: Vec<RawChunk> = Vec::new();
+    camera.flush(&mut chunks).unwrap();
+    let [chunk] = &chunks[..] else {
+        panic!("{chunks:?}")
+    };
+    assert_eq!((chunk.facts.cd_events, chunk.facts.on_events), (10, 10));
+    assert_eq!(
+        (chunk.facts.first_us, chunk.facts.last_us),
+        (Some(0), Some(9_000))
+    );
+    assert_eq!(chunk.triggers.len(), 10);
+    assert_eq!(
+        (chunk.triggers[3].t_us, chunk.triggers[3].rising),
+        (3_000, true)
+    );
+    assert_eq!(
+        chunk.host_time,
+        HostTime(10 * MS),
+        "when the last packet arrived"
+    );
+}
+
+#[test]
+fn what_the_link_dropped_is_stated_before_the_chunk_that_follows() {
+    let script = Script {
+        drops: Some((5, 8)),
+        ..Script::default()
+    };
+    let mut camera = started(&script);
+    script.clock.clone().wait_until(HostTime(10 * MS));
+    let mut chunks = Vec::new();
+    camera.stop(&mut chunks).unwrap();
+    let told: Vec<_> = chunks
+        .iter()
+        .map(|c| (c.seq, c.lost_before, c.facts.cd_events))
+        .collect();
+    assert_eq!(told, [(0, 0, 5), (1, 3 * PACKET as u64, 2)]);
+}
+
+#[test]
+fn a_link_that_ends_is_told_after_what_it_brought() {
+    let script = Script {
+        ends: Some(4),
+        ..Script::default()
+    };
+    let mut camera = started(&script);
+    script.clock.clone().wait_until(HostTime(10 * MS));
+    let mut chunks = Vec::new();
+    match camera.poll(&mut chunks) {
+        Err(DeviceError::Lost { serial, detail, .. }) => {
+            assert_eq!((&serial[..], &detail[..]), ("00ABCDEF", "no device"));
+        }
+        other => panic!("{other:?}"),
+    }
+    assert_eq!(chunks.iter().map(|c| c.facts.cd_events).sum::<u64>(), 4);
+    assert_eq!(camera.stop(&mut chunks), Ok(()));
+}
