@@ -35,12 +35,25 @@ pub enum Command {
     )]
     Plan(PlanArgs),
 
-    /// Run a protocol (on the simulated rig), record, analyse, report.
+    /// Run a protocol (on the simulated rig, or on the bench of a rig file), record, analyse, report.
     #[command(after_help = "Examples:\n  skinrig run protocols/demo.yaml\n  \
         skinrig run protocols/demo.yaml --level optical --seed 7\n  \
+        skinrig run protocols/quick-check.yaml --rig hil/rigs/NAME.yaml\n  \
         skinrig run --replay sessions/NAME.session.sqlite\n\n\
         ctrl-C once stops after the current press, twice retracts and stops now. The session stays readable.")]
     Run(RunArgs),
+
+    /// List what is connected: robot, cameras, trigger box; and what keeps it from being used.
+    #[command(
+        after_help = "Examples:\n  skinrig devices\n  skinrig devices --rig hil/rigs/NAME.yaml"
+    )]
+    Devices(DevicesArgs),
+
+    /// Move the robot by hand under the limits of the rig file, and record touched points; lines from standard input.
+    #[command(after_help = "Examples:\n  skinrig jog --rig hil/rigs/NAME.yaml\n  \
+        printf 'z +5mm\\ntouch 20mm\\npoint nw at -30 40 0 mm\\n' | skinrig jog\n\n\
+        ctrl-C holds, rises and disarms. Coordinates are the robot's own. `help` lists what can be typed.")]
+    Jog(JogArgs),
 
     /// List recorded sessions.
     #[command(after_help = "Example:\n  skinrig sessions sessions/")]
@@ -92,9 +105,13 @@ pub enum Command {
     #[command(after_help = "Example:\n  skinrig inspect recording.raw")]
     Inspect(InspectArgs),
 
-    /// Print the JSON Schema of protocols, for editors.
+    /// Print the JSON Schema of protocols, schedules or rig files, for editors.
     #[command(after_help = "Example:\n  skinrig schema > skinrig.schema.json")]
     Schema(SchemaArgs),
+
+    /// Brake the robot's arm when the program that started this one dies.
+    #[command(hide = true)]
+    SuperviseArm,
 }
 
 /// A limit that something can be above or below.
@@ -147,6 +164,10 @@ pub struct RunArgs {
     #[arg(long, value_name = "SESSION")]
     pub replay: Option<PathBuf>,
 
+    /// The rig file of a bench; the simulated rig when absent.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["replay", "level", "real_time"])]
+    pub rig: Option<PathBuf>,
+
     /// Seed of the run and of the simulated rig; the protocol's seed when absent.
     #[arg(long, conflicts_with = "replay")]
     pub seed: Option<u64>,
@@ -170,6 +191,26 @@ pub struct RunArgs {
     /// Fail (exit code 4) when the scored RMSE is above this, in mm.
     #[arg(long, value_name = "MM", value_parser = limit_mm)]
     pub max_rmse: Option<f64>,
+}
+
+/// Arguments of `devices`.
+#[derive(Debug, Args)]
+pub struct DevicesArgs {
+    /// Also ask what this rig file names: its robot library and its trigger box's port.
+    #[arg(long, value_name = "FILE")]
+    pub rig: Option<PathBuf>,
+}
+
+/// Arguments of `jog`.
+#[derive(Debug, Args)]
+pub struct JogArgs {
+    /// The rig file of a bench; the simulated rig when absent.
+    #[arg(long, value_name = "FILE")]
+    pub rig: Option<PathBuf>,
+
+    /// Where everything is logged; a new file in `sessions/` when absent.
+    #[arg(long, value_name = "FILE")]
+    pub log: Option<PathBuf>,
 }
 
 /// Arguments of `sessions`.
@@ -408,6 +449,8 @@ pub enum SchemaKind {
     Protocol,
     /// Schedules (`import`).
     Schedule,
+    /// Rig files (`--rig`).
+    Rig,
 }
 
 /// Arguments of `schema`.

@@ -16,7 +16,8 @@ pub enum Exit {
     Internal = 1,
     /// Bad input: command line, protocol, schedule, data file or session file.
     Input = 2,
-    /// A device, the trigger line or the recorder failed during a run; the session up to there is kept.
+    /// A check before a run failed, or a device, the trigger line or the recorder during it; the session up to there is
+    /// kept.
     Rig = 3,
     /// A stated limit was not met: `--max-rmse`, `verify`.
     Limit = 4,
@@ -30,7 +31,7 @@ impl Exit {
         0  done\n  \
         1  fault of skinrig or of this machine\n  \
         2  bad input: command line, protocol, schedule, data or session file\n  \
-        3  rig fault during a run (the session up to there is kept)\n  \
+        3  rig fault, or a failed check before a run (the session up to there is kept)\n  \
         4  a limit was not met (--max-rmse, verify)\n  \
         5  stopped by the operator (the session up to there is kept)";
 }

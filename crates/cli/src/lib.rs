@@ -6,10 +6,12 @@ pub mod terminal;
 
 pub mod args;
 pub mod check;
+pub mod devices;
 pub mod exit;
 pub mod export;
 pub mod import;
 pub mod inspect;
+pub mod jog;
 pub mod paths;
 pub mod progress;
 pub mod provenance;
@@ -23,6 +25,7 @@ pub mod show;
 pub mod signals;
 pub mod sink;
 pub mod source;
+pub mod supervise;
 pub mod tradeoff;
 pub mod verify;
 
@@ -68,6 +71,8 @@ fn dispatch(cli: &Cli, arguments: &[OsString]) -> Outcome {
         Command::Check(a) => check::check(a, json),
         Command::Plan(a) => check::plan(a, json),
         Command::Run(a) => run::run(a, &command_line(arguments), json),
+        Command::Devices(a) => devices::devices(a, json),
+        Command::Jog(a) => jog::jog(a),
         Command::Sessions(a) => sessions::sessions(a, json),
         Command::Show(a) => show::show(a, json),
         Command::Analyze(a) => results::analyze(a, json),
@@ -78,6 +83,7 @@ fn dispatch(cli: &Cli, arguments: &[OsString]) -> Outcome {
         Command::Export(a) => export::export(a, json),
         Command::Inspect(a) => inspect::inspect(a, json),
         Command::Schema(a) => schema::schema(a),
+        Command::SuperviseArm => supervise::supervise(),
     }
 }
 

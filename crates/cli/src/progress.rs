@@ -58,6 +58,14 @@ impl ProgressView {
         self.tracker.progress()
     }
 
+    /// Writes lines above the bar.
+    pub fn say(&self, text: &str) {
+        match &self.display {
+            Display::Bar(bar) => bar.suspend(|| errln!("{text}")),
+            Display::Lines { .. } => errln!("{text}"),
+        }
+    }
+
     /// Takes the next record.
     pub fn update(&mut self, record: &Record) {
         self.tracker.update(record);

@@ -3,13 +3,13 @@
 use std::path::{Path, PathBuf};
 
 use chrono::{DateTime, SecondsFormat, Utc};
-use skinrig_controller::{ControlHandle, RunReport, execute};
+use skinrig_controller::{ControlHandle, Preflight, RunReport, execute, execute_checked};
 use skinrig_device::Rig;
 use skinrig_model::{
     AnalysisSettings, CameraId, HostDuration, InterruptionKind, PressVerdict, RunEnd, RunHeader,
     SimLevel,
 };
-use skinrig_protocol::Plan;
+use skinrig_protocol::{Plan, Protocol};
 use skinrig_recorder::{RecorderError, SessionReader, SessionWriter};
 
 use crate::args::RunArgs;
@@ -17,7 +17,7 @@ use crate::check;
 use crate::exit::{Exit, Failure, Outcome};
 use crate::progress::ProgressView;
 use crate::results::{self, RigDocument};
-use crate::rig::{self, RepeatedOperator};
+use crate::rig::{self, RepeatedOperator, bench, gates};
 use crate::sink::{Foreknowledge, SessionSink};
 use crate::{paths, signals};
 
@@ -49,7 +49,8 @@ pub struct Intent<'a> {
     pub known: Foreknowledge,
 }
 
-/// Records `plan` on `rig` into a new session in `folder`.
+/// Records `plan` on `rig` into a new session in `folder`, after the `preflight` when there is one: an import and a
+/// replay have no devices to check.
 ///
 /// # Errors
 /// [`Failure::internal`] when the session cannot be made. A rig or recorder fault during the run is in the report.
@@ -58,6 +59,7 @@ pub fn record(
     plan: &Plan,
     mut rig: Rig,
     folder: &Path,
+    preflight: Option<Preflight>,
 ) -> Result<(PathBuf, RunReport), Failure> {
     let started = Utc::now();
     let started_at = started.to_rfc3339_opts(SecondsFormat::Secs, true);
@@ -89,7 +91,13 @@ pub fn record(
     })
     .map_err(Failure::internal)?;
 
-    let mut report = execute(plan, header, rig, &control, &mut sink);
+    let mut report = match preflight {
+        Some(mut preflight) => {
+            preflight.made.insert(0, gates::recorder(&path));
+            execute_checked(plan, header, rig, &control, &mut sink, preflight)
+        }
+        None => execute(plan, header, rig, &control, &mut sink),
+    };
     if let Err(error) = sink.seal() {
         let error = error.to_string();
         match &report.end {
@@ -257,6 +265,9 @@ fn fresh(
     json: bool,
 ) -> Result<(PathBuf, RunReport), Failure> {
     let checked = check::load(protocol, &args.overrides)?;
+    if let Some(file) = &args.rig {
+        return on_bench(args, checked.protocol, file, command_line, json);
+    }
     let (protocol, mut plan) = (checked.protocol, checked.plan);
     let level = match &args.level {
         Some(name) => name
@@ -283,7 +294,51 @@ fn fresh(
             protocol.scene.level
         );
     }
-    let intent = Intent {
+    let preflight = gates::of_simulated(&rig, &args.sessions, summary.expected_bytes);
+    let intent = intent_of(&protocol, seed, summary.duration_s, command_line);
+    record(&intent, &plan, rig, &args.sessions, Some(preflight))
+}
+
+/// Runs a protocol on the bench of a rig file, within what the bench bears.
+fn on_bench(
+    args: &RunArgs,
+    mut protocol: Protocol,
+    file: &Path,
+    command_line: &str,
+    json: bool,
+) -> Result<(PathBuf, RunReport), Failure> {
+    let file = bench::load(file)?;
+    bench::tighten(&mut protocol, &file);
+    let mut plan = protocol.compile();
+    protocol.check(&plan).map_err(|found| {
+        let mut failure = Failure::findings(&found);
+        let l = &file.limits;
+        failure.message.push_str(&format!(
+            "\n  {} allows at most {} mm/s, {} N and {} mm; the tighter of its limits and the protocol's hold",
+            file.file_name, l.max_speed_mm_s, l.max_force_n, l.max_depth_mm
+        ));
+        failure
+    })?;
+    let seed = args.seed.unwrap_or(protocol.seed);
+    plan.seed = seed;
+    let summary = plan.summary();
+    if !json {
+        outln!("{summary}");
+        outln!("rig       {} ({})\n", file.name, file.kind.name());
+    }
+    let rig = bench::open(&file, &protocol)?;
+    let preflight = gates::of_bench(&file, &rig, &args.sessions, summary.duration_s);
+    let intent = intent_of(&protocol, seed, summary.duration_s, command_line);
+    record(&intent, &plan, rig, &args.sessions, Some(preflight))
+}
+
+fn intent_of<'a>(
+    protocol: &'a Protocol,
+    seed: u64,
+    duration_s: f64,
+    command_line: &'a str,
+) -> Intent<'a> {
+    Intent {
         text: &protocol.text,
         file_name: &protocol.file_name,
         name: &protocol.name,
@@ -294,10 +349,9 @@ fn fresh(
         operator: &protocol.operator,
         analysis: &protocol.analysis,
         command_line,
-        expected: HostDuration::from_secs_f64(summary.duration_s),
+        expected: HostDuration::from_secs_f64(duration_s),
         known: Foreknowledge::default(),
-    };
-    record(&intent, &plan, rig, &args.sessions)
+    }
 }
 
 fn replay(
@@ -340,7 +394,7 @@ fn replay(
         known: foreknowledge(&reader).map_err(Failure::input)?,
     };
     let rig = rig::replayed(recording, &header, &document)?;
-    record(&intent, &plan, rig, folder)
+    record(&intent, &plan, rig, folder, None)
 }
 
 /// What the recording says that no device can: schedule, exclusions, and what the operator did.

@@ -11,6 +11,7 @@ pub fn schema(args: &SchemaArgs) -> Outcome {
     let schema = match args.kind {
         SchemaKind::Protocol => skinrig_protocol::schema_json(),
         SchemaKind::Schedule => skinrig_protocol::schedule_schema_json(),
+        SchemaKind::Rig => skinrig_protocol::rig_schema_json(),
     };
     crate::terminal::out(format_args!("{schema}"));
     Ok(Exit::Ok)

@@ -1,11 +1,12 @@
 //! `skinrig show`: one session described.
 
-use skinrig_model::{CameraId, RunEnd};
+use skinrig_model::{CameraId, PreflightCheck, RunEnd};
 use skinrig_recorder::{RecorderError, SessionReader};
 
 use crate::args::ShowArgs;
 use crate::exit::{Exit, Failure, Outcome};
 use crate::progress::clock_text;
+use crate::rig::gates;
 
 /// Describes a session.
 ///
@@ -79,6 +80,7 @@ fn describe(args: &ShowArgs) -> Result<serde_json::Value, RecorderError> {
             RunEnd::Completed => None,
             RunEnd::Stopped(r) | RunEnd::Faulted(r) => Some(r.clone()),
         }),
+        "preflight": reader.preflight()?,
         "duration_s": end.as_ref().map(|(t, _)| t.as_secs_f64()),
     });
     if args.protocol {
@@ -101,9 +103,17 @@ fn press_rows(reader: &SessionReader) -> Result<Vec<serde_json::Value>, Recorder
             "reason": outcome.and_then(|o| o.verdict.reason()),
             "contact_s": outcome.and_then(|o| o.timing).map(|t| t.contact.as_secs_f64()),
             "measured_depth_mm": outcome.and_then(|o| o.measured_depth_mm),
+            "touched_mm": outcome.and_then(|o| o.touched_mm),
         })
     });
     Ok(rows.collect())
+}
+
+fn print_preflight(checks: &serde_json::Value) {
+    let checks: Vec<PreflightCheck> = serde_json::from_value(checks.clone()).unwrap_or_default();
+    if !checks.is_empty() {
+        crate::terminal::out(format_args!("{}", gates::table(&checks)));
+    }
 }
 
 fn print(d: &serde_json::Value) {
@@ -161,6 +171,7 @@ fn print(d: &serde_json::Value) {
         p["excluded"],
         d["totals"]["sync"]["planned"]
     );
+    print_preflight(&d["preflight"]);
     outln!("devices");
     for device in d["devices"].as_array().into_iter().flatten() {
         let s = |k: &str| device[k].as_str().unwrap_or("-").to_owned();

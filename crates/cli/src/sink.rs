@@ -7,6 +7,7 @@ use skinrig_model::{HostTime, InterruptionKind, PressId, PressVerdict, Record};
 use skinrig_recorder::{RecorderError, Sealed, SessionWriter};
 
 use crate::progress::ProgressView;
+use crate::rig::gates;
 
 /// What the rig cannot know about its presses, but an import or the replay of one can.
 #[derive(Debug, Clone, Default)]
@@ -55,6 +56,9 @@ impl RecordSink for SessionSink {
             if let (PressVerdict::Valid, Some(rule)) = (&outcome.verdict, rule) {
                 outcome.verdict = PressVerdict::Excluded(rule.clone());
             }
+        }
+        if let Record::Preflight(checks) = &record {
+            self.view.say(&gates::table(checks));
         }
         // What is shown as done is on the disk. Bulk data, whose copy would cost, are only counted.
         let shown = match &record {

@@ -1,5 +1,6 @@
 //! The preflight: what is checked of rig and devices before the robot is powered.
 
+use skinrig_device::DeviceError;
 use skinrig_model::pulse::{LOOPBACK, decode_marks};
 use skinrig_model::{
     CameraId, DeviceIdentity, DeviceRole, HostDuration, PreflightCheck, RawChunk, Record, Setting,
@@ -29,8 +30,8 @@ pub struct ExpectedDevice {
     pub role: DeviceRole,
     /// Its serial number; any when absent.
     pub serial: Option<String>,
-    /// Its firmware version, or a part of what it says of it; any when absent.
-    pub firmware: Option<String>,
+    /// Versions that it must name in what it says of its firmware.
+    pub versions: Vec<String>,
     /// Values that were read from it, by name, as they must be; a version of a library for example.
     pub settings: Vec<(String, String)>,
 }
@@ -136,10 +137,10 @@ impl Core<'_> {
             serial.is_none_or(|s| s == identity.serial),
             "connect the right device, or correct its serial number in the rig file",
         ));
-        if let Some(version) = wanted.and_then(|w| w.firmware.as_deref()) {
+        for version in wanted.iter().flat_map(|w| &w.versions) {
             checks.push(PreflightCheck::new(
-                format!("{role}: firmware"),
-                version,
+                format!("{role}: version"),
+                version.as_str(),
                 identity.firmware.as_str(),
                 says_version(&identity.firmware, version),
                 "install the expected version, or accept this one in the rig file after testing it",
@@ -203,7 +204,7 @@ impl Core<'_> {
                 };
                 self.checks.push(PreflightCheck::new(
                     format!("{camera}: clock"),
-                    format!("advancing within {within}"),
+                    format!("advancing within {}", seconds(within)),
                     found,
                     watch.is_some_and(|w| w.advances(camera)),
                     "power-cycle the camera; a slave camera needs its master's sync line",
@@ -213,12 +214,10 @@ impl Core<'_> {
         let Some(loopback) = preflight.loopback else {
             return Ok(());
         };
-        let Some(trigger) = &mut self.trigger_box else {
+        if self.trigger_box.is_none() {
             return Ok(());
-        };
-        let sent = trigger.send(LOOPBACK).map_err(ControllerError::from)?;
-        let train = trigger.capabilities().train_duration;
-        self.hold_line(sent.t + train);
+        }
+        self.send_loopback()?;
         let seen = |w: &Watch| {
             CameraId::ALL
                 .into_iter()
@@ -230,11 +229,31 @@ impl Core<'_> {
             let watch = self.watch.as_ref();
             self.checks.push(PreflightCheck::new(
                 format!("{camera}: trigger loop-back"),
-                format!("the mark on channel {channel} within {}", loopback.within),
+                format!(
+                    "the mark on channel {channel} within {}",
+                    seconds(loopback.within)
+                ),
                 watch.map_or_else(String::new, |w| w.describe(camera, channel)),
                 watch.is_some_and(|w| w.saw_mark(camera, channel)),
                 "check the trigger cable, its channel in the rig file, and levels (docs/bench.md)",
             ));
+        }
+        Ok(())
+    }
+
+    /// Sends the test mark as soon as the line is free: the box may be sending a train of its own.
+    fn send_loopback(&mut self) -> Result<(), Halt> {
+        let until = self.now() + self.settings.mark_within;
+        while let Some(trigger) = &mut self.trigger_box {
+            match trigger.send(LOOPBACK) {
+                Ok(sent) => {
+                    let train = trigger.capabilities().train_duration;
+                    self.hold_line(sent.t + train);
+                    break;
+                }
+                Err(DeviceError::State { .. }) if self.now() < until => self.tick(Some(until))?,
+                Err(e) => return Err(ControllerError::from(e).into()),
+            }
         }
         Ok(())
     }
@@ -307,6 +326,11 @@ fn read_back(role: DeviceRole, settings: &[Setting]) -> PreflightCheck {
         differing.is_empty(),
         "power-cycle the device and try again",
     )
+}
+
+/// `2 s`, without zeros behind.
+fn seconds(t: HostDuration) -> String {
+    format!("{} s", t.as_secs_f64())
 }
 
 /// Equal as texts, or as numbers as far as single precision tells.

@@ -5,12 +5,12 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use sqlx::ConnectOptions;
 use sqlx::migrate::Migrator;
 use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection, SqliteJournalMode, SqliteSynchronous};
+use sqlx::{ConnectOptions, Row};
 
 use crate::error::RecorderError;
-use crate::query::Fault;
+use crate::query::{Fault, each_row};
 
 /// The schema version that this build writes, and the newest that it reads (`PRAGMA user_version`).
 pub const SCHEMA_VERSION: u32 = 3;
@@ -71,7 +71,7 @@ pub async fn open(path: &Path) -> Result<SqliteConnection, RecorderError> {
     let rollback = check_first_page(path)?;
     // A sealed file is in rollback mode, never has a log beside it and never changes again.
     let immutable = rollback && !log_of(path).exists();
-    SqliteConnectOptions::new()
+    let mut conn = SqliteConnectOptions::new()
         .filename(path)
         .read_only(true)
         .immutable(immutable)
@@ -80,7 +80,23 @@ pub async fn open(path: &Path) -> Result<SqliteConnection, RecorderError> {
         .thread_name(|_| "session-reader".to_owned())
         .connect()
         .await
-        .map_err(|e| Fault::from(e).at(path, "opening it"))
+        .map_err(|e| Fault::from(e).at(path, "opening it"))?;
+    let text = check_schema_text(&mut conn).await;
+    text.map_err(|fault| fault.at(path, "reading its schema"))?;
+    Ok(conn)
+}
+
+/// The schema of a damaged file may hold names that are no text, over which the SQLite client would panic.
+async fn check_schema_text(conn: &mut SqliteConnection) -> Result<(), Fault> {
+    let sql = "SELECT CAST(sql AS BLOB) AS sql FROM sqlite_schema WHERE sql IS NOT NULL";
+    each_row(sqlx::query(sql), conn, |row| {
+        let text: &[u8] = row.try_get("sql")?;
+        match std::str::from_utf8(text) {
+            Ok(_) => Ok(()),
+            Err(_) => Err(Fault::bad("schema", "UTF-8 text", "other bytes")),
+        }
+    })
+    .await
 }
 
 /// The write-ahead log of a session file.

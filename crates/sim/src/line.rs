@@ -24,6 +24,9 @@ const BOUNCE_NS: f64 = 10_000.0;
 /// A report reaches the host this long after what it tells, ns.
 const REPORT_NS: i64 = 300_000;
 
+/// A train and the silence after it, ns of world time; the box's clock is at most some thousandths off.
+const TRAIN_NS: i64 = PulseTrain::DURATION_US as i64 * 1_010;
+
 /// Shares of the edges of one camera, in percent.
 #[derive(Debug, Clone, Copy, Default)]
 struct Noise {
@@ -43,6 +46,8 @@ pub struct Line {
     marks: u32,
     /// The line is taken until then, world time, ns.
     busy_until_ns: i64,
+    /// A periodic train may start then, world time, ns: a whole train after the first edge of the one before.
+    sync_after_ns: i64,
     lost_pulses: Vec<(CameraId, u32, u32)>,
     noise: [Noise; 2],
     random: [Stream; 2],
@@ -92,6 +97,7 @@ impl Line {
             syncs: 0,
             marks: 0,
             busy_until_ns: 0,
+            sync_after_ns: 0,
             lost_pulses,
             noise,
             random: [random(3), random(4)],
@@ -110,7 +116,7 @@ impl Line {
     /// Sends the periodic trains that are due by `now_ns`; one that finds the line taken waits until it is free.
     pub fn advance(&mut self, now_ns: i64) {
         while self.sync_ns > 0 {
-            let start_ns = self.next_sync_ns.max(self.busy_until_ns);
+            let start_ns = self.next_sync_ns.max(self.sync_after_ns);
             if start_ns > now_ns {
                 return;
             }
@@ -124,7 +130,8 @@ impl Line {
             self.syncs = (self.syncs + 1) & skinrig_model::pulse::MAX_MARKED_PRESS;
             self.tell(start_ns, report);
             self.put(train, start_ns, None);
-            self.busy_until_ns = start_ns + PulseTrain::DURATION_US as i64 * 1_000;
+            self.busy_until_ns = start_ns + TRAIN_NS;
+            self.sync_after_ns = self.busy_until_ns;
         }
     }
 
@@ -141,6 +148,8 @@ impl Line {
         self.put(train, rise_ns, Some(self.marks));
         self.marks += 1;
         self.busy_until_ns = until_ns;
+        // What the host was told is free a latency earlier than the line is.
+        self.sync_after_ns = rise_ns + TRAIN_NS;
     }
 
     /// The contact input changed at `t_ns`.

@@ -99,7 +99,7 @@ pub fn import(args: &ImportArgs, command_line: &str, json: bool) -> Outcome {
         expected: HostDuration(last),
         known,
     };
-    let (session, report) = record(&intent, &plan, rig, &args.sessions)?;
+    let (session, report) = record(&intent, &plan, rig, &args.sessions, None)?;
     conclude(&session, &report, args.no_analysis, None, json)
 }
 

@@ -13,6 +13,7 @@ mod json;
 mod options;
 mod pipeline;
 mod replay;
+mod rigs;
 mod streams;
 mod support;
 mod tradeoff;

@@ -129,13 +129,13 @@ fn another_device_and_another_version_are_refused() {
         ExpectedDevice {
             role: DeviceRole::Camera2,
             serial: Some("00001754".into()),
-            firmware: None,
+            versions: Vec::new(),
             settings: vec![("fpga".into(), "3.0".into())],
         },
         ExpectedDevice {
             role: DeviceRole::TriggerBox,
             serial: None,
-            firmware: Some("9.9".into()),
+            versions: vec!["9.9".into()],
             settings: Vec::new(),
         },
     ];
@@ -145,7 +145,7 @@ fn another_device_and_another_version_are_refused() {
         &[
             "camera 2: identity",
             "camera 2: fpga",
-            "trigger box: firmware",
+            "trigger box: version",
         ],
     );
 }

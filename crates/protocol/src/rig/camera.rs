@@ -1,7 +1,5 @@
 //! Cameras and trigger box of a bench, each from its own keys.
 
-use skinrig_model::HostDuration;
-
 use super::build::Places;
 use super::{BoxSetup, CameraSetup, SyncRole};
 use crate::build::{biases, nominal_camera, roi};
@@ -41,6 +39,21 @@ pub(super) fn cameras(
         out.error(span, "cameras.camera2.sync", "the sync modes do not fit")
             .expected("both `standalone`, or one `master` and one `slave`")
             .found(format!("{:?} and {:?}", pair.0, pair.1).to_lowercase());
+    }
+    if out.is_clean() && one.trigger_channel != two.trigger_channel {
+        let span = second
+            .get("trigger_channel")
+            .map_or(second.span, |s| s.span);
+        out.error(
+            span,
+            "cameras.camera2.trigger_channel",
+            "the trigger channels differ",
+        )
+        .expected("the same channel on both cameras: analyses read one")
+        .found(format!(
+            "{} and {}",
+            one.trigger_channel, two.trigger_channel
+        ));
     }
     Some([one, two])
 }
@@ -104,14 +117,7 @@ fn camera(f: &Field, places: &Places<'_>, out: &mut Collector) -> Option<CameraS
 }
 
 pub(super) fn trigger_box(f: &Field, places: &Places<'_>, out: &mut Collector) -> Option<BoxSetup> {
-    let port = f.get("port").map(|p| places.text(p, out));
-    let serial = f.text("serial");
-    if f.get("port").is_none() && serial.is_none() {
-        out.error(f.span, f.path.as_str(), "which trigger box is not said")
-            .expected("`port`, `serial` or both")
-            .found("neither")
-            .help("`skinrig devices` lists serial ports with the serial numbers of their adapters");
-    }
+    let port = f.get("port").and_then(|p| places.text(p, out));
     let wiring = f.get("wiring")?;
     let output = |key| wiring.word(key);
     let outputs = [output("output1")?, output("output2")?, output("output3")?];
@@ -126,11 +132,13 @@ pub(super) fn trigger_box(f: &Field, places: &Places<'_>, out: &mut Collector) -
         .found(lines(camera).to_string());
     }
     Some(BoxSetup {
-        port: port.map_or(Some(None), |p| p.map(Some))?,
-        serial,
+        port: port?,
+        serial: f.text("serial"),
         firmware: f.text("firmware"),
         outputs,
         input: wiring.word("input")?,
-        sync_period: HostDuration::from_secs_f64(f.quantity("sync_period")?),
+        // In range by the key.
+        sync_period_ms: (f.quantity("sync_period")? * 1e3).round() as u16,
+        max_drift_ppm: f.number("max_drift_ppm")?,
     })
 }

@@ -227,12 +227,12 @@ pub enum SyncRole {
     Slave,
 }
 
-/// The trigger box of a bench. At least one of `port` and `serial` is there.
+/// The trigger box of a bench.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct BoxSetup {
     /// Serial port.
-    pub port: Option<String>,
-    /// Serial number of its USB adapter.
+    pub port: String,
+    /// Its own serial number; `None`: any.
     pub serial: Option<String>,
     /// Expected firmware version.
     pub firmware: Option<String>,
@@ -240,8 +240,10 @@ pub struct BoxSetup {
     pub outputs: [&'static str; 3],
     /// What the input comes from: `contact`, `optical`, `other` or `none`.
     pub input: &'static str,
-    /// From one sync train to the next.
-    pub sync_period: HostDuration,
+    /// From one sync train to the next, ms.
+    pub sync_period_ms: u16,
+    /// How fast or slow its clock may be, ppm.
+    pub max_drift_ppm: f64,
 }
 
 /// What must hold before anything is armed.

@@ -215,6 +215,13 @@ fn what_cannot_be_is_named() {
         "loop-back",
     );
     finding(
+        "trigger_channel: 0",
+        "trigger_channel: 7",
+        "cameras.camera2.trigger_channel",
+        "the trigger channels differ",
+        "7 and 0",
+    );
+    finding(
         "output2: camera2",
         "output2: camera1",
         "trigger_box.wiring",

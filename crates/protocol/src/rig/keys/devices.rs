@@ -1,6 +1,6 @@
 //! Keys of the robot, the cameras and the trigger box.
 
-use super::{ANGLE, MASS, time};
+use super::{ANGLE, MASS};
 use crate::keys::schedule::CAMERA as NOMINAL_CAMERA;
 use crate::keys::{ROI, count, default, optional, required};
 use crate::quantity::Dimension::{Acceleration, EventRate, Force, Jerk, Time};
@@ -248,17 +248,17 @@ const SYNC_MODES: &[Word] = &[
 
 pub(super) static TRIGGER_BOX: Table = Table {
     name: "trigger_box",
-    doc: "The trigger box. `port`, `serial` or both say which; with both they must agree.",
+    doc: "The trigger box.",
     keys: &[
-        optional(
+        required(
             "port",
             Shape::Text,
-            "Serial port; `${NAME}` stands for an environment variable.",
+            "Serial port, best one under `/dev/serial/by-id`; `${NAME}` stands for an environment variable. Ports are never guessed.",
         ),
         optional(
             "serial",
             Shape::Text,
-            "Serial number of its USB adapter, as `skinrig devices` shows it.",
+            "The box's own serial number, as `skinrig devices --rig` shows it; absent: any.",
         ),
         optional(
             "firmware",
@@ -273,9 +273,15 @@ pub(super) static TRIGGER_BOX: Table = Table {
         ),
         default(
             "sync_period",
-            time(10.0),
+            Shape::Quantity(&[Time], Range::between(0.018, 65.0)),
             "100 ms",
-            "From one coded sync train to the next.",
+            "From one coded sync train to the next, in whole milliseconds.",
+        ),
+        default(
+            "max_drift_ppm",
+            Shape::Number(Range::above_zero(20_000.0)),
+            "5000",
+            "How fast or slow the box's clock may be: an Arduino Uno has a ceramic resonator of 0.5 %, a board with a crystal 100.",
         ),
     ],
     exactly_one: &[],

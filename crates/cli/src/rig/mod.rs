@@ -1,4 +1,7 @@
-//! Which rig a run uses: simulated, or a recording served as one.
+//! Which rig a run uses: simulated, a bench, or a recording served as one.
+
+pub mod bench;
+pub mod gates;
 
 use std::path::Path;
 
@@ -25,14 +28,17 @@ pub fn simulated(protocol: &Protocol, level: SimLevel, seed: u64, real_time: boo
     if real_time { in_real_time(rig) } else { rig }
 }
 
+/// The protocol's wishes on top of the rig's own settings.
 fn apply(settings: &mut CameraSettings, request: &CameraRequest) {
     settings.biases.extend(request.biases.clone());
-    settings.roi = request.roi.map(|[x, y, width, height]| Roi {
-        x,
-        y,
-        width,
-        height,
-    });
+    if let Some([x, y, width, height]) = request.roi {
+        settings.roi = Some(Roi {
+            x,
+            y,
+            width,
+            height,
+        });
+    }
 }
 
 /// A recorded session as a rig.

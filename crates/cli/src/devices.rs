@@ -1,0 +1,313 @@
+//! `skinrig devices`: what is connected, what keeps it from being used, and the next step.
+
+use std::path::Path;
+use std::time::Duration;
+
+use serde::Serialize;
+use skinrig_evk1::FoundState;
+use skinrig_omega3::enumerate::Availability;
+use skinrig_omega3::load::LoadError;
+use skinrig_protocol::rig::RigFile;
+use skinrig_trigger_box::PortState;
+
+use crate::args::DevicesArgs;
+use crate::exit::{Exit, Outcome};
+use crate::rig::bench;
+
+/// How long a trigger box may take to say hello: opening its port resets it.
+const HELLO: Duration = Duration::from_secs(4);
+
+/// One thing that was found, or that should have been.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+struct Line {
+    /// `robot`, `camera`, `trigger box` or `port`.
+    device: &'static str,
+    /// Model and place.
+    what: String,
+    /// Its serial number, where it told one.
+    serial: Option<String>,
+    /// `ready`, `busy`, `not permitted`, `other device`, `absent`, `not asked` or `faulty`.
+    state: &'static str,
+    /// More about the state.
+    detail: String,
+    /// What the rig file wants of it, for example `camera1`.
+    role: Option<String>,
+    /// What to do next.
+    next_step: Option<String>,
+}
+
+/// `skinrig devices`.
+///
+/// # Errors
+/// [`crate::exit::Failure`] for a rig file that cannot be read. Nothing connected is no error.
+pub fn devices(args: &DevicesArgs, json: bool) -> Outcome {
+    let rig = args.rig.as_deref().map(bench::load).transpose()?;
+    let mut lines = robots(rig.as_ref());
+    lines.extend(cameras(rig.as_ref()));
+    lines.extend(trigger_boxes(rig.as_ref()));
+    if json {
+        crate::print_json(&serde_json::json!({
+            "rig": rig.as_ref().map(|r| &r.name),
+            "kind": rig.as_ref().map(|r| r.kind.name()),
+            "devices": lines,
+        }));
+        return Ok(Exit::Ok);
+    }
+    print(&lines, rig.as_ref());
+    Ok(Exit::Ok)
+}
+
+fn print(lines: &[Line], rig: Option<&RigFile>) {
+    if let Some(rig) = rig {
+        outln!("rig       {} ({})", rig.name, rig.kind.name());
+    }
+    let width = |of: fn(&Line) -> usize| lines.iter().map(of).max().unwrap_or(0);
+    let what = width(|l| l.what.chars().count());
+    let serial = width(|l| l.serial.as_ref().map_or(1, |s| s.chars().count()));
+    for l in lines {
+        let role = l
+            .role
+            .as_ref()
+            .map(|r| format!("  [{r}]"))
+            .unwrap_or_default();
+        outln!(
+            "{:<11}  {:<what$}  {:<serial$}  {:<13}{}{role}",
+            l.device,
+            l.what,
+            l.serial.as_deref().unwrap_or("-"),
+            l.state,
+            if l.detail.is_empty() {
+                String::new()
+            } else {
+                format!("  {}", l.detail)
+            }
+        );
+        if let Some(next) = &l.next_step {
+            outln!("             next: {next}");
+        }
+    }
+    if lines.iter().all(|l| l.state != "ready") {
+        outln!(
+            "\nno device is ready. The simulated rig needs none: `skinrig run protocols/demo.yaml`; docs/bench.md tells how to wire a bench"
+        );
+    }
+}
+
+fn robots(rig: Option<&RigFile>) -> Vec<Line> {
+    let line = |what: &str, state, detail: String, next_step: Option<String>| Line {
+        device: "robot",
+        what: what.to_owned(),
+        serial: None,
+        state,
+        detail,
+        role: None,
+        next_step,
+    };
+    let wanted = rig.map(|r| r.robot.serial);
+    let library = rig.and_then(|r| r.robot.library.as_deref());
+    let loaded = match skinrig_omega3::load::load(library) {
+        Ok(loaded) => loaded,
+        Err(e) => {
+            let detail = match &e {
+                LoadError::Absent(tried) => format!("libdrd not found in {} places", tried.len()),
+                other => other.to_string(),
+            };
+            let next = "install Force Dimension's SDK (3.10 or newer is advised) and name its libdrd in the rig file or in SKINRIG_LIBDRD; everything else works without";
+            return vec![line(
+                "omega.3 library",
+                "absent",
+                detail,
+                Some(next.to_owned()),
+            )];
+        }
+    };
+    let found = match skinrig_omega3::enumerate::list(&loaded.library) {
+        Ok(found) => found,
+        Err(e) => return vec![line("omega.3", "faulty", e.to_string(), None)],
+    };
+    let mut lines: Vec<Line> = found
+        .iter()
+        .map(|f| {
+            let (state, detail) = match &f.availability {
+                Availability::Free => ("ready", String::new()),
+                Availability::Busy => ("busy", "another program holds it".to_owned()),
+                Availability::NotPermitted => ("not permitted", String::new()),
+                Availability::OtherModel => ("other device", "not an omega.3".to_owned()),
+                Availability::Failed(e) => ("faulty", e.to_string()),
+            };
+            Line {
+                serial: f.serial.map(|s| s.to_string()),
+                role: (f.serial.is_some() && f.serial == wanted).then(|| "robot".to_owned()),
+                ..line(
+                    f.model.as_deref().unwrap_or("Force Dimension device"),
+                    state,
+                    detail,
+                    f.next_step(),
+                )
+            }
+        })
+        .collect();
+    missing(
+        &mut lines,
+        "robot",
+        "omega.3",
+        wanted.map(|s| ("robot", s.to_string())),
+    );
+    lines
+}
+
+fn cameras(rig: Option<&RigFile>) -> Vec<Line> {
+    let line = |what: &str, state, detail: String| Line {
+        device: "camera",
+        what: what.to_owned(),
+        serial: None,
+        state,
+        detail,
+        role: None,
+        next_step: None,
+    };
+    let wanted = |serial: &str| {
+        let cameras = &rig?.cameras;
+        let roles = ["camera1", "camera2"];
+        let at = cameras.iter().position(|c| c.serial == serial)?;
+        Some(roles[at].to_owned())
+    };
+    let mut lines: Vec<Line> = match skinrig_evk1::enumerate() {
+        Err(e) => vec![line("USB", "faulty", e.to_string())],
+        Ok(found) => found
+            .iter()
+            .map(|f| {
+                let next_step = f.next_step();
+                let place = |model: &str| format!("{model}, {}", f.place);
+                let found = match &f.state {
+                    FoundState::Ready(identity) => Line {
+                        serial: Some(identity.serial.clone()),
+                        role: wanted(&identity.serial),
+                        ..line(&place("EVK1 Gen3.1"), "ready", identity.firmware())
+                    },
+                    FoundState::Busy => line(
+                        &place("camera"),
+                        "busy",
+                        "another program holds it".to_owned(),
+                    ),
+                    FoundState::NoPermission => {
+                        line(&place("camera"), "not permitted", String::new())
+                    }
+                    FoundState::NotEvk1(what) => {
+                        line(&place("not an EVK1"), "other device", what.clone())
+                    }
+                    FoundState::Faulty(what) => line(&place("camera"), "faulty", what.clone()),
+                };
+                Line { next_step, ..found }
+            })
+            .collect(),
+    };
+    for (role, camera) in ["camera1", "camera2"]
+        .into_iter()
+        .zip(rig.iter().flat_map(|r| &r.cameras))
+    {
+        missing(
+            &mut lines,
+            "camera",
+            "EVK1",
+            Some((role, camera.serial.clone())),
+        );
+    }
+    if rig.is_none() && lines.is_empty() {
+        lines.push(Line {
+            next_step: Some("check cable and power; an EVK1 needs USB 3".to_owned()),
+            ..line(
+                "EVK1",
+                "absent",
+                "no device with the USB IDs of an EVK1".to_owned(),
+            )
+        });
+    }
+    lines
+}
+
+/// Adds a line for a device that the rig file wants and that is not among `lines`.
+fn missing(
+    lines: &mut Vec<Line>,
+    device: &'static str,
+    model: &str,
+    wanted: Option<(&str, String)>,
+) {
+    let (role, serial) = match wanted {
+        Some((role, serial)) => (Some(role.to_owned()), Some(serial)),
+        None => (None, None),
+    };
+    let there = match &role {
+        Some(role) => lines.iter().any(|l| l.role.as_ref() == Some(role)),
+        None => !lines.is_empty(),
+    };
+    if !there {
+        lines.push(Line {
+            device,
+            what: model.to_owned(),
+            serial,
+            state: "absent",
+            detail: String::new(),
+            role,
+            next_step: Some(
+                "plug it in, switch it on; or correct its serial number in the rig file".to_owned(),
+            ),
+        });
+    }
+}
+
+/// The box of the rig file is asked; other serial ports are only listed, for bytes sent to a stranger may move something.
+fn trigger_boxes(rig: Option<&RigFile>) -> Vec<Line> {
+    let port = rig
+        .and_then(|r| r.trigger_box.as_ref())
+        .map(|b| b.port.clone());
+    let mut lines = Vec::new();
+    for found in skinrig_trigger_box::enumerate(port.as_slice(), HELLO) {
+        use skinrig_trigger_box::OpenError;
+        let (state, detail) = match &found.state {
+            PortState::Ready(identity) => ("ready", format!("firmware {}", identity.firmware)),
+            PortState::Closed(OpenError::Absent(_)) => ("absent", String::new()),
+            PortState::Closed(OpenError::Busy(_)) => ("busy", String::new()),
+            PortState::Closed(OpenError::NotPermitted(_)) => ("not permitted", String::new()),
+            PortState::Closed(_) => ("faulty", String::new()),
+            PortState::Unusable(_) => ("other device", String::new()),
+        };
+        let (serial, next_step) = match &found.state {
+            PortState::Ready(identity) => (Some(identity.serial.clone()), None),
+            other => (None, Some(other.to_string())),
+        };
+        lines.push(Line {
+            device: "trigger box",
+            what: found.port,
+            serial,
+            state,
+            detail,
+            role: Some("trigger_box".to_owned()),
+            next_step,
+        });
+    }
+    for path in serial_ports(Path::new("/dev/serial/by-id")) {
+        if port.as_deref() != Some(&path) {
+            lines.push(Line {
+                device: "port",
+                what: path,
+                serial: None,
+                state: "not asked",
+                detail: String::new(),
+                role: None,
+                next_step: Some(
+                    "if this is the trigger box, name the port in the rig file: only ports that are named are opened".to_owned(),
+                ),
+            });
+        }
+    }
+    lines
+}
+
+/// Serial ports under their lasting names, sorted.
+fn serial_ports(folder: &Path) -> Vec<String> {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let mut ports: Vec<String> = entries.map(|e| e.path().display().to_string()).collect();
+    ports.sort();
+    ports
+}

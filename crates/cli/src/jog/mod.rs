@@ -1,0 +1,375 @@
+//! `skinrig jog`: moves the robot by hand, under the guard of runs, and records touched points.
+
+mod log;
+mod order;
+mod points;
+
+use std::io::{BufRead, IsTerminal};
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
+use std::time::Duration;
+
+use chrono::Utc;
+use skinrig_controller::{ControllerError, ControllerSettings, Jog, Moved, Touched};
+use skinrig_device::{Clock, Indenter, MotionLimits, RealClock};
+use skinrig_model::{HostDuration, Point3, PoseSample, RigidTransform, Robot, SimLevel, Skin};
+use skinrig_protocol::plan::RunLimits;
+use skinrig_protocol::{Surface, TouchSearch};
+use skinrig_sim::{SimConfig, in_real_time, simulated_rig};
+
+use crate::args::JogArgs;
+use crate::exit::{Exit, Failure, Outcome};
+use crate::rig::bench;
+use crate::signals;
+use log::Log;
+use order::Order;
+use points::NamedPoint;
+
+/// Between two looks at the robot while nobody types.
+const IDLE: Duration = Duration::from_millis(10);
+/// Speed until another one is asked for, mm/s.
+const FIRST_SPEED_MM_S: f64 = 5.0;
+/// How close to its target a motion ends, mm.
+const TOLERANCE_MM: f64 = 0.1;
+/// How the surface is touched when the rig file does not say.
+const SEARCH: TouchSearch = TouchSearch {
+    threshold_n: 0.2,
+    samples: 5,
+    speed_mm_s: 2.0,
+    band_mm: 1.0,
+    tare: HostDuration::from_millis(300),
+};
+
+/// What is moved, and within what.
+struct Bench {
+    name: String,
+    indenter: Box<dyn Indenter>,
+    clock: Box<dyn Clock>,
+    min_mm: [f64; 3],
+    max_mm: [f64; 3],
+    max_speed_mm_s: f64,
+    max_force_n: f64,
+    robot_from_skin: RigidTransform<Robot, Skin>,
+    search: TouchSearch,
+}
+
+fn open(args: &JogArgs) -> Result<Bench, Failure> {
+    let Some(path) = &args.rig else {
+        return Ok(simulated());
+    };
+    let file = bench::load(path)?;
+    let clock = RealClock::start();
+    let search = match file.surface {
+        Some(Surface::Touch(search)) => search,
+        _ => SEARCH,
+    };
+    Ok(Bench {
+        name: format!("{} ({})", file.name, file.kind.name()),
+        indenter: bench::open_robot(&file, clock)?,
+        clock: Box::new(clock),
+        min_mm: file.limits.workspace_min_mm,
+        max_mm: file.limits.workspace_max_mm,
+        max_speed_mm_s: file.limits.max_speed_mm_s,
+        max_force_n: file.limits.max_force_n,
+        robot_from_skin: file.frame.robot_from_skin,
+        search,
+    })
+}
+
+/// The simulated rig at the speed of a real one where somebody types, at full speed where a file is piped in.
+fn simulated() -> Bench {
+    let config = SimConfig::new(1, SimLevel::Kinematic);
+    let mut rig = simulated_rig(&config);
+    if std::io::stdin().is_terminal() {
+        rig = in_real_time(rig);
+    }
+    let can = rig.indenter.capabilities();
+    Bench {
+        name: rig.name,
+        indenter: rig.indenter,
+        clock: rig.clock,
+        min_mm: can.workspace_min_mm,
+        max_mm: can.workspace_max_mm,
+        max_speed_mm_s: can.max_speed_mm_s,
+        max_force_n: can.max_force_n,
+        robot_from_skin: rig.robot_from_skin,
+        search: SEARCH,
+    }
+}
+
+/// Coordinates are the robot's own: where the skin lies is what a touch-off is to find out.
+fn limits(bench: &Bench) -> (RunLimits, MotionLimits) {
+    let run = RunLimits {
+        workspace_min_mm: bench.min_mm,
+        workspace_max_mm: bench.max_mm,
+        // No surface is known: the workspace alone says how low the tip may go.
+        clearance_mm: bench.min_mm[2],
+        max_depth_mm: (-bench.min_mm[2]).max(f64::MIN_POSITIVE),
+        max_speed_mm_s: bench.max_speed_mm_s,
+        max_force_n: bench.max_force_n,
+        position_tolerance_mm: TOLERANCE_MM,
+        settle_time: HostDuration::from_millis(50),
+    };
+    let robot = MotionLimits {
+        min_mm: bench.min_mm,
+        max_mm: bench.max_mm,
+        max_speed_mm_s: bench.max_speed_mm_s,
+        max_force_n: bench.max_force_n,
+    };
+    (run, robot)
+}
+
+/// `skinrig jog`.
+///
+/// # Errors
+/// [`Failure::rig`] when the robot fails; [`Failure::input`] for a wrong line of a piped file, which ends the jog.
+pub fn jog(args: &JogArgs) -> Outcome {
+    let path = args.log.clone().unwrap_or_else(default_log);
+    let mut log = Log::create(&path)?;
+    let bench = open(args)?;
+    let stop = Arc::new(AtomicBool::new(false));
+    let pressed = Arc::clone(&stop);
+    signals::on_ctrl_c(move |times| {
+        pressed.store(true, Ordering::SeqCst);
+        if times >= 3 {
+            std::process::exit(i32::from(Exit::Stopped as u8));
+        }
+    })
+    .map_err(Failure::internal)?;
+
+    let (run, robot) = limits(&bench);
+    let skin_from_robot = bench.robot_from_skin.inverse();
+    let (jog, _) = Jog::start(
+        bench.indenter,
+        bench.clock,
+        RigidTransform::identity(),
+        run,
+        &robot,
+        ControllerSettings::default(),
+    )
+    .map_err(Failure::rig)?;
+    let mut table = Table {
+        jog,
+        stop,
+        search: bench.search,
+        speed_mm_s: FIRST_SPEED_MM_S.min(run.max_speed_mm_s),
+        skin_from_robot,
+        last_touch: None,
+        points: Vec::new(),
+    };
+    let identity = table.jog.identity();
+    outln!(
+        "{}: {} {}; coordinates of the robot; `help` tells what can be typed, ctrl-C holds, rises and disarms\nlog       {}",
+        bench.name,
+        identity.model,
+        identity.serial,
+        log.path().display()
+    );
+    let started = format!("{}: {} {}", bench.name, identity.model, identity.serial);
+    log.line(table.jog.now(), "start", &started);
+    let outcome = table.listen(&mut log);
+    let ended = table.jog.finish();
+    log.path_of_tip(&table.jog.take_trace());
+    let t = table.jog.now();
+    if !table.points.is_empty() {
+        let block = table.block();
+        log.line(t, "points", &block);
+        outln!("{block}");
+    }
+    match &ended {
+        Ok(at) => {
+            let place = at.map_or_else(|| "nowhere seen".to_owned(), |p| words(&p));
+            log.line(t, "end", &format!("disarmed at {place}"));
+            outln!("disarmed at {place}");
+        }
+        Err(e) => log.line(t, "end", &format!("error: {e}")),
+    }
+    let exit = outcome?;
+    ended.map_err(|e| {
+        Failure::rig(format!(
+            "{e}\n  next: look at the arm; if it is live, press the force button on its base"
+        ))
+    })?;
+    Ok(exit)
+}
+
+fn default_log() -> PathBuf {
+    let now = Utc::now().format("%Y%m%dT%H%M%S%.3fZ");
+    PathBuf::from("sessions").join(format!("jog-{now}.log"))
+}
+
+/// `(x, y, z) mm, force F N`.
+fn words(p: &PoseSample) -> String {
+    let [x, y, z] = p.measured.to_array();
+    format!("({x:.3}, {y:.3}, {z:.3}) mm, force {:.2} N", p.force_n)
+}
+
+/// The robot and what was typed so far.
+struct Table {
+    jog: Jog,
+    stop: Arc<AtomicBool>,
+    search: TouchSearch,
+    speed_mm_s: f64,
+    skin_from_robot: RigidTransform<Skin, Robot>,
+    last_touch: Option<Point3<Robot>>,
+    points: Vec<NamedPoint>,
+}
+
+impl Table {
+    /// Follows orders until the end of input, `quit`, ctrl-C or a fault.
+    fn listen(&mut self, log: &mut Log) -> Outcome {
+        let interactive = std::io::stdin().is_terminal();
+        let lines = read_lines()?;
+        loop {
+            if self.stop.load(Ordering::SeqCst) {
+                log.line(self.jog.now(), "ctrl-C", "");
+                return Ok(Exit::Stopped);
+            }
+            let line = match lines.recv_timeout(IDLE) {
+                Ok(line) => line,
+                Err(RecvTimeoutError::Disconnected) => return Ok(Exit::Ok),
+                Err(RecvTimeoutError::Timeout) => {
+                    let looked = self.jog.look();
+                    log.path_of_tip(&self.jog.take_trace());
+                    looked.map_err(Failure::rig)?;
+                    continue;
+                }
+            };
+            log.line(self.jog.now(), "order", &line);
+            let answer = match order::parse(&line) {
+                Ok(None) => continue,
+                Ok(Some(Order::Quit)) => return Ok(Exit::Ok),
+                Ok(Some(order)) => self.obey(order),
+                Err(e) => Err(Refusal::Input(e)),
+            };
+            log.path_of_tip(&self.jog.take_trace());
+            match answer {
+                Ok(text) => {
+                    log.line(self.jog.now(), "answer", &text);
+                    outln!("{text}");
+                }
+                Err(Refusal::Rig(e)) => {
+                    log.line(self.jog.now(), "fault", &e.to_string());
+                    return Err(Failure::rig(e));
+                }
+                Err(Refusal::Input(e)) => {
+                    log.line(self.jog.now(), "refused", &e);
+                    if !interactive {
+                        // Nobody looks: what comes after a line that was not obeyed may rely on it.
+                        return Err(Failure::input(format!("`{line}`: {e}")));
+                    }
+                    errln!("refused: {e}");
+                }
+            }
+        }
+    }
+
+    fn obey(&mut self, order: Order) -> Result<String, Refusal> {
+        let stop = Arc::clone(&self.stop);
+        let stop = move || stop.load(Ordering::SeqCst);
+        match order {
+            Order::By(axis, by_mm) => {
+                let mut target = self.jog.look()?.commanded.to_array();
+                target[axis] += by_mm;
+                self.go(target, &stop)
+            }
+            Order::To(target) => self.go(target, &stop),
+            Order::Speed(speed_mm_s) => {
+                self.speed_mm_s = speed_mm_s;
+                Ok(format!("speed {speed_mm_s} mm/s"))
+            }
+            Order::Where => self.place(),
+            Order::Touch(way_mm) => self.touch(way_mm, &stop),
+            Order::Point(name, skin) => self.point(name, skin),
+            Order::Points => Ok(self.block()),
+            Order::Help | Order::Quit => Ok(order::HELP.to_owned()),
+        }
+    }
+
+    fn go(&mut self, target: [f64; 3], stop: &dyn Fn() -> bool) -> Result<String, Refusal> {
+        let [x, y, z] = target;
+        let moved = self.jog.go(Point3::new(x, y, z), self.speed_mm_s, stop)?;
+        Ok(match moved {
+            Moved::Arrived(at) => format!("at {}", words(&at)),
+            Moved::Stopped(at) => format!("stopped at {}", words(&at)),
+        })
+    }
+
+    fn place(&mut self) -> Result<String, Refusal> {
+        let at = self.jog.look()?;
+        let [x, y, z] = at.measured.to_array();
+        let [a, b, c] = self.skin_from_robot.apply(Point3::new(x, y, z)).to_array();
+        Ok(format!(
+            "at {}; skin ({a:.3}, {b:.3}, {c:.3}) mm by the rig's frame",
+            words(&at)
+        ))
+    }
+
+    fn touch(&mut self, way_mm: f64, stop: &dyn Fn() -> bool) -> Result<String, Refusal> {
+        Ok(match self.jog.touch(self.search, way_mm, stop)? {
+            Touched::At(found) => {
+                let [x, y, z] = found.measured.to_array();
+                self.last_touch = Some(Point3::new(x, y, z));
+                format!("touched at {}; `point NAME` records it", words(&found))
+            }
+            Touched::Nothing(at) => format!("nothing touched down to {}", words(&at)),
+            Touched::Stopped(at) => format!("stopped at {}", words(&at)),
+        })
+    }
+
+    fn point(&mut self, name: String, skin: Option<[f64; 3]>) -> Result<String, Refusal> {
+        let Some(robot) = self.last_touch.take() else {
+            return Err(Refusal::Input(
+                "expected a touch since the last point, found none; `touch` first".to_owned(),
+            ));
+        };
+        self.points.retain(|p| p.name != name);
+        let [x, y, z] = robot.to_array();
+        let said = format!("point {name} at ({x:.3}, {y:.3}, {z:.3}) mm");
+        self.points.push(NamedPoint { name, skin, robot });
+        Ok(said)
+    }
+
+    fn block(&self) -> String {
+        let today = Utc::now().format("%Y-%m-%d").to_string();
+        points::block(&self.points, &today)
+    }
+}
+
+/// Why an order was not obeyed.
+enum Refusal {
+    /// It may not be; the robot is as it was.
+    Input(String),
+    /// The robot failed.
+    Rig(ControllerError),
+}
+
+impl From<ControllerError> for Refusal {
+    fn from(e: ControllerError) -> Self {
+        match e {
+            ControllerError::Guard(e) => Self::Input(e.to_string()),
+            ControllerError::Device(e @ skinrig_device::DeviceError::Refused { .. }) => {
+                Self::Input(e.to_string())
+            }
+            e => Self::Rig(e),
+        }
+    }
+}
+
+/// The lines of standard input, read on a thread of its own so that the robot is looked at meanwhile.
+fn read_lines() -> Result<Receiver<String>, Failure> {
+    let (tell, hear) = sync_channel(16);
+    std::thread::Builder::new()
+        .name("jog-input".to_owned())
+        .spawn(move || {
+            for line in std::io::stdin().lock().lines().map_while(Result::ok) {
+                if tell.send(line).is_err() {
+                    return; // nobody listens any more
+                }
+            }
+        })
+        .map(|_| hear)
+        .map_err(|e| Failure::internal(format!("cannot read standard input: {e}")))
+}

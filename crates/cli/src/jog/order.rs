@@ -1,0 +1,174 @@
+//! What the operator types, as orders.
+
+use skinrig_protocol::quantity::{self, Dimension};
+
+/// One line.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Order {
+    /// Along one axis, 0 to 2, by so many mm.
+    By(usize, f64),
+    /// Straight to a point, mm.
+    To([f64; 3]),
+    /// Speed of the motions to come, mm/s.
+    Speed(f64),
+    /// Where is the tip?
+    Where,
+    /// Slowly down, at most so many mm.
+    Touch(f64),
+    /// The last touch is this point; where it lies on the skin, mm, when that is said.
+    Point(String, Option<[f64; 3]>),
+    /// Print the touched points as a block for the rig file.
+    Points,
+    /// What can be typed.
+    Help,
+    /// The end.
+    Quit,
+}
+
+/// What can be typed.
+pub const HELP: &str = "\
+x +1mm | y -0.5mm | z +10mm   move along one axis
+to 0 0 5 mm                   move straight to a point
+speed 5mm/s                   speed of the moves to come
+where                         where the tip is
+touch [5mm]                   slowly down, at most so far, until the force rises; then off again
+point NAME [at 10 2 0 mm]     the last touch is this point (where it lies on the skin)
+points                        the touched points as a block for the rig file
+quit                          hold, rise, disarm";
+
+/// How far `touch` goes down when it is not said, mm.
+const TOUCH_WAY_MM: f64 = 5.0;
+
+/// Reads a line; `None` for a blank one and a comment.
+///
+/// # Errors
+/// What was expected and found.
+pub fn parse(line: &str) -> Result<Option<Order>, String> {
+    let line = line.split('#').next().unwrap_or("").trim();
+    let (word, rest) = match line.split_once(char::is_whitespace) {
+        Some((word, rest)) => (word, rest.trim()),
+        None => (line, ""),
+    };
+    let bare = |order: Order| {
+        if rest.is_empty() {
+            Ok(Some(order))
+        } else {
+            Err(format!("expected nothing after `{word}`, found `{rest}`"))
+        }
+    };
+    match word {
+        "" => Ok(None),
+        "x" | "y" | "z" => {
+            let axis = usize::from(word == "y") + 2 * usize::from(word == "z");
+            Ok(Some(Order::By(axis, length(rest)?)))
+        }
+        "to" => Ok(Some(Order::To(triple(rest)?))),
+        "speed" => match measured(rest, Dimension::Speed)? {
+            v if v > 0.0 => Ok(Some(Order::Speed(v))),
+            v => Err(format!("expected a speed above 0, found {v} mm/s")),
+        },
+        "touch" if rest.is_empty() => Ok(Some(Order::Touch(TOUCH_WAY_MM))),
+        "touch" => match length(rest)? {
+            v if v > 0.0 => Ok(Some(Order::Touch(v))),
+            v => Err(format!("expected a way above 0, found {v} mm")),
+        },
+        "point" => point(rest).map(Some),
+        "where" => bare(Order::Where),
+        "points" => bare(Order::Points),
+        "help" => bare(Order::Help),
+        "quit" => bare(Order::Quit),
+        other => Err(format!(
+            "expected x, y, z, to, speed, where, touch, point, points, help or quit, found `{other}`"
+        )),
+    }
+}
+
+fn point(rest: &str) -> Result<Order, String> {
+    let (name, place) = match rest.split_once(" at ") {
+        Some((name, place)) => (name.trim(), Some(triple(place.trim())?)),
+        None => (rest, None),
+    };
+    let plain = |c: char| c.is_alphanumeric() || c == '-' || c == '_';
+    if name.is_empty() || !name.chars().all(plain) {
+        return Err(format!(
+            "expected `point NAME` or `point NAME at 10 2 0 mm`, the name of letters, digits, - and _, found `{rest}`"
+        ));
+    }
+    Ok(Order::Point(name.to_owned(), place))
+}
+
+fn measured(text: &str, dimension: Dimension) -> Result<f64, String> {
+    quantity::parse(text, &[dimension])
+        .map(|q| q.value)
+        .map_err(|e| format!("expected {}, found {}", e.expected, e.found))
+}
+
+fn length(text: &str) -> Result<f64, String> {
+    measured(text, Dimension::Length)
+}
+
+/// Three lengths: each with its unit, or one unit for all at the end. Commas may stand between.
+fn triple(text: &str) -> Result<[f64; 3], String> {
+    let wrong = || format!("expected three coordinates such as `0 0 5 mm`, found `{text}`");
+    let flat = text.replace(',', " ");
+    let words: Vec<&str> = flat.split_whitespace().collect();
+    let one = |a: &str, unit: &str| length(&format!("{a}{unit}"));
+    match words.as_slice() {
+        [x, y, z] => {
+            // `0 0 5mm`: the last unit holds for those without one.
+            let unit = z.trim_start_matches(|c: char| !c.is_alphabetic() && c != 'µ');
+            let each = |a: &str| {
+                let has_unit = a.ends_with(char::is_alphabetic);
+                one(a, if has_unit { "" } else { unit })
+            };
+            Ok([each(x)?, each(y)?, each(z)?])
+        }
+        [x, y, z, unit] => Ok([one(x, unit)?, one(y, unit)?, one(z, unit)?]),
+        [x, a, y, b, z, c] => Ok([one(x, a)?, one(y, b)?, one(z, c)?]),
+        _ => Err(wrong()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_mean_what_they_say() {
+        let order = |line: &str| parse(line).unwrap();
+        assert_eq!(order("x +1mm"), Some(Order::By(0, 1.0)));
+        assert_eq!(order("  z -0.5 mm # down"), Some(Order::By(2, -0.5)));
+        for line in [
+            "to 0 -1 5 mm",
+            "to 0mm -1mm 5mm",
+            "to 0 mm -1 mm 5 mm",
+            "to 0, -1, 5mm",
+        ] {
+            assert_eq!(order(line), Some(Order::To([0.0, -1.0, 5.0])), "{line}");
+        }
+        assert_eq!(order("speed 0.5 cm/s"), Some(Order::Speed(5.0)));
+        assert_eq!(order("touch"), Some(Order::Touch(5.0)));
+        assert_eq!(order("touch 12mm"), Some(Order::Touch(12.0)));
+        assert_eq!(order("point nw"), Some(Order::Point("nw".into(), None)));
+        let named = Order::Point("nw".into(), Some([-30.0, 40.0, 0.0]));
+        assert_eq!(order("point nw at -3 4 0 cm"), Some(named));
+        assert_eq!((order(""), order("# nothing")), (None, None));
+        for line in [
+            "x",
+            "x 1",
+            "x 1 s",
+            "to 1 2",
+            "to 0 0 5",
+            "speed 0 mm/s",
+            "touch -1mm",
+            "point",
+            "point a b",
+            "where now",
+            "jump",
+            "to nan nan nan mm",
+            "speed -1 mm/s",
+        ] {
+            assert!(parse(line).is_err(), "{line}");
+        }
+    }
+}

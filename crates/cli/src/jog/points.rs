@@ -1,0 +1,35 @@
+//! Touched points as the block that a rig file wants.
+
+use skinrig_model::{Point3, Robot};
+
+/// A touched point.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NamedPoint {
+    /// As the operator called it.
+    pub name: String,
+    /// Where it lies on the skin, mm, when the operator said so.
+    pub skin: Option<[f64; 3]>,
+    /// Where the tip was.
+    pub robot: Point3<Robot>,
+}
+
+/// The key `frame` of a rig file with these points, to be pasted.
+#[must_use]
+pub fn block(points: &[NamedPoint], date: &str) -> String {
+    let mut out = format!("frame:\n  touch_off:\n    date: {date}\n    points:\n");
+    for p in points {
+        let [x, y, z] = p.robot.to_array();
+        let skin = match p.skin {
+            Some([a, b, c]) => format!("[{a} mm, {b} mm, {c} mm]"),
+            None => "[FILL IN mm, FILL IN mm, 0 mm]".to_owned(),
+        };
+        out.push_str(&format!(
+            "      - {{name: {}, skin: {skin}, robot: [{x:.3} mm, {y:.3} mm, {z:.3} mm]}}\n",
+            p.name
+        ));
+    }
+    if points.len() < 3 {
+        out.push_str("    # a frame needs at least three points that do not lie on one line\n");
+    }
+    out
+}

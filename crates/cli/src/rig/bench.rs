@@ -1,0 +1,223 @@
+//! A bench from its rig file: the drivers opened, identified, and put together as a rig.
+
+use std::path::Path;
+
+use skinrig_device::{
+    CameraSettings, EventCamera, Indenter, NoiseFilter, RealClock, Rig, Roi, SyncMode, TriggerBox,
+};
+use skinrig_evk1::biases::parse_bias_file;
+use skinrig_evk1::{Evk1, Evk1Config};
+use skinrig_model::{CameraId, RigGeometry, SkinOutline, StereoGeometry};
+use skinrig_omega3::axes::{Axes, Axis};
+use skinrig_omega3::config::{Initialise, SupervisorCommand, Watchdog};
+use skinrig_omega3::{Omega, OmegaConfig};
+use skinrig_protocol::Protocol;
+use skinrig_protocol::rig::{BoxSetup, CameraSetup, RigFile, SyncRole};
+use skinrig_trigger_box::{SerialTriggerBox, TriggerBoxConfig};
+
+use crate::exit::Failure;
+
+/// Reads the rig file at `path`.
+///
+/// # Errors
+/// [`Failure::input`] when it cannot be read; every finding in it at once.
+pub fn load(path: &Path) -> Result<RigFile, Failure> {
+    let bytes = std::fs::read(path)
+        .map_err(|e| Failure::input(format!("cannot read {}: {e}", path.display())))?;
+    let environment = |name: &str| std::env::var(name).ok();
+    RigFile::parse(&path.display().to_string(), &bytes, &environment)
+        .map_err(|found| Failure::findings(&found))
+}
+
+/// Holds the plan of `protocol` within what the bench bears: the tighter limit holds, and a protocol that does not say
+/// how the surface is found takes the bench's way.
+pub fn tighten(protocol: &mut Protocol, rig: &RigFile) {
+    let (limits, bench) = (&mut protocol.limits, &rig.limits);
+    limits.max_speed_mm_s = limits.max_speed_mm_s.min(bench.max_speed_mm_s);
+    limits.max_force_n = limits.max_force_n.min(bench.max_force_n);
+    limits.max_depth_mm = limits.max_depth_mm.min(bench.max_depth_mm);
+    protocol.surface = protocol.surface.or(rig.surface);
+}
+
+/// Opens every device of `rig`. The robot stays braked, unless the file lets it initialise itself.
+///
+/// # Errors
+/// [`Failure::rig`] naming the device that could not be opened and the next step.
+pub fn open(rig: &RigFile, protocol: &Protocol) -> Result<Rig, Failure> {
+    let clock = RealClock::start();
+    // Settings first: a bad bias file is no reason to have opened a device.
+    let camera_settings = [
+        camera_settings(&rig.cameras[0], &protocol.cameras[0])?,
+        camera_settings(&rig.cameras[1], &protocol.cameras[1])?,
+    ];
+    let indenter = open_robot(rig, clock)?;
+    let cameras = [
+        open_camera(&rig.cameras[0], CameraId::One, clock)?,
+        open_camera(&rig.cameras[1], CameraId::Two, clock)?,
+    ];
+    let trigger_box = match &rig.trigger_box {
+        Some(setup) => Some(open_trigger_box(setup, clock)?),
+        None => None,
+    };
+    Ok(Rig {
+        kind: rig.kind.name().to_owned(),
+        name: format!("{} ({})", rig.name, rig.kind.name()),
+        indenter,
+        cameras,
+        camera_settings,
+        trigger_box,
+        clock: Box::new(clock),
+        robot_from_skin: rig.frame.robot_from_skin,
+        geometry: geometry(rig, protocol.surroundings.outline),
+        description_json: serde_json::to_string(rig).map_err(Failure::internal)?,
+    })
+}
+
+/// What analyses need to know of the bench.
+fn geometry(rig: &RigFile, outline: SkinOutline) -> RigGeometry {
+    let [one, two] = &rig.cameras;
+    RigGeometry {
+        outline,
+        nominal: StereoGeometry {
+            cameras: [one.geometry, two.geometry],
+        },
+        // The same on both cameras: the rig file was checked.
+        trigger_channel: rig.trigger_box.as_ref().map(|_| one.trigger_channel),
+    }
+}
+
+/// Opens the robot alone.
+///
+/// # Errors
+/// [`Failure::rig`].
+pub fn open_robot(rig: &RigFile, clock: RealClock) -> Result<Box<dyn Indenter>, Failure> {
+    let omega = Omega::open(omega_config(rig)?, clock).map_err(Failure::rig)?;
+    for remark in omega.remarks() {
+        errln!("note: {remark}");
+    }
+    Ok(Box::new(omega))
+}
+
+fn omega_config(rig: &RigFile) -> Result<OmegaConfig, Failure> {
+    let (robot, limits) = (&rig.robot, &rig.limits);
+    let mut config = OmegaConfig {
+        library: robot.library.clone(),
+        serial: Some(robot.serial),
+        ..OmegaConfig::default()
+    };
+    config.mount.device_angle_deg = robot.device_angle_deg;
+    config.mount.effector_mass_kg = robot.effector_mass_kg;
+    let axes = Axes::new(robot.axes.map(axis));
+    config.mount.axes = axes.ok_or_else(|| Failure::internal("robot.axes: not right-handed"))?;
+    config.mount.reported_force_sign = if robot.reports_sample_force {
+        -1.0
+    } else {
+        1.0
+    };
+    let envelope = &mut config.envelope;
+    envelope.min_mm = limits.workspace_min_mm;
+    envelope.max_mm = limits.workspace_max_mm;
+    envelope.max_speed_mm_s = limits.max_speed_mm_s;
+    envelope.max_force_n = limits.max_force_n;
+    envelope.n_per_ratio = robot.force_per_ratio_n;
+    envelope.gravity_ratio = robot.gravity_ratio;
+    envelope.least_ratio = robot.least_ratio;
+    config.motion.acceleration_mm_s2 = robot.acceleration_mm_s2;
+    config.motion.jerk_mm_s3 = robot.jerk_mm_s3;
+    config.motion.max_lead_mm = limits.max_lead_mm;
+    config.gains.p = robot.proportional_gain;
+    config.gains.i = Some(robot.integral_gain);
+    config.gains.d = robot.derivative_gain;
+    config.watchdog = Watchdog::ArmMilliseconds(f64::from(robot.watchdog_steps) * 0.125);
+    if robot.auto_init && robot.sample_is_off {
+        config.initialise = Initialise::SampleIsOff;
+    }
+    if robot.supervisor {
+        let program = std::env::current_exe()
+            .map_err(|e| Failure::internal(format!("cannot tell where this program lies: {e}")))?;
+        config.supervisor = Some(SupervisorCommand {
+            program,
+            arguments: vec![SUPERVISE.to_owned()],
+        });
+    }
+    Ok(config)
+}
+
+/// The hidden command that brakes the arm when this program dies.
+const SUPERVISE: &str = "supervise-arm";
+
+fn axis(word: &str) -> Axis {
+    match word {
+        "+x" => Axis::PlusX,
+        "-x" => Axis::MinusX,
+        "+y" => Axis::PlusY,
+        "-y" => Axis::MinusY,
+        "-z" => Axis::MinusZ,
+        _ => Axis::PlusZ,
+    }
+}
+
+fn open_camera(
+    setup: &CameraSetup,
+    camera: CameraId,
+    clock: RealClock,
+) -> Result<Box<dyn EventCamera>, Failure> {
+    if setup.model != "evk1" {
+        return Err(Failure::input(format!(
+            "{camera}: expected `model: evk1`, found `{}`, which this build does not drive",
+            setup.model
+        )));
+    }
+    let evk1 = Evk1::open_serial(&setup.serial, camera, Evk1Config::default(), clock);
+    Ok(Box::new(evk1.map_err(|e| {
+        Failure::rig(format!(
+            "{camera}: {e}\n  next: `skinrig devices` shows what is connected"
+        ))
+    })?))
+}
+
+fn camera_settings(
+    setup: &CameraSetup,
+    request: &skinrig_protocol::CameraRequest,
+) -> Result<CameraSettings, Failure> {
+    let mut settings = CameraSettings {
+        sync: match setup.sync {
+            SyncRole::Standalone => SyncMode::Standalone,
+            SyncRole::Master => SyncMode::Master,
+            SyncRole::Slave => SyncMode::Slave,
+        },
+        noise_filter: setup
+            .noise_filter_ev_s
+            .map(|min_rate_ev_s| NoiseFilter { min_rate_ev_s }),
+        trigger_channels: vec![setup.trigger_channel],
+        ..CameraSettings::default()
+    };
+    if let Some(file) = &setup.bias_file {
+        let wrong = |e: &dyn std::fmt::Display| Failure::input(format!("{}: {e}", file.display()));
+        let text = std::fs::read_to_string(file).map_err(|e| wrong(&e))?;
+        settings.biases = parse_bias_file(&text).map_err(|e| wrong(&e))?;
+    }
+    settings.biases.extend(setup.biases.clone());
+    settings.roi = setup.roi.map(|[x, y, width, height]| Roi {
+        x,
+        y,
+        width,
+        height,
+    });
+    super::apply(&mut settings, request);
+    Ok(settings)
+}
+
+fn open_trigger_box(setup: &BoxSetup, clock: RealClock) -> Result<Box<dyn TriggerBox>, Failure> {
+    let mut config = TriggerBoxConfig::new(&setup.port);
+    config.serial.clone_from(&setup.serial);
+    config.max_drift_ppm = setup.max_drift_ppm;
+    let open = || {
+        let mut device = SerialTriggerBox::open(config, clock)?;
+        device.set_sync(Some(setup.sync_period_ms))?;
+        device.arm()?;
+        Ok(device)
+    };
+    let device = open().map_err(|e: skinrig_device::DeviceError| Failure::rig(e))?;
+    Ok(Box::new(device))
+}

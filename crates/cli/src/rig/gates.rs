@@ -1,0 +1,269 @@
+//! What the program itself checks before a run: disk, frame, recorder; and whom the rig file expects.
+
+use std::path::Path;
+
+use chrono::Utc;
+use skinrig_controller::{ExpectedDevice, Loopback, Preflight};
+use skinrig_device::Rig;
+use skinrig_model::{DeviceRole, HostDuration, PreflightCheck};
+use skinrig_protocol::rig::{Frame, PreflightLimits, RigFile};
+
+/// Space that must be left on the disk after a session of the simulated rig, bytes.
+const SIMULATED_RESERVE_B: f64 = 200e6;
+/// A simulated session is given this many times the bytes that its plan leads to expect.
+const SIMULATED_ROOM: f64 = 2.0;
+/// How long the simulated rig may take to show that clocks advance and marks come back.
+const SIMULATED_WITHIN: HostDuration = HostDuration::from_millis(2_000);
+
+/// The preflight of a bench.
+#[must_use]
+pub fn of_bench(file: &RigFile, rig: &Rig, folder: &Path, expected_s: f64) -> Preflight {
+    let limits = &file.preflight;
+    let mut made = vec![disk(
+        folder,
+        limits.data_rate_b_s * expected_s,
+        limits.min_free_disk_b,
+    )];
+    made.extend(frame(&file.frame, limits));
+    Preflight {
+        made,
+        expected: expected(file),
+        clocks_within: Some(limits.clocks_within),
+        loopback: loopback(rig, limits.loopback_within),
+    }
+}
+
+/// The preflight of the simulated rig.
+#[must_use]
+pub fn of_simulated(rig: &Rig, folder: &Path, expected_b: f64) -> Preflight {
+    let size_b = SIMULATED_ROOM * expected_b;
+    Preflight {
+        made: vec![
+            disk(folder, size_b, SIMULATED_RESERVE_B),
+            PreflightCheck::skipped(
+                "frame",
+                "touched points",
+                "the simulated skin lies where it is said to",
+            ),
+        ],
+        expected: Vec::new(),
+        clocks_within: Some(SIMULATED_WITHIN),
+        loopback: loopback(rig, SIMULATED_WITHIN),
+    }
+}
+
+/// The recorder's line of the table: `session` was created, and took the run's header.
+#[must_use]
+pub fn recorder(session: &Path) -> PreflightCheck {
+    PreflightCheck::new(
+        "recorder",
+        "a new session file that can be written",
+        session.display().to_string(),
+        true,
+        "",
+    )
+}
+
+fn loopback(rig: &Rig, within: HostDuration) -> Option<Loopback> {
+    rig.trigger_box.as_ref()?;
+    let channel = rig.geometry.trigger_channel?;
+    Some(Loopback {
+        channels: [channel; 2],
+        within,
+    })
+}
+
+fn expected(file: &RigFile) -> Vec<ExpectedDevice> {
+    let robot = &file.robot;
+    let threshold = robot.velocity_threshold;
+    let mut expected = vec![ExpectedDevice {
+        role: DeviceRole::Indenter,
+        serial: Some(robot.serial.to_string()),
+        versions: [&robot.firmware, &robot.library_version]
+            .into_iter()
+            .flatten()
+            .cloned()
+            .collect(),
+        settings: threshold
+            .map(|t| ("velocity_threshold".to_owned(), t.to_string()))
+            .into_iter()
+            .collect(),
+    }];
+    for (role, camera) in [DeviceRole::Camera1, DeviceRole::Camera2]
+        .into_iter()
+        .zip(&file.cameras)
+    {
+        expected.push(ExpectedDevice {
+            role,
+            serial: Some(camera.serial.clone()),
+            versions: camera.fpga.iter().map(|v| format!("FPGA {v}")).collect(),
+            settings: Vec::new(),
+        });
+    }
+    if let Some(device) = &file.trigger_box {
+        expected.push(ExpectedDevice {
+            role: DeviceRole::TriggerBox,
+            serial: device.serial.clone(),
+            versions: device.firmware.iter().cloned().collect(),
+            settings: Vec::new(),
+        });
+    }
+    expected
+}
+
+/// Room for the session, and some left.
+fn disk(folder: &Path, session_b: f64, reserve_b: f64) -> PreflightCheck {
+    let need_b = session_b + reserve_b;
+    let expected = format!(
+        "{} free: about {} for the session, {} to be left",
+        size(need_b),
+        size(session_b),
+        size(reserve_b)
+    );
+    let next = "make room, or give another folder with --sessions";
+    // The folder may have to be made first.
+    let there = folder
+        .ancestors()
+        .find(|f| f.exists())
+        .filter(|f| !f.as_os_str().is_empty())
+        .unwrap_or(Path::new("."));
+    match free_bytes(there) {
+        Ok(free_b) => PreflightCheck::new("disk", expected, size(free_b), free_b >= need_b, next),
+        Err(e) => PreflightCheck::new("disk", expected, e, false, next),
+    }
+}
+
+#[cfg(unix)]
+fn free_bytes(folder: &Path) -> Result<f64, String> {
+    let room = rustix::fs::statvfs(folder).map_err(|e| e.to_string())?;
+    Ok(room.f_bavail as f64 * room.f_frsize as f64)
+}
+
+#[cfg(not(unix))]
+fn free_bytes(_folder: &Path) -> Result<f64, String> {
+    Err("free space cannot be asked for on this system".to_owned())
+}
+
+/// `1.5 GB`.
+fn size(bytes: f64) -> String {
+    match bytes {
+        b if b >= 1e9 => format!("{:.1} GB", b / 1e9),
+        b => format!("{:.0} MB", b / 1e6),
+    }
+}
+
+/// How old the frame is, and how well the touched points fit.
+fn frame(frame: &Frame, limits: &PreflightLimits) -> Vec<PreflightCheck> {
+    let days = Utc::now().timestamp().div_euclid(86_400) - frame.date.days_since_1970();
+    let most_h = limits.touch_off_max_age.as_secs_f64() / 3600.0;
+    let age = PreflightCheck::new(
+        "frame: age",
+        format!("measured at most {most_h:.0} h ago"),
+        match days {
+            0 => format!("{}, today", frame.date),
+            d if d < 0 => format!("{}, in the future", frame.date),
+            d => format!("{}, {d} days ago", frame.date),
+        },
+        // A date has no hour: a day counts from its beginning, and one of tomorrow may be another time zone's today.
+        (-1..=(most_h / 24.0).ceil() as i64).contains(&days),
+        "touch the skin again with `skinrig jog`, and put the block that it prints into the rig file",
+    );
+    let fit = match &frame.touch_off {
+        Some(touched) => PreflightCheck::new(
+            "frame: residual",
+            format!("at most {} mm", touched.max_residual_mm),
+            format!(
+                "{:.3} mm at worst, {:.3} mm root mean square, {} points",
+                touched.worst_mm,
+                touched.rms_mm,
+                touched.points.len()
+            ),
+            touched.worst_mm <= touched.max_residual_mm,
+            "touch the points again with `skinrig jog`",
+        ),
+        None => PreflightCheck::skipped("frame: residual", "touched points", "the frame is given"),
+    };
+    vec![age, fit]
+}
+
+/// The table for people: check, expected, found, verdict, and under a failed check the next step.
+#[must_use]
+pub fn table(checks: &[PreflightCheck]) -> String {
+    let width = |of: fn(&PreflightCheck) -> &str| {
+        let widest = checks.iter().map(|c| of(c).chars().count()).max();
+        widest.unwrap_or(0).min(60)
+    };
+    let (name, expected) = (width(|c| &c.check), width(|c| &c.expected));
+    let mut out = String::from("preflight\n");
+    for c in checks {
+        out.push_str(&format!(
+            "  {:<7}  {:<name$}  {:<expected$}  {}\n",
+            c.verdict.name(),
+            c.check,
+            c.expected,
+            c.found
+        ));
+        if c.failed() {
+            out.push_str(&format!("           next: {}\n", c.next_step));
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use skinrig_model::CheckVerdict;
+    use skinrig_protocol::rig::Date;
+
+    #[test]
+    fn a_session_that_does_not_fit_fails() {
+        let here = Path::new(".");
+        assert!(!disk(here, 1.0, 1.0).failed());
+        let full = disk(here, 1e18, 0.0);
+        assert!(
+            full.failed() && full.next_step.contains("--sessions"),
+            "{full:?}"
+        );
+        // A folder that is still to be made lies on the disk of the one above it.
+        assert!(!disk(Path::new("no/such/folder"), 1.0, 1.0).failed());
+    }
+
+    #[test]
+    fn an_old_frame_and_one_of_the_future_fail() {
+        let text = include_str!("../../../../hil/rigs/bench.example.yaml");
+        let mut file = RigFile::parse("rig.yaml", text.as_bytes(), &|_| None).unwrap();
+        let verdicts = |file: &RigFile| -> Vec<CheckVerdict> {
+            let checks = frame(&file.frame, &file.preflight);
+            checks.iter().map(|c| c.verdict).collect()
+        };
+        let passed = CheckVerdict::Passed;
+        let today = Utc::now().format("%Y-%m-%d").to_string();
+        file.frame.date = Date::parse(&today).unwrap();
+        assert_eq!(verdicts(&file), [passed; 2]);
+        for wrong in ["2001-01-01", "2999-01-01"] {
+            file.frame.date = Date::parse(wrong).unwrap();
+            assert_eq!(verdicts(&file), [CheckVerdict::Failed, passed], "{wrong}");
+        }
+        file.frame.touch_off = None;
+        assert_eq!(verdicts(&file)[1], CheckVerdict::Skipped);
+    }
+
+    #[test]
+    fn the_table_tells_what_to_do_about_a_failed_check() {
+        let checks = [
+            PreflightCheck::new("disk", "1 GB", "2 GB", true, "make room"),
+            PreflightCheck::new(
+                "camera 1: clock",
+                "advancing",
+                "no time",
+                false,
+                "power-cycle it",
+            ),
+        ];
+        assert_eq!(
+            table(&checks),
+            "preflight\n  passed   disk             1 GB       2 GB\n  failed   camera 1: clock  advancing  no time\n           next: power-cycle it\n"
+        );
+    }
+}

@@ -1,0 +1,19 @@
+//! The hidden command `supervise-arm`: brakes the robot's arm when the program that started it dies.
+
+use crate::exit::{Exit, Failure, Outcome};
+
+/// Waits on standard input for the driver's goodbye or its death.
+///
+/// # Errors
+/// [`Failure::rig`] when the arm could not be braked: it may be live.
+pub fn supervise() -> Outcome {
+    let ended = skinrig_omega3::supervisor::supervise(
+        std::io::stdin(),
+        std::io::stdout(),
+        std::io::stderr(),
+    );
+    match ended {
+        Ok(_) => Ok(Exit::Ok),
+        Err(e) => Err(Failure::rig(e)),
+    }
+}

@@ -1,0 +1,302 @@
+//! Benches: rig files, what is connected, the preflight in sessions, jogging, and presses that touch.
+
+use std::io::Write;
+use std::process::Stdio;
+
+use serde_json::Value;
+use skinrig_protocol::rig::RigFile;
+
+use crate::replay::assert_replays;
+use crate::support::{Lab, ROOT, Said, files, program, said, show, skinrig};
+
+const EMULATED: &str = "hil/rigs/emulated.yaml";
+const QUICK: &str = "protocols/quick-check.yaml";
+
+/// The program with the devices of an emulated bench that is not there.
+fn without_devices(arguments: &[&str]) -> Said {
+    let mut command = program(arguments);
+    command
+        .env("SKINRIG_EMULATED_LIBDRD", "/nowhere/libdrd.so")
+        .env("SKINRIG_EMULATED_TRIGGER_BOX", "/nowhere/box")
+        .env("SKINRIG_LIBDRD", "/nowhere/libdrd.so");
+    said(command)
+}
+
+#[test]
+fn nothing_connected_is_no_error_and_every_line_has_a_next_step() {
+    let plain = without_devices(&["devices"]).code(0);
+    assert!(plain.out.contains("libdrd not found"), "{plain:?}");
+    assert!(plain.out.contains("no device is ready"), "{plain:?}");
+    let json = without_devices(&["devices", "--rig", EMULATED, "--json"])
+        .code(0)
+        .json();
+    assert_eq!(json["kind"], "emulated");
+    let lines = json["devices"].as_array().unwrap();
+    let role = |role: &str| lines.iter().find(|l| l["role"] == role);
+    for name in ["camera1", "camera2", "trigger_box"] {
+        let line = role(name).unwrap_or_else(|| panic!("{name} is not listed: {lines:?}"));
+        assert_eq!(line["state"], "absent", "{line}");
+        assert!(
+            line["next_step"].as_str().is_some_and(|s| !s.is_empty()),
+            "{line}"
+        );
+    }
+}
+
+#[test]
+fn a_rig_file_is_read_with_the_same_care_as_a_protocol() {
+    let lab = Lab::new();
+    let run =
+        |rig: &str| without_devices(&["run", QUICK, "--rig", rig, "--sessions", &lab.text("s")]);
+    run("hil/rigs/nowhere.yaml")
+        .code(2)
+        .complains(&["cannot read hil/rigs/nowhere.yaml"]);
+    run(QUICK)
+        .code(2)
+        .complains(&["this is not a rig", "found: a protocol"]);
+    let spoilt = std::fs::read_to_string(format!("{ROOT}/{EMULATED}")).unwrap();
+    let spoilt = spoilt.replace("max_force: 8 N", "max_force: 8");
+    std::fs::write(lab.path("rig.yaml"), spoilt).unwrap();
+    run(&lab.text("rig.yaml")).code(2).complains(&[
+        "limits.max_force",
+        "the unit is missing",
+        "write `8 N`",
+    ]);
+    skinrig(&["run", QUICK, "--rig", EMULATED, "--level", "optical"]).code(2);
+    assert_eq!(files(&lab.path("s"), "").len(), 0, "nothing was recorded");
+}
+
+#[test]
+fn a_bench_that_is_not_there_is_named_with_the_next_step() {
+    let lab = Lab::new();
+    let sessions = lab.text("s");
+    without_devices(&["run", QUICK, "--rig", EMULATED, "--sessions", &sessions])
+        .code(3)
+        .complains(&["/nowhere/libdrd.so", "install the SDK"]);
+    without_devices(&["jog", "--rig", EMULATED, "--log", &lab.text("jog.log")])
+        .code(3)
+        .complains(&["/nowhere/libdrd.so"]);
+}
+
+#[test]
+fn the_tighter_limit_of_bench_and_protocol_holds() {
+    let lab = Lab::new();
+    let text = std::fs::read_to_string(format!("{ROOT}/{EMULATED}")).unwrap();
+    let text = text.replace("max_speed: 100 mm/s", "max_speed: 30 mm/s");
+    std::fs::write(lab.path("slow.yaml"), text).unwrap();
+    without_devices(&[
+        "run",
+        QUICK,
+        "--rig",
+        &lab.text("slow.yaml"),
+        "--sessions",
+        &lab.text("s"),
+    ])
+    .code(2)
+    .complains(&[
+        "the speed is outside its limit",
+        "at most 30 mm/s",
+        "slow.yaml allows",
+    ]);
+}
+
+#[test]
+fn the_preflight_is_in_the_session() {
+    let lab = Lab::new();
+    let session = lab.record("s", &[]);
+    let shown = show(&session);
+    let checks = shown["preflight"].as_array().unwrap();
+    let verdict = |name: &str| {
+        let check = checks.iter().find(|c| c["check"] == name);
+        check.map_or(Value::Null, |c| c["verdict"].clone())
+    };
+    for name in [
+        "recorder",
+        "disk",
+        "camera 1: clock",
+        "camera 2: trigger loop-back",
+    ] {
+        assert_eq!(verdict(name), "passed", "{name}: {checks:?}");
+    }
+    assert!(checks.iter().all(|c| c["verdict"] != "failed"));
+    let plain = skinrig(&["show", session.to_str().unwrap()]).code(0);
+    assert!(
+        plain.out.contains("camera 2: trigger loop-back"),
+        "{plain:?}"
+    );
+}
+
+#[test]
+fn presses_that_touch_are_recorded_and_replayed() {
+    let lab = Lab::new();
+    let touch = [
+        "press={surface: touch, threshold: 0.15 N, speed: 6 mm/s, band: 0.6 mm, tare: 100 ms}",
+        "sync={count: 2, interval: 2.5 s, at: [10 mm, 2 mm], pause_after: 1 s}",
+        "motion.period=2.5 s",
+    ];
+    let more: Vec<&str> = touch.iter().flat_map(|set| ["--set", set]).collect();
+    let session = lab.record("s", &more);
+    let presses = show(&session)["presses"].as_array().unwrap().clone();
+    assert_eq!(presses.len(), 10);
+    for press in &presses {
+        assert_eq!(press["verdict"], "valid", "{press}");
+        let touched = press["touched_mm"].as_f64().unwrap();
+        assert!((-0.4..0.0).contains(&touched), "{press}");
+        let depth = press["measured_depth_mm"].as_f64().unwrap();
+        assert!((depth - 1.5).abs() < 0.05, "{press}");
+    }
+    assert_replays(&lab, &session, "r");
+}
+
+/// Jogs the simulated rig with these lines; the log goes to `log`.
+fn jog(lines: &str, log: &str) -> Said {
+    let mut child = program(&["jog", "--log", log])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    // The program may end before it has read everything.
+    let _ = child.stdin.take().unwrap().write_all(lines.as_bytes());
+    let output = child.wait_with_output().unwrap();
+    Said {
+        code: output.status.code(),
+        out: String::from_utf8(output.stdout).unwrap(),
+        err: String::from_utf8(output.stderr).unwrap(),
+    }
+}
+
+#[test]
+fn touched_points_become_the_frame_of_a_rig_file() {
+    let lab = Lab::new();
+    // The simulated skin is turned by the angle of the 7-24-25 triangle; robot = R skin + (-6, -3, -15) mm.
+    let robot = |x: f64, y: f64| (0.96 * x - 0.28 * y - 6.0, 0.28 * x + 0.96 * y - 3.0);
+    let mut lines = "speed 40 mm/s\nwhere\n".to_owned();
+    for (name, x, y) in [
+        ("sw", -20.0, -30.0),
+        ("se", 45.0, -25.0),
+        ("ne", 45.0, 30.0),
+        ("nw", -25.0, 35.0),
+    ] {
+        let (rx, ry) = robot(x, y);
+        lines += &format!("to {rx} {ry} -8 mm\ntouch 10mm\npoint {name} at {x} {y} 0 mm\nz +5mm\n");
+    }
+    lines += "points\nquit\n";
+    let log = lab.text("jog.log");
+    let said = jog(&lines, &log).code(0);
+    let block = said.out.split("frame:\n").nth(1).unwrap();
+    let end = block
+        .find("\n\n")
+        .or_else(|| block.find("disarmed"))
+        .unwrap_or(block.len());
+    let emulated = std::fs::read_to_string(format!("{ROOT}/{EMULATED}")).unwrap();
+    let (start, rest) = emulated.split_once("frame:\n").unwrap();
+    let rest = rest.split_once("\n\n").unwrap().1;
+    let text = format!("{start}frame:\n{}\n\n{rest}", &block[..end]);
+    let rig = RigFile::parse("rig.yaml", text.as_bytes(), &|_| Some("/dev/null".into()))
+        .unwrap_or_else(|e| panic!("{e}\n{text}"));
+    let found = rig.frame.robot_from_skin;
+    for (i, (r, t)) in [([0.96, -0.28], -6.0), ([0.28, 0.96], -3.0)]
+        .into_iter()
+        .enumerate()
+    {
+        assert!((found.rotation[i][0] - r[0]).abs() < 2e-3, "{found:?}");
+        assert!((found.rotation[i][1] - r[1]).abs() < 2e-3, "{found:?}");
+        assert!((found.translation_mm[i] - t).abs() < 0.1, "{found:?}");
+    }
+    // The touch comes late by the threshold over the skin's stiffness, 0.33 mm.
+    assert!((found.translation_mm[2] + 15.4).abs() < 0.15, "{found:?}");
+    let log = std::fs::read_to_string(log).unwrap();
+    for kind in [
+        "start",
+        "order\ttouch 10mm",
+        "answer\ttouched at",
+        "tip",
+        "end\tdisarmed",
+    ] {
+        assert!(log.contains(&format!("\t{kind}")), "{kind}\n{log}");
+    }
+}
+
+#[test]
+fn a_wrong_line_of_a_file_ends_the_jog_with_the_robot_disarmed() {
+    let lab = Lab::new();
+    for (i, (line, words)) in [
+        ("jump 3mm", "found `jump`"),
+        ("x 3", "the bare number"),
+        ("to 200 0 0 mm", "expected a target with x"),
+        ("speed 500 mm/s\nx 1mm", "expected a speed above 0"),
+        ("point a", "`touch` first"),
+        // From the touch sideways: the tip is 2 mm up at most.
+        (
+            "touch 15mm\nz -1.5mm\nx +5mm",
+            "expected lateral motion only at",
+        ),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let log = lab.text(&format!("{i}.log"));
+        let said = jog(&format!("{line}\nz +1mm\n"), &log)
+            .code(2)
+            .complains(&[words]);
+        assert!(said.out.contains("disarmed at"), "{said:?}");
+        let log = std::fs::read_to_string(log).unwrap();
+        assert!(
+            log.contains("\trefused\t") && !log.contains("z +1mm"),
+            "{log}"
+        );
+    }
+}
+
+#[test]
+fn the_logs_of_jogs_are_never_written_over() {
+    let lab = Lab::new();
+    let log = lab.text("jog.log");
+    jog("where\n", &log).code(0);
+    jog("where\n", &log)
+        .code(1)
+        .complains(&["jog.log", "--log"]);
+}
+
+#[test]
+fn ctrl_c_holds_rises_and_disarms() {
+    let lab = Lab::new();
+    let mut child = program(&["jog", "--log", &lab.text("jog.log")])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut stdin = child.stdin.take().unwrap();
+    stdin.write_all(b"where\n").unwrap();
+    // The log tells when the order was obeyed; a signal before that would find no robot to disarm.
+    let log = lab.path("jog.log");
+    let began = std::time::Instant::now();
+    while !std::fs::read_to_string(&log).is_ok_and(|t| t.contains("\tanswer\t")) {
+        assert!(began.elapsed().as_secs() < 120, "no answer");
+        std::thread::yield_now();
+    }
+    let killed = std::process::Command::new("kill")
+        .args(["-INT", &child.id().to_string()])
+        .status()
+        .unwrap();
+    assert!(killed.success());
+    let output = child.wait_with_output().unwrap();
+    drop(stdin);
+    let out = String::from_utf8(output.stdout).unwrap();
+    assert_eq!(output.status.code(), Some(5), "{out}");
+    assert!(out.contains("disarmed at"), "{out}");
+    // From (3.0, 1.7, -5) mm up by 10 mm.
+    let z: f64 = out
+        .rsplit("disarmed at")
+        .next()
+        .unwrap()
+        .split([',', ')'])
+        .nth(2)
+        .unwrap()
+        .trim()
+        .parse()
+        .unwrap();
+    assert!((z - 5.0).abs() < 0.2, "{out}");
+}

@@ -1,0 +1,336 @@
+//! Moving the robot by hand: single motions and slow touches under the guard of runs.
+
+use skinrig_device::{Clock, Indenter, MotionLimits};
+use skinrig_model::{
+    DeviceIdentity, HostDuration, HostTime, Point3, PoseSample, RigidTransform, Robot, Setting,
+    Skin,
+};
+use skinrig_protocol::TouchSearch;
+use skinrig_protocol::plan::RunLimits;
+
+use crate::error::{ControllerError, GuardError};
+use crate::guard::GuardedIndenter;
+use crate::moments::Settling;
+use crate::settings::ControllerSettings;
+use crate::touch::TouchDetector;
+
+/// After a touch the tip goes sideways only this far above its height, mm.
+const LIFT_MM: f64 = 2.0;
+/// From one sample of the trace to the next.
+const TRACE_EVERY: HostDuration = HostDuration::from_millis(100);
+/// How far the tip rises at the end, mm; less where the workspace ends.
+const RETRACT_MM: f64 = 10.0;
+
+/// Asks whether the operator wants everything to stop now.
+pub type Stop<'a> = &'a dyn Fn() -> bool;
+
+/// A robot that is moved by hand. Dropped, it holds, rises and disarms.
+pub struct Jog {
+    indenter: GuardedIndenter,
+    clock: Box<dyn Clock>,
+    settings: ControllerSettings,
+    limits: RunLimits,
+    fresh: Vec<PoseSample>,
+    /// Height of the last touch.
+    touched_mm: Option<f64>,
+    /// Samples far enough apart for a log, not yet taken.
+    trace: Vec<PoseSample>,
+    traced: Option<HostTime>,
+    finished: bool,
+}
+
+/// How a motion ended.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Moved {
+    /// The tip settled at its target.
+    Arrived(PoseSample),
+    /// The operator stopped it; the robot holds.
+    Stopped(PoseSample),
+}
+
+/// How a touch ended.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Touched {
+    /// The force rose here.
+    At(PoseSample),
+    /// It did not, down to here.
+    Nothing(PoseSample),
+    /// The operator stopped it; the robot holds.
+    Stopped(PoseSample),
+}
+
+impl Jog {
+    /// Limits the robot, powers it, and waits for its pose. Coordinates are those of the frame that `robot_from_frame`
+    /// takes to the robot's: the skin's, or the robot's own with the identity.
+    ///
+    /// # Errors
+    /// What the robot answers; [`ControllerError::PoseStream`] when it tells no pose. It is then disarmed.
+    pub fn start(
+        indenter: Box<dyn Indenter>,
+        clock: Box<dyn Clock>,
+        robot_from_frame: RigidTransform<Robot, Skin>,
+        limits: RunLimits,
+        robot_limits: &MotionLimits,
+        settings: ControllerSettings,
+    ) -> Result<(Self, Vec<Setting>), ControllerError> {
+        let indenter =
+            GuardedIndenter::new(indenter, robot_from_frame, limits, settings.stale_after);
+        let mut jog = Self {
+            indenter,
+            clock,
+            settings,
+            limits,
+            fresh: Vec::new(),
+            touched_mm: None,
+            trace: Vec::new(),
+            traced: None,
+            finished: false,
+        };
+        let written = jog.indenter.configure(robot_limits)?;
+        jog.indenter.arm()?;
+        let until = jog.clock.now() + jog.settings.first_pose_within;
+        while jog.indenter.position().is_none() {
+            if jog.clock.now() >= until {
+                return Err(ControllerError::PoseStream {
+                    expected: format!("a sample within {}", jog.settings.first_pose_within),
+                    found: "none".to_owned(),
+                });
+            }
+            jog.tick()?;
+        }
+        Ok((jog, written))
+    }
+
+    /// Who the robot is.
+    #[must_use]
+    pub fn identity(&self) -> DeviceIdentity {
+        self.indenter.identity()
+    }
+
+    /// The present.
+    #[must_use]
+    pub fn now(&self) -> HostTime {
+        self.clock.now()
+    }
+
+    /// Where the tip is, after a look at the robot. To be called often: it also watches force and stream.
+    ///
+    /// # Errors
+    /// [`ControllerError::Force`] above the limit, a stale or broken pose stream, what the robot answers.
+    pub fn look(&mut self) -> Result<PoseSample, ControllerError> {
+        self.tick()?;
+        self.position()
+    }
+
+    /// Takes the path of the tip since the last call, a sample every 100 ms.
+    pub fn take_trace(&mut self) -> Vec<PoseSample> {
+        std::mem::take(&mut self.trace)
+    }
+
+    /// Straight to `target`. After a touch sideways only 2 mm above its height.
+    ///
+    /// # Errors
+    /// [`ControllerError::Guard`] for a motion that is not allowed: nothing was done. [`ControllerError::NotArrived`]:
+    /// the robot holds. Otherwise as [`look`](Self::look).
+    pub fn go(
+        &mut self,
+        target: Point3<Skin>,
+        speed_mm_s: f64,
+        stop: Stop<'_>,
+    ) -> Result<Moved, ControllerError> {
+        let from = self.look()?;
+        self.check_lift(from, target)?;
+        let way_mm = target.distance_mm(from.measured);
+        let t = self.command(target, speed_mm_s)?;
+        let allowed =
+            HostDuration::from_secs_f64(2.0 * way_mm / speed_mm_s) + self.settings.rise_allowance;
+        let mut settling = Settling::new(target, &self.limits, t);
+        while settling.settled().is_none() {
+            if stop() {
+                self.indenter.hold()?;
+                return Ok(Moved::Stopped(self.look()?));
+            }
+            if self.clock.now() >= t + allowed {
+                self.indenter.hold()?;
+                return Err(ControllerError::NotArrived {
+                    what: "jog".to_owned(),
+                    tolerance_mm: self.limits.position_tolerance_mm,
+                    target,
+                    allowed,
+                    found: self.indenter.position().map(|p| p.measured),
+                });
+            }
+            self.tick()?;
+            self.fresh.iter().for_each(|s| settling.feed(s));
+        }
+        let at = self.position()?;
+        Ok(Moved::Arrived(at))
+    }
+
+    /// Slowly down, at most `way_mm`, until the force rises; then back up off what was touched.
+    ///
+    /// # Errors
+    /// As [`go`](Self::go); [`ControllerError::PoseStream`] for a robot that tells no force.
+    pub fn touch(
+        &mut self,
+        search: TouchSearch,
+        way_mm: f64,
+        stop: Stop<'_>,
+    ) -> Result<Touched, ControllerError> {
+        let above = self.look()?;
+        let here = above.commanded;
+        let t = self.command(here, search.speed_mm_s)?;
+        let mut detector = TouchDetector::new(search, t);
+        let until = t + search.tare + self.settings.first_pose_within;
+        while detector.tare_n().is_none() {
+            if detector.is_blind() || self.clock.now() >= until {
+                return Err(ControllerError::PoseStream {
+                    expected: "forces".to_owned(),
+                    found: "none".to_owned(),
+                });
+            }
+            if stop() {
+                return Ok(Touched::Stopped(self.position()?));
+            }
+            self.tick()?;
+            self.fresh.iter().for_each(|s| detector.feed(s));
+        }
+        let lowest = here.z_mm - way_mm;
+        let t = self.command(here.plane().at_height(lowest), search.speed_mm_s)?;
+        detector.search_from(t);
+        let until = t
+            + HostDuration::from_secs_f64(2.0 * way_mm / search.speed_mm_s)
+            + self.settings.rise_allowance;
+        loop {
+            self.tick()?;
+            self.fresh.iter().for_each(|s| detector.feed(s));
+            let at = self.position()?;
+            if let Some(found) = detector.touched() {
+                self.touched_mm = Some(found.measured.z_mm);
+                // Off the skin the way the tip came, and no higher than it came from.
+                let z_mm = (found.measured.z_mm + LIFT_MM).min(here.z_mm);
+                self.go(here.plane().at_height(z_mm), search.speed_mm_s, stop)?;
+                return Ok(Touched::At(found));
+            }
+            if stop() {
+                self.indenter.hold()?;
+                return Ok(Touched::Stopped(at));
+            }
+            let low = at.measured.z_mm <= lowest + self.limits.position_tolerance_mm;
+            if low || detector.is_blind() || self.clock.now() >= until {
+                self.indenter.hold()?;
+                return Ok(Touched::Nothing(at));
+            }
+        }
+    }
+
+    /// Holds, rises where that is possible, disarms. Gives where the tip was then, or what went wrong on the way; the
+    /// robot is told to disarm in any case.
+    ///
+    /// # Errors
+    /// The first thing that failed.
+    pub fn finish(&mut self) -> Result<Option<PoseSample>, ControllerError> {
+        if std::mem::replace(&mut self.finished, true) {
+            return Ok(self.indenter.position());
+        }
+        let rose = if self.indenter.is_armed() {
+            self.rise()
+        } else {
+            Ok(())
+        };
+        let disarmed = (0..3)
+            .map(|_| self.indenter.disarm())
+            .find(Result::is_ok)
+            .unwrap_or_else(|| self.indenter.disarm());
+        rose.and(disarmed)?;
+        Ok(self.indenter.position())
+    }
+
+    fn rise(&mut self) -> Result<(), ControllerError> {
+        self.indenter.hold()?;
+        let at = self.look()?.measured;
+        let z_mm = (at.z_mm + RETRACT_MM).min(self.limits.workspace_max_mm[2]);
+        if z_mm <= at.z_mm {
+            return Ok(()); // nowhere to rise to
+        }
+        let speed = self
+            .settings
+            .rise_speed_mm_s
+            .min(self.limits.max_speed_mm_s);
+        self.go(at.plane().at_height(z_mm), speed, &|| false)
+            .map(drop)
+    }
+
+    /// Well above what was touched at this height, mm.
+    fn clear_of(&self, touched_mm: f64) -> f64 {
+        touched_mm + LIFT_MM - self.limits.position_tolerance_mm
+    }
+
+    /// After a touch, sideways motion would shear what is touched.
+    fn check_lift(&self, from: PoseSample, target: Point3<Skin>) -> Result<(), GuardError> {
+        let Some(touched_mm) = self.touched_mm else {
+            return Ok(());
+        };
+        let lateral_mm = target.plane().distance_mm(from.measured.plane());
+        let height_mm = target.z_mm.min(from.measured.z_mm);
+        let clearance_mm = self.clear_of(touched_mm);
+        if lateral_mm > self.limits.position_tolerance_mm && height_mm < clearance_mm {
+            return Err(GuardError::Lateral {
+                clearance_mm,
+                lateral_mm,
+                height_mm,
+            });
+        }
+        Ok(())
+    }
+
+    fn command(
+        &mut self,
+        target: Point3<Skin>,
+        speed_mm_s: f64,
+    ) -> Result<HostTime, ControllerError> {
+        self.indenter
+            .command(target, speed_mm_s, self.clock.now())?;
+        Ok(self.clock.now())
+    }
+
+    fn position(&self) -> Result<PoseSample, ControllerError> {
+        self.indenter
+            .position()
+            .ok_or_else(|| ControllerError::PoseStream {
+                expected: "a known position".to_owned(),
+                found: "none".to_owned(),
+            })
+    }
+
+    fn tick(&mut self) -> Result<(), ControllerError> {
+        self.clock.wait_until(self.clock.now() + self.settings.tick);
+        self.fresh.clear();
+        let polled = self.indenter.poll(&mut self.fresh);
+        for s in &self.fresh {
+            if self.traced.is_none_or(|t| s.t - t >= TRACE_EVERY) {
+                self.traced = Some(s.t);
+                self.trace.push(*s);
+            }
+        }
+        polled?;
+        if self.indenter.is_armed() && self.indenter.position().is_some() {
+            self.indenter.check_fresh(self.clock.now())?;
+        }
+        let limit_n = self.limits.max_force_n;
+        match self.fresh.iter().find(|s| s.force_n > limit_n) {
+            Some(s) if !self.finished => Err(ControllerError::Force {
+                limit_n,
+                found_n: s.force_n,
+                t: s.t,
+            }),
+            _ => Ok(()),
+        }
+    }
+}
+
+impl Drop for Jog {
+    fn drop(&mut self) {
+        let _ = self.finish();
+    }
+}
