@@ -2,18 +2,14 @@
 #![expect(clippy::print_stdout, reason = "a bench prints its table")]
 
 use std::error::Error;
-use std::fs::File;
 use std::hint::black_box;
-use std::io::Write;
 use std::path::Path;
 
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use skinrig_bench::Table;
-use skinrig_model::{
-    AttemptId, CameraId, ChunkFacts, HostTime, PlannedPress, Point2, PressId, RawChunk, Record,
-    RigidTransform, RunHeader, StreamFormat, press::PressRole,
-};
+use skinrig_bench::session::{header, plain_file};
+use skinrig_model::{AttemptId, CameraId, ChunkFacts, HostTime, PressId, RawChunk, Record};
 use skinrig_recorder::{SessionWriter, codec};
 
 const CHUNK: usize = 1 << 20;
@@ -37,50 +33,12 @@ fn evt2(events: u32, bytes: usize) -> Vec<u8> {
     words.into_iter().flat_map(u32::to_le_bytes).collect()
 }
 
-fn plain_file(path: &Path, chunk: &[u8]) -> std::io::Result<()> {
-    let mut file = File::create(path)?;
-    for _ in 0..CHUNKS {
-        file.write_all(chunk)?;
-    }
-    file.sync_all()
-}
-
 fn session(path: &Path, chunk: &[u8]) -> Result<(), Box<dyn Error>> {
     if path.exists() {
         std::fs::remove_file(path)?;
     }
-    let text = "{}".to_owned();
-    // SHA-256 of `{}`.
-    let digest = "44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a".to_owned();
     let mut writer = SessionWriter::create(path)?;
-    writer.accept(Record::Started(Box::new(RunHeader {
-        protocol_text: text.clone(),
-        protocol_name: "bench".into(),
-        protocol_sha256: digest.clone(),
-        overrides: vec![],
-        plan_json: text.clone(),
-        plan_sha256: digest,
-        seed: 1,
-        rig_kind: "simulated".into(),
-        rig_name: "bench".into(),
-        rig_json: text,
-        robot_from_skin: RigidTransform::identity(),
-        stream_formats: [StreamFormat::Evt2; 2],
-        prototype: String::new(),
-        operator: String::new(),
-        started_at: String::new(),
-        host: String::new(),
-        software: String::new(),
-        command_line: String::new(),
-        presses: vec![PlannedPress {
-            id: PressId(0),
-            role: PressRole::Score,
-            repetition: 0,
-            location: 0,
-            at: Point2::new(0.0, 0.0),
-            depth_mm: 2.0,
-        }],
-    })))?;
+    writer.accept(Record::Started(Box::new(header())))?;
     for n in 0..CHUNKS {
         writer.accept(Record::Chunk(RawChunk {
             camera: CameraId::ALL[(n % 2) as usize],
@@ -113,7 +71,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let mut table = Table::new(&title, "MB", METHOD);
         let (file, database) = (folder.path().join("plain"), folder.path().join("session"));
         table.baseline("plain file, one fsync at the end", megabytes, move || {
-            plain_file(&file, chunk).expect("the temporary folder takes a file");
+            plain_file(&file, chunk, CHUNKS).expect("the temporary folder takes a file");
         });
         table.row("session file, one commit per 8 MiB", megabytes, move || {
             session(&database, chunk).expect("the temporary folder takes a session");

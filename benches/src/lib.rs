@@ -5,12 +5,13 @@
 //! are interleaved, so that a slow moment of the machine hits all of them, and every second round runs backwards,
 //! so that none always follows the same neighbour; the best round counts.
 //!
-//! [`recording`] makes the data, [`files`] stores it, [`python`] runs the other side, [`memory`] reads the peak.
+//! [`recording`] makes the data, [`files`] and [`session`] store it, [`python`] runs the other side, [`memory`] reads the peak.
 
 pub mod files;
 pub mod memory;
 pub mod python;
 pub mod recording;
+pub mod session;
 
 use std::fmt::Write as _;
 use std::time::Instant;

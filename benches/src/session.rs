@@ -1,0 +1,57 @@
+//! The head of a session that holds nothing but camera bytes, and what a plain file takes.
+
+use std::fs::File;
+use std::io::Write;
+use std::path::Path;
+
+use skinrig_model::{
+    PlannedPress, Point2, PressId, PressRole, RigidTransform, RunHeader, StreamFormat,
+};
+
+/// A header with one press that nobody makes.
+#[must_use]
+pub fn header() -> RunHeader {
+    let text = "{}".to_owned();
+    // SHA-256 of `{}`.
+    let digest = "44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a".to_owned();
+    RunHeader {
+        protocol_text: text.clone(),
+        protocol_name: "bench".into(),
+        protocol_sha256: digest.clone(),
+        overrides: vec![],
+        plan_json: text.clone(),
+        plan_sha256: digest,
+        seed: 1,
+        rig_kind: "simulated".into(),
+        rig_name: "bench".into(),
+        rig_json: text,
+        robot_from_skin: RigidTransform::identity(),
+        stream_formats: [StreamFormat::Evt2; 2],
+        prototype: String::new(),
+        operator: String::new(),
+        started_at: String::new(),
+        host: String::new(),
+        software: String::new(),
+        command_line: String::new(),
+        presses: vec![PlannedPress {
+            id: PressId(0),
+            role: PressRole::Score,
+            repetition: 0,
+            location: 0,
+            at: Point2::new(0.0, 0.0),
+            depth_mm: 2.0,
+        }],
+    }
+}
+
+/// Writes `chunk` so many times and waits until it is on the disk.
+///
+/// # Errors
+/// When the file cannot be written.
+pub fn plain_file(path: &Path, chunk: &[u8], times: u64) -> std::io::Result<()> {
+    let mut file = File::create(path)?;
+    for _ in 0..times {
+        file.write_all(chunk)?;
+    }
+    file.sync_all()
+}
