@@ -114,6 +114,7 @@ impl EmulatedBench {
                 serial: ARM_SERIAL,
                 ..ArmDevice::default()
             }],
+            journal_reads: false,
             contact: Some(Contact {
                 stiffness_n_m: config.skin_n_m,
                 ..Contact::horizontal(surface.z_mm * 1e-3)
