@@ -13,8 +13,9 @@
 #include "pins.h"
 #include "protocol.h"
 
-// How long before an edge its interrupt is due: longer than the longest stretch without interrupts.
-#define LEAD_TICKS (40UL * TICKS_PER_US)
+// How long before an edge its interrupt is due: longer than the longest stretch without interrupts. Half a microsecond
+// off the grid of the edges, so that no match falls on the timer's overflow, where simavr 1.6 misses it.
+#define LEAD_TICKS (40UL * TICKS_PER_US + TICKS_PER_US / 2)
 // From "now" to the first edge of a train that need not wait.
 #define START_LEAD_TICKS (100UL * TICKS_PER_US)
 // Cycles between the reading of Timer1 in `write_at` and the change of the port, besides the wait itself.
@@ -92,10 +93,16 @@ ISR(TIMER1_COMPA_vect)
     if (state == IDLE)
         return;
     // A match of an old setting, or an edge more than a turn of the timer away: it will come again.
-    if ((int32_t)(due - clock_low()) > (int32_t)(2 * LEAD_TICKS))
+    int32_t left = (int32_t)(due - clock_low());
+    if (left > (int32_t)(2 * LEAD_TICKS))
         return;
     uint8_t value = high ? PORTB & (uint8_t)~OUTPUTS : PORTB | OUTPUTS;
-    if (write_at((uint16_t)due, value) && counts.late_edges != UINT16_MAX)
+    bool late = left < 0;
+    if (late)
+        PORTB = value;
+    else
+        late = write_at((uint16_t)due, value);
+    if (late && counts.late_edges != UINT16_MAX)
         ++counts.late_edges;
     high = !high;
     if (high) {

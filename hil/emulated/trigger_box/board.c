@@ -341,15 +341,27 @@ static int wanted_reset;
 static bool powered = true;
 
 static avr_cycle_count_t look_around(avr_t *a, avr_cycle_count_t when, void *param);
-static avr_cycle_count_t looked;
 
-static void reset(int cause)
+static void outputs_fall(void)
 {
     for (int pin = FIRST_PIN; pin <= LAST_PIN; ++pin)
         if (pin != INPUT_PIN)
             avr_raise_irq(pins[pin], 0); // an output without a driver is pulled low
+}
+
+// What a reset takes from the board around the processor.
+static void start_over(void)
+{
     queue_tail = queue_head;
     uart_full = false;
+    drive_input(levels[INPUT_PIN]);
+    avr_cycle_timer_register(avr, SLICE, look_around, NULL);
+    arm_planned();
+}
+
+static void reset(int cause)
+{
+    outputs_fall();
     avr_reset(avr);
     if (cause == RESET_POWER)
         avr_regbit_set(avr, avr->reset_flags.porf);
@@ -357,10 +369,29 @@ static void reset(int cause)
         avr_regbit_set(avr, avr->reset_flags.borf);
     else
         avr_regbit_set(avr, avr->reset_flags.extrf);
-    drive_input(levels[INPUT_PIN]);
-    looked = avr->cycle;
-    avr_cycle_timer_register(avr, SLICE, look_around, NULL);
-    arm_planned();
+    start_over();
+}
+
+// A firmware that hangs: the instruction that comes next is a jump to itself until the next reset.
+static bool wanted_hang;
+static bool hung;
+static avr_flashaddr_t hung_at;
+static uint8_t hung_instruction[2];
+
+static void hang(void)
+{
+    static const uint8_t jump_to_itself[2] = {0xff, 0xcf};
+    hung = true;
+    hung_at = avr->pc;
+    memcpy(hung_instruction, avr->flash + hung_at, 2);
+    memcpy(avr->flash + hung_at, jump_to_itself, 2);
+}
+
+static void mend(void)
+{
+    if (hung)
+        memcpy(avr->flash + hung_at, hung_instruction, 2);
+    hung = false;
 }
 
 // ------------------------------------------------------------------------------------------------------ commands
@@ -403,9 +434,7 @@ static void obey(struct client *c, char *line)
     } else if (!strcmp(line, "unplug") && powered) {
         unplug_port();
         powered = false;
-        for (int pin = FIRST_PIN; pin <= LAST_PIN; ++pin)
-            if (pin != INPUT_PIN)
-                avr_raise_irq(pins[pin], 0);
+        outputs_fall();
     } else if (!strcmp(line, "plug") && !powered) {
         plug_port();
         powered = true;
@@ -414,6 +443,8 @@ static void obey(struct client *c, char *line)
         wanted_reset = RESET_BROWN_OUT;
     } else if (sscanf(line, "reset %15s", word) == 1 && !strcmp(word, "button")) {
         wanted_reset = RESET_BUTTON;
+    } else if (!strcmp(line, "hang") && powered && !hung) {
+        wanted_hang = true;
     } else {
         tell(c, "error not understood: %s\n", line);
         return;
@@ -471,7 +502,6 @@ static avr_cycle_count_t look_around(avr_t *a, avr_cycle_count_t when, void *par
 {
     (void)param;
     static unsigned slices;
-    looked = a->cycle;
     if (!free_running) {
         // The slice to come is over on the host's clock before it begins here: the box is never ahead.
         int64_t end = ns_at(when + SLICE);
@@ -590,6 +620,7 @@ int main(int argc, char **argv)
     printf("ready\n");
     fflush(stdout);
 
+    void (*const run)(avr_t *) = avr->run;
     for (;;) {
         if (!powered) {
             sleep_until(host_ns() + 1000000);
@@ -606,19 +637,25 @@ int main(int argc, char **argv)
             avr_cycle_count_t now = free_running ? avr->cycle : cycle_at(host_ns());
             if (now > avr->cycle)
                 avr->cycle = now;
+            mend();
             reset(wanted_reset);
             wanted_reset = NO_RESET;
         }
+        if (wanted_hang) {
+            hang();
+            wanted_hang = false;
+        }
+        // The watchdog struck: simavr will reset the processor instead of running it, and takes all timers with it.
+        bool watchdog = avr->run != run;
         int state = avr_run(avr);
+        if (watchdog) {
+            mend();
+            outputs_fall();
+            start_over();
+        }
         if (state == cpu_Done || state == cpu_Crashed) {
             fprintf(stderr, "board: the processor stopped at %#x\n", avr->pc);
             return 1;
-        }
-        if (avr->cycle - looked > 4 * SLICE) {
-            // The firmware's own reset (watchdog) took our timers with it.
-            looked = avr->cycle;
-            avr_cycle_timer_register(avr, SLICE, look_around, NULL);
-            arm_planned();
         }
     }
 }

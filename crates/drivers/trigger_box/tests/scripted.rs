@@ -35,6 +35,8 @@ struct Script {
     deaf_to: Option<(u8, u32)>,
     /// Carries these out and loses the reply, so many times.
     mute_after: Option<(u8, u32)>,
+    /// Sends each reply twice, as after a request that was repeated too early.
+    doubled: bool,
     /// Is reset when it takes a mark.
     reset_at_mark: bool,
     always_busy: bool,
@@ -62,6 +64,7 @@ impl Default for Script {
             dropped: 0,
             deaf_to: None,
             mute_after: None,
+            doubled: false,
             reset_at_mark: false,
             always_busy: false,
             silent_disarm: false,
@@ -156,7 +159,11 @@ impl Script {
         reply.extend(self.boot.to_le_bytes());
         reply.extend(ticks.to_le_bytes());
         reply.extend(answers);
-        self.to_host.extend(frame::encode(&reply).unwrap());
+        let frame = frame::encode(&reply).unwrap();
+        self.to_host.extend(&frame);
+        if self.doubled {
+            self.to_host.extend(&frame);
+        }
     }
 }
 
@@ -341,6 +348,22 @@ fn a_lost_request_and_a_lost_reply_both_end_in_one_train() {
     device.send(mark(2)).unwrap();
     device.send(mark(3)).unwrap();
     assert_eq!(line.script().trains, [payload(1), payload(2), payload(3)]);
+}
+
+#[test]
+fn replies_that_come_again_pass_by() {
+    let (line, mut device) = open();
+    line.script().doubled = true;
+    let mut reports = Vec::new();
+    for press in 1..=5 {
+        device.send(mark(press)).unwrap();
+        device.counters().unwrap_err(); // the script keeps none
+        device.poll(&mut reports).unwrap();
+    }
+    assert_eq!(
+        line.script().trains,
+        (1..=5).map(payload).collect::<Vec<_>>()
+    );
 }
 
 #[test]

@@ -245,6 +245,14 @@ impl EmulatedBox {
         })
     }
 
+    /// Lets the firmware hang, until its watchdog or anything else resets it.
+    ///
+    /// # Errors
+    /// When the board is gone.
+    pub fn hang(&mut self) -> io::Result<u64> {
+        self.order("hang")
+    }
+
     /// Gives an order; the cycle in which it was taken.
     fn order(&mut self, line: &str) -> io::Result<u64> {
         self.control.write_all(format!("{line}\n").as_bytes())?;

@@ -292,3 +292,21 @@ proptest! {
         prop_assert_eq!(kept, sent - sent % 4);
     }
 }
+
+#[test]
+fn what_a_stopped_stream_left_behind_is_let_go_before_the_next_and_told() {
+    let bench = Bench::new();
+    let mut camera = bench.open().unwrap();
+    camera.start().unwrap();
+    camera.stop(&mut Vec::new()).unwrap();
+    bench.model().left_over = 300_000;
+    bench.trace();
+    camera.start().unwrap();
+    assert_eq!(camera.report().left_over_bytes, 300_000);
+    assert_eq!(bench.model().left_over, 0);
+    let trace = bench.trace();
+    let place = |what: &str| trace.find(what).unwrap();
+    assert!(place("bulk read of 0") < place("queue 20 transfers"));
+    camera.stop(&mut Vec::new()).unwrap();
+    assert!(camera.report().notes()[0].contains("left over"));
+}
