@@ -1,0 +1,130 @@
+//! The emulated bench, end to end and in real time: production drivers over stand-ins for the hardware.
+#![cfg(target_os = "linux")]
+#![expect(clippy::unwrap_used, reason = "a test that cannot run must fail")]
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use serde_json::Value;
+use skinrig_emulated_bench::{BenchConfig, BenchError, EmulatedBench};
+
+const SKINRIG: &str = env!("CARGO_BIN_EXE_skinrig");
+/// Of the cameras' true geometry and their noise; the simulated bench takes it too.
+const SEED: u64 = 1;
+
+fn top() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
+fn said(output: &Output) -> String {
+    format!(
+        "{}{}",
+        String::from_utf8_lossy(&output.stdout),
+        String::from_utf8_lossy(&output.stderr)
+    )
+}
+
+fn ended_well(output: &Output) -> String {
+    let said = said(output);
+    assert!(output.status.success(), "{}\n{said}", output.status);
+    said
+}
+
+fn run(mut command: Command, rig: &[&str], sessions: &Path) -> Output {
+    let seed = SEED.to_string();
+    command
+        .current_dir(top())
+        .args(["run", "protocols/quick-check.yaml", "--seed", &seed])
+        .args(rig)
+        .arg("--sessions")
+        .arg(sessions);
+    command.output().unwrap()
+}
+
+/// Runs on the emulated bench. A machine that leaves the robot's thread waiting for a tenth of a second gets the answer that
+/// a lab would want, a safe end; it may try again.
+fn run_in_real_time(bench: &EmulatedBench, sessions: &Path) -> (PathBuf, String) {
+    let rig = ["--rig", "hil/rigs/emulated.yaml"];
+    for attempt in 1.. {
+        let folder = sessions.join(attempt.to_string());
+        let output = run(bench.command(SKINRIG).unwrap(), &rig, &folder);
+        let starved = said(&output).contains("expected a pose sample no older than");
+        if attempt == 4 || !starved {
+            return (folder, ended_well(&output));
+        }
+        eprintln!("the machine is too busy for real time, once more");
+    }
+    unreachable!("the fourth attempt returns")
+}
+
+fn the_only(folder: &Path, ending: &str) -> PathBuf {
+    let found: Vec<PathBuf> = fs::read_dir(folder)
+        .unwrap()
+        .map(|e| e.unwrap().path())
+        .filter(|p| p.to_string_lossy().ends_with(ending))
+        .collect();
+    assert_eq!(found.len(), 1, "{ending} in {found:?}");
+    found[0].clone()
+}
+
+fn results(folder: &Path) -> Value {
+    let text = fs::read(the_only(folder, ".results.json")).unwrap();
+    serde_json::from_slice(&text).unwrap()
+}
+
+#[test]
+fn the_quick_check_on_the_emulated_bench_agrees_with_the_simulated_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let (emulated, simulated) = (folder.path().join("emulated"), folder.path().join("sim"));
+    let bench = EmulatedBench::start(&BenchConfig {
+        seed: SEED,
+        ..BenchConfig::default()
+    });
+    let bench = match bench {
+        Ok(bench) => bench,
+        Err(BenchError::Box(reason)) => {
+            eprintln!("skipped: no emulated bench: {reason}");
+            return;
+        }
+        Err(e) => panic!("{e}"),
+    };
+    let (emulated, said) = run_in_real_time(&bench, &emulated);
+    assert!(said.contains("rig       emulated"), "{said}");
+    ended_well(&run(Command::new(SKINRIG), &[], &simulated));
+
+    let (bench, sim) = (results(&emulated), results(&simulated));
+    assert_eq!(bench["provenance"]["rig_kind"], "emulated");
+    assert_eq!(bench["provenance"]["lost_bytes"], serde_json::json!([0, 0]));
+    assert_eq!(bench["provenance"]["run_end"], "completed");
+    let models: Vec<&str> = bench["provenance"]["devices"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|d| d["model"].as_str().unwrap())
+        .collect();
+    assert_eq!(
+        models,
+        [
+            "Force Dimension omega.3",
+            "Prophesee EVK1 Gen3.1",
+            "Prophesee EVK1 Gen3.1",
+            "skinrig-trigger-box"
+        ]
+    );
+    for metric in ["rmse_mm", "bias_x_mm", "bias_y_mm"] {
+        let of = |results: &Value, what: &str| {
+            results["analysis"]["scored"][metric][what]
+                .as_f64()
+                .unwrap_or_else(|| panic!("{metric}: no {what}"))
+        };
+        let (found, low, high) = (of(&bench, "value"), of(&sim, "low"), of(&sim, "high"));
+        assert!(
+            (low..=high).contains(&found),
+            "{metric}: expected {low} to {high} as on the simulated bench, found {found}"
+        );
+    }
+    let session = the_only(&emulated, ".session.sqlite");
+    let verified = Command::new(SKINRIG).arg("verify").arg(session).output();
+    ended_well(&verified.unwrap());
+}
