@@ -22,6 +22,9 @@ use crate::worker::{Command, Done, Job, Shared, Worker, lock};
 /// Beyond its deadline a command may still be on the line for one more try or one hello.
 const GRACE: Duration = Duration::from_secs(2);
 
+/// No clock drifts by more than a tenth.
+const MAX_DRIFT_PPM: f64 = 100_000.0;
+
 /// A trigger box over a line that a thread of its own keeps.
 ///
 /// After opening it is disarmed: [`SerialTriggerBox::arm`] first. Dropping it disarms the box.
@@ -54,6 +57,14 @@ impl SerialTriggerBox {
         clock: RealClock,
     ) -> Result<Self, DeviceError> {
         let named = config.serial.clone().unwrap_or_else(|| config.port.clone());
+        if !(0.0..=MAX_DRIFT_PPM).contains(&config.max_drift_ppm) {
+            return Err(DeviceError::Refused {
+                role: DeviceRole::TriggerBox,
+                serial: named,
+                expected: format!("a largest drift of 0 to {MAX_DRIFT_PPM} ppm"),
+                found: format!("{} ppm", config.max_drift_ppm),
+            });
+        }
         let wire = dial_patiently(dial.as_mut(), config.hello_timeout)
             .map_err(|e| open_failed(&e, &named))?;
         let mut link = Link::new(wire, clock);

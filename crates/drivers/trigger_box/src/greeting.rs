@@ -1,6 +1,6 @@
 //! The first words with a box: is it one, is it the right one, does it run the right firmware?
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use skinrig_device::DeviceError;
 use skinrig_model::{DeviceIdentity, DeviceRole};
@@ -74,14 +74,11 @@ pub fn greet(
     serial: Option<&str>,
     timeout: Duration,
 ) -> Result<Greeted, GreetingError> {
-    let end = Instant::now() + timeout;
-    let answer = loop {
-        // A fresh number each time: what a starting box half understood must not answer for it.
-        match link.ask(&Request::Hello, Patience::once(HELLO_TRY)) {
-            Err(LinkError::Silent { .. }) if Instant::now() < end => {}
-            other => break other?,
-        }
+    let patience = Patience {
+        per_try: HELLO_TRY,
+        total: timeout,
     };
+    let answer = link.ask(&Request::Hello, patience)?;
     check(&answer.reply, port, serial)
 }
 

@@ -13,24 +13,13 @@ use crate::frame::{self, FrameReader};
 use crate::protocol::{Reply, Request};
 use crate::wire::Wire;
 
-/// How long to wait for a reply.
+/// How long to wait for a reply. A reply to any of the tries counts, so that a slow machine is slow and not deaf.
 #[derive(Debug, Clone, Copy)]
 pub struct Patience {
     /// Before the request is sent again.
     pub per_try: Duration,
     /// Before it is given up.
     pub total: Duration,
-}
-
-impl Patience {
-    /// One try.
-    #[must_use]
-    pub fn once(wait: Duration) -> Self {
-        Self {
-            per_try: wait,
-            total: wait,
-        }
-    }
 }
 
 /// A reply and the instants of the host around it.

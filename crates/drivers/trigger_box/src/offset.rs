@@ -107,7 +107,9 @@ impl HostFromBox {
     fn bounds_from(&self, e: Exchange, at: Ticks) -> Bounds {
         let ticks = at.0 as f64 - e.at.0 as f64;
         let ns = ticks * (1_000.0 / TICKS_PER_US as f64);
-        let slack = ns.abs() * self.max_drift_ppm * 1e-6;
+        // A span of the box's clock is 1 / (1 +- drift) of it on the host's: that is 1 +- drift / (1 - drift) at the most.
+        let drift = self.max_drift_ppm * 1e-6;
+        let slack = ns.abs() * drift / (1.0 - drift);
         Bounds {
             low: HostTime(e.sent.0 + (ns - slack).floor() as i64),
             high: HostTime(e.received.0 + (ns + slack).ceil() as i64),
@@ -168,7 +170,8 @@ mod tests {
         };
         let (middle, half) = map.bounds(loose, loose.at).middle();
         assert_eq!(middle, HostTime(11_000_500));
-        assert_eq!(half, 500 + 1_000);
+        // 10 ms at 100 ppm, rounded up on both sides.
+        assert_eq!(half, 500 + 1_001);
     }
 
     #[test]

@@ -268,7 +268,7 @@ impl Worker {
     }
 
     fn exchange_time(&mut self) {
-        if let Ok(answer) = self.ask(&Request::Time, self.short_patience()) {
+        if let Ok(answer) = self.ask(&Request::Time, self.patience()) {
             let own = exchange(&answer);
             self.host_from_box.add(own);
             self.report(BoxReport::Exchange {
@@ -281,7 +281,7 @@ impl Worker {
 
     fn fetch_events(&mut self) {
         let from = self.next_event;
-        let Ok(answer) = self.ask(&Request::Events { from }, self.short_patience()) else {
+        let Ok(answer) = self.ask(&Request::Events { from }, self.patience()) else {
             return; // asked again for the same ones soon
         };
         let events = match self.expect_events(&answer) {
@@ -482,16 +482,6 @@ impl Worker {
         Patience {
             per_try: self.config.reply_timeout,
             total: self.config.command_timeout,
-        }
-    }
-
-    /// For what is asked again and again: commands wait meanwhile. Not a single try, since on a slow machine each reply
-    /// might come just after its request was given up.
-    fn short_patience(&self) -> Patience {
-        let four_tries = self.config.reply_timeout * 4;
-        Patience {
-            per_try: self.config.reply_timeout,
-            total: four_tries.min(self.config.command_timeout),
         }
     }
 

@@ -1,6 +1,8 @@
 //! The driver over a real serial port (a pseudo-terminal) against the real firmware on an emulated processor.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
+use std::ops::{Deref, DerefMut};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use skinrig_device::{DeviceError, RealClock, TriggerBox, contract};
@@ -21,9 +23,36 @@ use skinrig_trigger_box::{
 };
 
 /// Long enough for a machine that is busy with other things; a hang still fails.
-const PATIENCE: Duration = Duration::from_secs(60);
+const PATIENCE: Duration = Duration::from_secs(120);
 /// Edges of one train on all three outputs.
 const EDGES_PER_TRAIN: usize = 3 * 2 * PULSES_PER_TRAIN as usize;
+
+/// A board, one at a time: a board keeps pace with the clock only while it has a good part of a processor.
+struct Board {
+    board: EmulatedBox,
+    _turn: MutexGuard<'static, ()>,
+}
+
+fn start(options: &BoardOptions) -> Option<Board> {
+    static TURN: Mutex<()> = Mutex::new(());
+    // A test that failed has dropped its board all the same.
+    let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
+    let board = EmulatedBox::start_or_skip(options)?;
+    Some(Board { board, _turn: turn })
+}
+
+impl Deref for Board {
+    type Target = EmulatedBox;
+    fn deref(&self) -> &EmulatedBox {
+        &self.board
+    }
+}
+
+impl DerefMut for Board {
+    fn deref_mut(&mut self) -> &mut EmulatedBox {
+        &mut self.board
+    }
+}
 
 fn paced() -> BoardOptions {
     BoardOptions {
@@ -134,7 +163,7 @@ fn assert_train(edges: &[Edge], mark: Mark) {
 }
 
 fn run_marks(n: u32) {
-    let Some(board) = EmulatedBox::start_or_skip(&free_running()) else {
+    let Some(board) = start(&free_running()) else {
         return;
     };
     let mut edges = board.edges().unwrap();
@@ -167,7 +196,7 @@ fn run_marks(n: u32) {
 
 #[test]
 fn trains_are_exact_to_the_cycle_on_all_outputs_at_once() {
-    run_marks(250);
+    run_marks(100);
 }
 
 /// 3,125 trains are 100,000 pulses.
@@ -180,7 +209,7 @@ fn a_hundred_thousand_pulses_without_loss() {
 #[test]
 fn the_contract_holds() {
     // One board for all boxes that the suite asks for.
-    let Some(board) = EmulatedBox::start_or_skip(&paced()) else {
+    let Some(board) = start(&paced()) else {
         return;
     };
     let marks = [mark(3), mark(4), mark(5)];
@@ -211,7 +240,7 @@ fn host_times_are_certain_and_box_times_are_those_of_the_edges() {
         ppm: 300.0,
         ..paced()
     };
-    let Some(mut board) = EmulatedBox::start_or_skip(&options) else {
+    let Some(mut board) = start(&options) else {
         return;
     };
     let mut edges = board.edges().unwrap();
@@ -284,18 +313,18 @@ fn host_times_are_certain_and_box_times_are_those_of_the_edges() {
 
 #[test]
 fn sync_trains_count_on_among_marks() {
-    let Some(board) = EmulatedBox::start_or_skip(&paced()) else {
+    let Some(board) = start(&paced()) else {
         return;
     };
     let mut edges = board.edges().unwrap();
     let mut device = open(&board, RealClock::start());
-    device.set_sync(Some(100)).unwrap();
+    device.set_sync(Some(300)).unwrap();
     let mut reports = Vec::new();
     for k in 0..6 {
         send_when_free(&mut device, mark(k)).unwrap();
     }
     poll_until(&mut device, &mut reports, |r| {
-        marks_in(r).len() == 6 && syncs_in(r).len() >= 5
+        marks_in(r).len() == 6 && syncs_in(r).len() >= 4
     });
     device.set_sync(None).unwrap();
     let end = Instant::now() + PATIENCE;
@@ -317,7 +346,7 @@ fn sync_trains_count_on_among_marks() {
 
 #[test]
 fn a_mark_follows_the_sync_train_under_way() {
-    let Some(board) = EmulatedBox::start_or_skip(&free_running()) else {
+    let Some(board) = start(&free_running()) else {
         return;
     };
     let mut edges = board.edges().unwrap();
@@ -389,7 +418,7 @@ fn syncs_in(reports: &[BoxReport]) -> Vec<(u32, BoxTime)> {
 
 #[test]
 fn on_a_noisy_line_every_mark_is_sent_once_or_named() {
-    let Some(mut board) = EmulatedBox::start_or_skip(&free_running()) else {
+    let Some(mut board) = start(&free_running()) else {
         return;
     };
     let mut edges = board.edges().unwrap();
@@ -442,7 +471,7 @@ fn on_a_noisy_line_every_mark_is_sent_once_or_named() {
 
 #[test]
 fn a_box_that_was_unplugged_comes_back() {
-    let Some(mut board) = EmulatedBox::start_or_skip(&paced()) else {
+    let Some(mut board) = start(&paced()) else {
         return;
     };
     let mut edges = board.edges().unwrap();
@@ -485,13 +514,13 @@ fn comes_back(device: &mut SerialTriggerBox, reports: &mut Vec<BoxReport>) {
 
 #[test]
 fn a_brown_out_is_told_as_a_reset_and_its_cause_is_kept() {
-    let Some(mut board) = EmulatedBox::start_or_skip(&paced()) else {
+    let Some(mut board) = start(&paced()) else {
         return;
     };
     let mut device = open(&board, RealClock::start());
-    device.set_sync(Some(100)).unwrap();
+    device.set_sync(Some(300)).unwrap();
     let mut reports = Vec::new();
-    poll_until(&mut device, &mut reports, |r| syncs_in(r).len() > 2);
+    poll_until(&mut device, &mut reports, |r| syncs_in(r).len() > 1);
     let before = syncs_in(&reports).last().unwrap().0;
     board.reset(ResetCause::BrownOut).unwrap();
     comes_back(&mut device, &mut reports);
@@ -524,7 +553,7 @@ fn asker(board: &EmulatedBox) -> impl FnMut(Request) -> Reply + use<> {
 
 #[test]
 fn inputs_shift_no_pulse_and_pulses_shift_no_stamp() {
-    let Some(mut board) = EmulatedBox::start_or_skip(&free_running()) else {
+    let Some(mut board) = start(&free_running()) else {
         return;
     };
     let mut ask = asker(&board);
@@ -581,7 +610,7 @@ fn inputs_shift_no_pulse_and_pulses_shift_no_stamp() {
 
 #[test]
 fn a_firmware_that_hangs_is_restarted_by_its_watchdog() {
-    let Some(mut board) = EmulatedBox::start_or_skip(&paced()) else {
+    let Some(mut board) = start(&paced()) else {
         return;
     };
     let mut device = open(&board, RealClock::start());
@@ -594,7 +623,7 @@ fn a_firmware_that_hangs_is_restarted_by_its_watchdog() {
 
 #[test]
 fn a_silent_host_disarms_the_box() {
-    let Some(mut board) = EmulatedBox::start_or_skip(&free_running()) else {
+    let Some(mut board) = start(&free_running()) else {
         return;
     };
     let mut edges = board.edges().unwrap();
@@ -636,7 +665,7 @@ fn a_silent_host_disarms_the_box() {
 
 #[test]
 fn the_box_answers_a_repeated_mark_without_a_second_train() {
-    let Some(board) = EmulatedBox::start_or_skip(&free_running()) else {
+    let Some(board) = start(&free_running()) else {
         return;
     };
     let mut edges = board.edges().unwrap();
@@ -660,7 +689,7 @@ fn the_box_answers_a_repeated_mark_without_a_second_train() {
 
 #[test]
 fn what_is_behind_a_port_is_told_with_the_next_step() {
-    let Some(board) = EmulatedBox::start_or_skip(&paced()) else {
+    let Some(board) = start(&paced()) else {
         return;
     };
     let port = board.port().to_str().unwrap().to_owned();
@@ -692,7 +721,7 @@ fn what_is_behind_a_port_is_told_with_the_next_step() {
 
 #[test]
 fn a_new_serial_number_is_kept_and_the_self_test_sees_the_outputs() {
-    let Some(mut board) = EmulatedBox::start_or_skip(&paced()) else {
+    let Some(mut board) = start(&paced()) else {
         return;
     };
     let mut device = SerialTriggerBox::open(config(&board), RealClock::start()).unwrap();

@@ -37,6 +37,9 @@ struct Script {
     mute_after: Option<(u8, u32)>,
     /// Sends each reply twice, as after a request that was repeated too early.
     doubled: bool,
+    /// Each reply is so late.
+    slow: Duration,
+    ready: Instant,
     /// Is reset when it takes a mark.
     reset_at_mark: bool,
     always_busy: bool,
@@ -65,6 +68,8 @@ impl Default for Script {
             deaf_to: None,
             mute_after: None,
             doubled: false,
+            slow: Duration::ZERO,
+            ready: Instant::now(),
             reset_at_mark: false,
             always_busy: false,
             silent_disarm: false,
@@ -159,6 +164,9 @@ impl Script {
         reply.extend(self.boot.to_le_bytes());
         reply.extend(ticks.to_le_bytes());
         reply.extend(answers);
+        if self.to_host.is_empty() {
+            self.ready = Instant::now() + self.slow;
+        }
         let frame = frame::encode(&reply).unwrap();
         self.to_host.extend(&frame);
         if self.doubled {
@@ -197,7 +205,12 @@ impl Wire for Line {
             if script.broken {
                 return Err(io::ErrorKind::BrokenPipe.into());
             }
-            let n = script.to_host.len().min(buffer.len());
+            let there = if Instant::now() < script.ready {
+                0
+            } else {
+                script.to_host.len()
+            };
+            let n = there.min(buffer.len());
             if n > 0 || Instant::now() >= end {
                 buffer[..n].copy_from_slice(&script.to_host[..n]);
                 script.to_host.drain(..n);
@@ -314,6 +327,18 @@ fn another_firmware_is_refused_with_the_command_that_flashes_it() {
 }
 
 #[test]
+fn a_drift_that_no_clock_has_is_refused() {
+    for max_drift_ppm in [-1.0, 1e6, f64::NAN] {
+        let bad = TriggerBoxConfig {
+            max_drift_ppm,
+            ..config()
+        };
+        let refused = try_open(Script::default(), bad).1.err().unwrap();
+        assert!(matches!(refused, DeviceError::Refused { .. }), "{refused}");
+    }
+}
+
+#[test]
 fn strangers_and_silence_are_told_apart() {
     let stranger = Script {
         name: "toaster",
@@ -348,6 +373,23 @@ fn a_lost_request_and_a_lost_reply_both_end_in_one_train() {
     device.send(mark(2)).unwrap();
     device.send(mark(3)).unwrap();
     assert_eq!(line.script().trains, [payload(1), payload(2), payload(3)]);
+}
+
+#[test]
+fn a_slow_box_is_slow_and_not_lost() {
+    let (line, mut device) = open();
+    // Ten times the patience of one try.
+    line.script().slow = Duration::from_millis(50);
+    device.send(mark(1)).unwrap();
+    let end = Instant::now() + PATIENCE;
+    let mut reports = Vec::new();
+    while reports.len() < 3 {
+        device.poll(&mut reports).unwrap();
+        assert!(Instant::now() < end, "no exchange of time came through");
+        std::thread::yield_now();
+    }
+    device.send(mark(2)).unwrap();
+    assert_eq!(line.script().trains, [payload(1), payload(2)]);
 }
 
 #[test]
