@@ -59,7 +59,7 @@ pub fn devices(args: &DevicesArgs, json: bool) -> Outcome {
 
 fn print(lines: &[Line], rig: Option<&RigFile>) {
     if let Some(rig) = rig {
-        outln!("rig       {} ({})", rig.name, rig.kind.name());
+        outln!("rig       {}", bench::display_name(rig));
     }
     let width = |of: fn(&Line) -> usize| lines.iter().map(of).max().unwrap_or(0);
     let what = width(|l| l.what.chars().count());

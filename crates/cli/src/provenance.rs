@@ -75,6 +75,9 @@ pub fn provenance(
         rig_kind: header.rig_kind.clone(),
         rig_name: header.rig_name.clone(),
         simulated: header.rig_name.contains("simulated"),
+        // A replay keeps the name, not the kind.
+        emulated: header.rig_kind == "emulated" || header.rig_name.contains("emulated"),
+        preflight: reader.preflight()?,
         devices,
         software: header.software.clone(),
         host: header.host.clone(),

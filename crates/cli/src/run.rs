@@ -324,7 +324,7 @@ fn on_bench(
     let summary = plan.summary();
     if !json {
         outln!("{summary}");
-        outln!("rig       {} ({})\n", file.name, file.kind.name());
+        outln!("rig       {}\n", bench::display_name(&file));
     }
     let rig = bench::open(&file, &protocol)?;
     let preflight = gates::of_bench(&file, &rig, &args.sessions, summary.duration_s);

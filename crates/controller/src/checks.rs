@@ -172,7 +172,7 @@ impl Core<'_> {
                 None => PreflightCheck::skipped(
                     "indenter: initialised",
                     "true",
-                    "this robot needs no initialisation",
+                    "this robot does not say",
                 ),
             });
         }

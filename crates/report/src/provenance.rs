@@ -1,6 +1,7 @@
 //! Owns the plain description of where a session comes from, as the report shows it.
 
 use serde::{Deserialize, Serialize};
+use skinrig_model::PreflightCheck;
 
 /// Where the numbers of a report come from. Plain strings; empty strings are shown as "not recorded".
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -23,12 +24,18 @@ pub struct Provenance {
     pub plan_sha256: String,
     /// The seed of the run.
     pub seed: u64,
-    /// `simulated`, `replayed`, `imported` or `bench`.
+    /// `simulated`, `replayed`, `imported`, `emulated` or `bench`.
     pub rig_kind: String,
     /// Name of the rig, with the level of a simulated one.
     pub rig_name: String,
     /// True when the rig was simulated: the report then says so plainly.
     pub simulated: bool,
+    /// True when stand-ins stood behind the drivers: the report then says so plainly.
+    #[serde(default)]
+    pub emulated: bool,
+    /// What was checked before the robot was powered.
+    #[serde(default)]
+    pub preflight: Vec<PreflightCheck>,
     /// The devices, in the order in which they were configured.
     pub devices: Vec<DeviceRow>,
     /// Version of skinrig that recorded the session.
@@ -52,6 +59,15 @@ pub struct Provenance {
 }
 
 impl Provenance {
+    /// `simulated` or `emulated` when no hardware was behind the session.
+    pub(crate) const fn stand_in(&self) -> Option<&'static str> {
+        match (self.simulated, self.emulated) {
+            (true, _) => Some("simulated"),
+            (false, true) => Some("emulated"),
+            (false, false) => None,
+        }
+    }
+
     /// True when this interruption is the one that ended the run: both give the same reason.
     pub(crate) fn ended_by(&self, interruption: &InterruptionRow) -> bool {
         self.run_end_reason.as_ref() == Some(&interruption.reason)

@@ -127,6 +127,41 @@ fn simulated_is_said_in_page_and_in_every_figure() {
 }
 
 #[test]
+fn emulated_is_said_as_plainly_and_the_preflight_is_shown() {
+    let a = support::analysis(3, 2);
+    let mut input = input(&a);
+    input.provenance.simulated = false;
+    input.provenance.emulated = true;
+    input.provenance.preflight = vec![skinrig_model::PreflightCheck::new(
+        "camera 2: clock",
+        "advancing",
+        "<no time>",
+        false,
+        "power-cycle it",
+    )];
+    let page = html(&input).unwrap();
+    for part in [
+        "data-testid=\"emulated\"",
+        "stand-ins for the hardware",
+        "data-testid=\"preflight\"",
+        "camera 2: clock",
+        "&lt;no time&gt;",
+        "power-cycle it",
+    ] {
+        assert!(page.contains(part), "{part}");
+    }
+    assert!(!page.contains("data-testid=\"simulated\""));
+    for figure in skinrig_report::figures::all(&input) {
+        assert!(figure.svg.contains("emulated rig"), "{}", figure.id);
+    }
+    let table = skinrig_report::terminal_table(&input, false);
+    assert!(
+        table.contains("EMULATED, not measured on hardware"),
+        "{table}"
+    );
+}
+
+#[test]
 fn a_session_without_presses_says_so() {
     let analysis = support::empty();
     let page = html(&input(&analysis)).unwrap();

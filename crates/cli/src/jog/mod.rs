@@ -66,7 +66,7 @@ fn open(args: &JogArgs) -> Result<Bench, Failure> {
         _ => SEARCH,
     };
     Ok(Bench {
-        name: format!("{} ({})", file.name, file.kind.name()),
+        name: bench::display_name(&file),
         indenter: bench::open_robot(&file, clock)?,
         clock: Box::new(clock),
         min_mm: file.limits.workspace_min_mm,

@@ -61,7 +61,7 @@ pub fn open(rig: &RigFile, protocol: &Protocol) -> Result<Rig, Failure> {
     };
     Ok(Rig {
         kind: rig.kind.name().to_owned(),
-        name: format!("{} ({})", rig.name, rig.kind.name()),
+        name: display_name(rig),
         indenter,
         cameras,
         camera_settings,
@@ -71,6 +71,17 @@ pub fn open(rig: &RigFile, protocol: &Protocol) -> Result<Rig, Failure> {
         geometry: geometry(rig, protocol.surroundings.outline),
         description_json: serde_json::to_string(rig).map_err(Failure::internal)?,
     })
+}
+
+/// The bench's name, which always says when it is emulated.
+#[must_use]
+pub fn display_name(rig: &RigFile) -> String {
+    let kind = rig.kind.name();
+    if rig.name.contains(kind) {
+        rig.name.clone()
+    } else {
+        format!("{} ({kind})", rig.name)
+    }
 }
 
 /// What analyses need to know of the bench.
@@ -168,7 +179,11 @@ fn open_camera(
             setup.model
         )));
     }
-    let evk1 = Evk1::open_serial(&setup.serial, camera, Evk1Config::default(), clock);
+    let config = Evk1Config {
+        read_back_exceptions: setup.read_back_exceptions.clone(),
+        ..Evk1Config::default()
+    };
+    let evk1 = Evk1::open_serial(&setup.serial, camera, config, clock);
     Ok(Box::new(evk1.map_err(|e| {
         Failure::rig(format!(
             "{camera}: {e}\n  next: `skinrig devices` shows what is connected"

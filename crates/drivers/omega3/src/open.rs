@@ -331,14 +331,15 @@ impl Procedure<'_> {
 
     fn initialised(&self, opened: &mut Opened) -> Result<(), OmegaError> {
         if self.sdk.is_initialized(self.id) {
+            opened.settings.push(seen("initialised", true));
             return Ok(());
         }
         if self.config.initialise == Initialise::Never {
             return self.unfit(
                 "a robot initialised since power-up",
                 "one that is not (its LED blinks)",
-                "take the sample and tools off, keep hands clear, and start once with initialise: sample_is_off; or \
-                 put the calibration pole into the pit by hand",
+                "take the sample and tools off, keep hands clear, and start once with `auto_init: true` and \
+                 `sample_is_off: true` in the rig file; or put the calibration pole into the pit by hand",
             );
         }
         let answer = self.sdk.auto_init(self.id);
@@ -350,6 +351,7 @@ impl Procedure<'_> {
             let next = "power-cycle the robot and try again";
             return self.unfit("an initialised robot", "one that is still not", next);
         }
+        opened.settings.push(seen("initialised", true));
         opened
             .remarks
             .push("the robot initialised itself".to_owned());

@@ -103,19 +103,6 @@ fn assemble(root: &Field, places: &Places<'_>, out: &mut Collector) -> Option<Ri
     if let (Some(frame), Some(limits)) = (&frame, &limits) {
         inside(frame, limits, root, out);
     }
-    if let (Some(frame), Some(preflight)) = (&frame, &preflight)
-        && preflight.retouch
-        && frame.touch_off.is_none()
-    {
-        let span = root.get("preflight").map_or(root.span, |f| f.span);
-        out.error(
-            span,
-            "preflight.retouch",
-            "there is no point to touch again",
-        )
-        .expected("`frame.touch_off`")
-        .found("`frame.given`");
-    }
     Some(RigFile {
         file_name: String::new(),
         text: String::new(),
@@ -175,7 +162,5 @@ fn preflight(f: &Field) -> Option<PreflightLimits> {
         min_free_disk_b: f.quantity("min_free_disk")?,
         loopback_within: span("loopback_within")?,
         clocks_within: span("clocks_within")?,
-        retouch: f.flag("retouch")?,
-        retouch_tolerance_mm: f.quantity("retouch_tolerance")?,
     })
 }

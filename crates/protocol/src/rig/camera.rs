@@ -4,7 +4,7 @@ use super::build::Places;
 use super::{BoxSetup, CameraSetup, SyncRole};
 use crate::build::{biases, nominal_camera, roi};
 use crate::diagnostic::Collector;
-use crate::shape::Field;
+use crate::shape::{Field, Value};
 use skinrig_model::Point2;
 
 /// The EVK1's trigger input that its sync line uses when it is a slave.
@@ -60,6 +60,9 @@ pub(super) fn cameras(
 
 fn camera(f: &Field, places: &Places<'_>, out: &mut Collector) -> Option<CameraSetup> {
     let bias_file = f.get("bias_file").map(|b| places.path(b, out));
+    let read_back_exceptions = f
+        .get("read_back_exceptions")
+        .and_then(|list| addresses(list, out));
     let roi = f.get("roi").map(|r| roi(r, out));
     let sync = match f.word("sync")? {
         "master" => SyncRole::Master,
@@ -110,10 +113,30 @@ fn camera(f: &Field, places: &Places<'_>, out: &mut Collector) -> Option<CameraS
         bias_file: bias_file.map_or(Some(None), |b| b.map(Some))?,
         roi: roi.map_or(Some(None), |r| r.map(Some))?,
         noise_filter_ev_s: f.quantity("noise_filter").map(|r| r.round() as u32),
+        read_back_exceptions: read_back_exceptions?,
         sync,
         trigger_channel,
         geometry,
     })
+}
+
+/// Register addresses, hexadecimal.
+fn addresses(list: &Field, out: &mut Collector) -> Option<Vec<u32>> {
+    let mut addresses = Vec::new();
+    for item in list.items() {
+        let Value::Text(text) = &item.value else {
+            return None;
+        };
+        let hex = text.strip_prefix("0x").map(|h| u32::from_str_radix(h, 16));
+        let Some(Ok(address)) = hex else {
+            out.error(item.span, item.path.as_str(), "not an address")
+                .expected("a hexadecimal number such as `0x0204`")
+                .found(format!("`{text}`"));
+            return None;
+        };
+        addresses.push(address);
+    }
+    Some(addresses)
 }
 
 pub(super) fn trigger_box(f: &Field, places: &Places<'_>, out: &mut Collector) -> Option<BoxSetup> {

@@ -205,6 +205,8 @@ pub struct CameraSetup {
     pub bias_file: Option<PathBuf>,
     /// Pixels that stay on: first column, first row, columns, rows.
     pub roi: Option<[u16; 4]>,
+    /// Addresses of registers whose writes need not read back.
+    pub read_back_exceptions: Vec<u32>,
     /// Threshold of the sensor's activity gate, events per second.
     pub noise_filter_ev_s: Option<u32>,
     /// Whose time base it follows.
@@ -259,10 +261,6 @@ pub struct PreflightLimits {
     pub loopback_within: HostDuration,
     /// Both cameras' clocks must be seen to advance within this time.
     pub clocks_within: HostDuration,
-    /// Touch the first point again before the run.
-    pub retouch: bool,
-    /// How far its height may be from the frame's, mm.
-    pub retouch_tolerance_mm: f64,
 }
 
 impl RigFile {

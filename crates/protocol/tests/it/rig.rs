@@ -222,6 +222,13 @@ fn what_cannot_be_is_named() {
         "7 and 0",
     );
     finding(
+        "read_back_exceptions: []",
+        "read_back_exceptions: [0x02G4]",
+        "cameras.camera1.read_back_exceptions[0]",
+        "not an address",
+        "`0x0204`",
+    );
+    finding(
         "output2: camera2",
         "output2: camera1",
         "trigger_box.wiring",

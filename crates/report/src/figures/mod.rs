@@ -152,8 +152,11 @@ impl<'a> Canvas<'a> {
     /// Writes the foot line (session, simulated or not, n) and closes.
     fn finish(mut self, n: &str, table: &'static str, interaction: &'static str) -> Figure {
         let p = &self.input.provenance;
-        let simulated = if p.simulated { " · simulated rig" } else { "" };
-        let foot = format!("session {}{simulated}", or_missing(&p.session_id));
+        let id = or_missing(&p.session_id);
+        let foot = match p.stand_in() {
+            Some(word) => format!("session {id} · {word} rig"),
+            None => format!("session {id}"),
+        };
         let (w, h) = self.size;
         self.svg.text((10.0, h - 8.0), "foot", "start", &foot);
         self.svg.text((w - 10.0, h - 8.0), "foot", "end", n);

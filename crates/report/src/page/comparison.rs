@@ -41,17 +41,13 @@ pub(crate) fn text(cell: &Cell, metric: Metric) -> String {
 
 /// The comparison with MSOWS.
 pub(super) fn msows(input: &ReportInput<'_>) -> Grid {
-    let session = if input.provenance.simulated {
-        "#this session, simulated"
-    } else {
-        "#this session"
-    };
+    let session = format!("#{}", own_name(input));
     let mut grid = Grid::new(
         "comparison-msows",
         "This session, the paper and MSOWS",
         &[
             "Quantity",
-            session,
+            &session,
             "#at 1/1024, emulated",
             "#paper, published",
             "#paper at 1/1024, published",
@@ -97,12 +93,10 @@ fn own(input: &ReportInput<'_>) -> String {
 }
 
 fn own_name(input: &ReportInput<'_>) -> String {
-    let simulated = if input.provenance.simulated {
-        ", simulated"
-    } else {
-        ""
-    };
-    format!("this session{simulated}")
+    match input.provenance.stand_in() {
+        Some(word) => format!("this session, {word}"),
+        None => "this session".to_owned(),
+    }
 }
 
 /// The paper's table of tactile localisation technologies, with the session as its last row.

@@ -128,7 +128,7 @@ pub(crate) fn render(input: &ReportInput<'_>) -> Result<String, ReportError> {
         session => or_missing(&p.session_id),
         heading => heading(&p.protocol_name),
         extent => extent(input),
-        simulated => p.simulated,
+        stand_in => p.stand_in(),
         rig_name => or_missing(&p.rig_name),
         rig_kind => p.rig_kind.clone(),
         started => or_missing(&p.started),
@@ -184,6 +184,12 @@ pub(crate) fn render(input: &ReportInput<'_>) -> Result<String, ReportError> {
             .map(|d| context! {
                 role => d.role.clone(), model => d.model.clone(), serial => d.serial.clone(),
                 firmware => d.firmware.clone()
+            })
+            .collect::<Vec<_>>(),
+        preflight => p.preflight.iter()
+            .map(|c| context! {
+                check => c.check.clone(), expected => c.expected.clone(), found => c.found.clone(),
+                verdict => c.verdict.name(), next => c.next_step.clone(),
             })
             .collect::<Vec<_>>(),
         clocks => clocks(input),

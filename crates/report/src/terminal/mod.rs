@@ -148,10 +148,11 @@ pub(crate) fn table(input: &ReportInput<'_>, color: bool) -> String {
     let mut out = String::new();
     out += &wrap("session   ", &plain(or_missing(&p.session_id)));
     let rig = plain(or_missing(&p.rig_name));
-    if p.simulated {
+    if let Some(word) = p.stand_in() {
+        let word = word.to_uppercase();
         out += &paint.warn(&wrap(
             "rig       ",
-            &format!("{rig} - SIMULATED, not measured on hardware"),
+            &format!("{rig} - {word}, not measured on hardware"),
         ));
     } else {
         out += &wrap("rig       ", &rig);

@@ -423,6 +423,8 @@ pub fn provenance() -> Provenance {
         rig_kind: "simulated".into(),
         rig_name: "simulated (geometric)".into(),
         simulated: true,
+        emulated: false,
+        preflight: Vec::new(),
         devices: vec![
             device("indenter", "simulated Omega.3", "sim-robot", "0.1.0"),
             device(

@@ -212,6 +212,16 @@ static CAMERA: Table = Table {
             "The sensor's activity gate: nothing passes while its total rate is below this. Off when absent.",
         ),
         default(
+            "read_back_exceptions",
+            Shape::List {
+                of: &Shape::Text,
+                min: 0,
+                max: 100,
+            },
+            "[]",
+            "Addresses of registers, such as `\"0x0204\"`, that a real camera was seen to read back differently: which do is not published.",
+        ),
+        default(
             "sync",
             Shape::Choice(SYNC_MODES),
             "standalone",

@@ -271,18 +271,6 @@ static PREFLIGHT: Table = Table {
             "2 s",
             "Both cameras' clocks must be seen to advance within this time.",
         ),
-        default(
-            "retouch",
-            Shape::Flag,
-            "false",
-            "Touch the first point of the touch-off again before the run. Needs a bench; the skin must bear it.",
-        ),
-        default(
-            "retouch_tolerance",
-            Shape::Quantity(&[Length], Range::above_zero(10.0)),
-            "0.3 mm",
-            "How far the touched height may be from the frame's.",
-        ),
     ],
     exactly_one: &[],
 };
