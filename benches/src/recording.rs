@@ -202,7 +202,9 @@ pub fn input() -> SessionInput {
         edges: [Vec::new(), Vec::new()],
         marks: Vec::new(),
         gaps: [Vec::new(), Vec::new()],
+        box_reports: Vec::new(),
         pose_interval_us: None,
+        crossing_se_us: None,
         rig: RigGeometry {
             outline: SkinOutline::PAPER,
             nominal: StereoGeometry::PAPER,

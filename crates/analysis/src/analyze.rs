@@ -15,11 +15,12 @@ use crate::kept::{Keep, Kept, KeptPress};
 use crate::metrics::{Exclusions, metrics, penalised};
 use crate::rates::RateHistogram;
 use crate::result::{
-    ANALYSIS_VERSION, Activity, Analysis, ClockFit, ContactTiming, DepthResult, PressPicture,
-    PressResult, PressView, RateSeries, RateZoom,
+    ANALYSIS_VERSION, Activity, Alignment, Analysis, ClockFit, ClockMap, ContactTiming,
+    DepthResult, MapName, PressPicture, PressResult, PressView, RateSeries, RateZoom,
 };
 use crate::segment::{Window, windows};
 use crate::sets::ScoreSet;
+use crate::timebase::{Ties, TimeBase};
 use crate::{audit, bit_rates, caveats, check, cmre, coverage, latency, reduction, verdict};
 
 /// Windows that share less than this, µs, only touch: their ends are rounded.
@@ -52,9 +53,12 @@ pub fn analyze_and_keep(
 ) -> Result<(Analysis, Kept), AnalysisError> {
     check::input(input)?;
     let plan = Closeups::choose(input, keep);
+    let base = time_base(input);
+    let base_clock = |k: usize| base.as_ref().and_then(|b| b.clocks[k]);
     let [one, two] = std::thread::scope(|scope| {
-        let second = scope.spawn(|| camera_pass(input, source, CameraId::Two, &plan));
-        let first = camera_pass(input, source, CameraId::One, &plan);
+        let second =
+            scope.spawn(|| camera_pass(input, source, CameraId::Two, &plan, base_clock(1)));
+        let first = camera_pass(input, source, CameraId::One, &plan, base_clock(0));
         let second = match second.join() {
             Ok(result) => result,
             Err(panic) => std::panic::resume_unwind(panic),
@@ -133,6 +137,10 @@ pub fn analyze_and_keep(
         rig: input.rig,
         geometry,
         counts,
+        alignment: base.map_or_else(
+            || uncertified([one.clock, two.clock]),
+            |base| base.alignment,
+        ),
         clocks: [one.clock, two.clock],
         contact_timing: contact_timing(input, scheduled),
         calibration,
@@ -159,12 +167,40 @@ pub fn analyze_and_keep(
     Ok((analysis, kept))
 }
 
+/// The time base, when the trigger box told of its clock.
+fn time_base(input: &SessionInput) -> Option<TimeBase> {
+    let used_at_us: Vec<f64> = spans(input)
+        .iter()
+        .flat_map(|s| [s.contact_us, s.release_us])
+        .collect();
+    let ties = Ties {
+        reports: &input.box_reports,
+        edges: [&input.edges[0], &input.edges[1]],
+        channel: input.rig.trigger_channel?,
+        used_at_us: &used_at_us,
+    };
+    TimeBase::new(&ties, &input.settings.alignment)
+}
+
+/// What can be said of the alignment without reports of a trigger box.
+fn uncertified(clocks: [Option<ClockFit>; 2]) -> Alignment {
+    let names = [MapName::Camera1FromHost, MapName::Camera2FromHost];
+    let maps = clocks.into_iter().zip(names);
+    Alignment {
+        maps: maps
+            .filter_map(|(fit, name)| Some(ClockMap::of_line(name, &fit?)))
+            .collect(),
+        ..Alignment::default()
+    }
+}
+
 fn contact_timing(input: &SessionInput, scheduled: bool) -> ContactTiming {
     let half_widths = input.marks.iter().map(|m| m.uncertainty_ns as f64 * 1e-3);
     ContactTiming {
         scheduled,
         pose_interval_us: input.pose_interval_us.unwrap_or(0.0),
         mark_half_width_us: half_widths.fold(0.0, f64::max),
+        crossing_se_us: input.crossing_se_us.unwrap_or(0.0),
     }
 }
 
@@ -238,6 +274,7 @@ fn camera_pass(
     source: &dyn EventSource,
     camera: CameraId,
     plan: &Closeups,
+    base_clock: Option<ClockFit>,
 ) -> Result<CameraResult, AnalysisError> {
     let settings = &input.settings;
     let k = camera.index();
@@ -245,11 +282,15 @@ fn camera_pass(
     let mut rates = Some(RateHistogram::new(rate_bin_us(settings)));
     let mut activity = None;
     let mut held = None;
+    let by_marks = |channel| fit_marks(&input.edges[k], channel, &input.marks);
     let marks = input
         .rig
         .trigger_channel
-        .and_then(|channel| fit_marks(&input.edges[k], channel, &input.marks));
-    let clock = if let Some(found) = marks {
+        .filter(|_| base_clock.is_none())
+        .and_then(by_marks);
+    let clock = if base_clock.is_some() {
+        base_clock
+    } else if let Some(found) = marks {
         warnings.extend(found.warnings);
         Some(found.fit)
     } else {

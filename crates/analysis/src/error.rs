@@ -97,6 +97,9 @@ pub enum AnalysisError {
         /// The most that there may be.
         most: usize,
     },
+    /// The session is invalid: its clocks are not known well enough.
+    #[error("the session is INVALID: its clocks are not known well enough: {0}")]
+    NotAligned(String),
     /// No press can be located in any way.
     #[error(
         "expected scored presses with measured times in the clocks of both cameras, found none; `skinrig analyze` says what is missing"

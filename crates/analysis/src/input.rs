@@ -1,8 +1,8 @@
 //! What an analysis reads: plain values and one event source.
 
 use skinrig_model::{
-    AnalysisSettings, CameraId, CdEvent, PlannedPress, PressOutcome, RigGeometry, SentMark,
-    TriggerEdge,
+    AnalysisSettings, BoxReport, CameraId, CdEvent, PlannedPress, PressOutcome, RigGeometry,
+    SentMark, TriggerEdge,
 };
 
 /// Everything but the events.
@@ -16,10 +16,14 @@ pub struct SessionInput {
     pub edges: [Vec<TriggerEdge>; 2],
     /// The marks that the trigger box sent.
     pub marks: Vec<SentMark>,
+    /// What the trigger box reported on its own clock, in order; empty without one.
+    pub box_reports: Vec<BoxReport>,
     /// Camera-time intervals `(from_us, to_us)` in which bytes of that camera were lost.
     pub gaps: [Vec<(u64, u64)>; 2],
     /// RMS interval between the two pose samples around a contact, µs; `None` when not known.
     pub pose_interval_us: Option<f64>,
+    /// RMS standard error of the instant at which the measured pose crossed the surface, µs; `None` when not known.
+    pub crossing_se_us: Option<f64>,
     /// The rig.
     pub rig: RigGeometry,
     /// The settings.

@@ -3,7 +3,7 @@
 //! Numbers in, numbers out: no files, no SQL, no devices, no clock, no randomness but the seed in the
 //! settings. The same input gives the same result to the last bit on the same machine.
 //!
-//! Data flows one way: [`clock`] finds where host time lies on each camera's clock, [`segment`] turns measured
+//! Data flows one way: [`timebase`], or [`clock`] without reports of a trigger box, finds where host time lies on each camera's clock, [`segment`] turns measured
 //! press times into windows of camera time, one pass over the events fills a [`grid`] per window and [`dbscan`]
 //! finds its clusters, [`triangulate`] intersects the rays of the two centroids, [`calibrate`] fits the
 //! camera geometry to the presses that calibrate ([`sets`]), [`metrics`] judges those that score.
@@ -42,6 +42,7 @@ mod seeded;
 pub mod segment;
 pub mod sets;
 pub mod sums;
+pub mod timebase;
 pub mod tradeoff;
 pub mod triangulate;
 mod verdict;

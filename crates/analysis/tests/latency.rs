@@ -238,7 +238,7 @@ fn every_event_is_in_the_bin_of_its_host_time_and_in_one_only() {
         let bins = [-4250, -1, -1, 0, 0, 1, 4000, 4249];
         let clock = clock(drift);
         let view = view(&clock, 5e6, &after);
-        let sight = Sight::new(&view, &clock);
+        let sight = Sight::new(&view, &clock, 0.0);
         let grid = Grid::within(-850_000.0, 850_000.0, 200.0);
         let count = |grid: Grid| {
             let mut counts = vec![0; grid.len];

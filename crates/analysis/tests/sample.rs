@@ -95,7 +95,9 @@ fn schedule(positions: &str) -> SessionInput {
         edges: [Vec::new(), Vec::new()],
         marks: Vec::new(),
         gaps: [Vec::new(), Vec::new()],
+        box_reports: Vec::new(),
         pose_interval_us: None,
+        crossing_se_us: None,
         rig: RigGeometry {
             outline: SkinOutline::PAPER,
             nominal: StereoGeometry::PAPER,

@@ -19,7 +19,7 @@ pub enum Exit {
     /// A check before a run failed, or a device, the trigger line or the recorder during it; the session up to there is
     /// kept.
     Rig = 3,
-    /// A stated limit was not met: `--max-rmse`, `verify`.
+    /// A stated limit was not met: `--max-rmse`, `verify`, the alignment of the clocks (an INVALID session).
     Limit = 4,
     /// The operator stopped or aborted the run; the session up to there is kept.
     Stopped = 5,
@@ -32,7 +32,7 @@ impl Exit {
         1  fault of skinrig or of this machine\n  \
         2  bad input: command line, protocol, schedule, data or session file\n  \
         3  rig fault, or a failed check before a run (the session up to there is kept)\n  \
-        4  a limit was not met (--max-rmse, verify)\n  \
+        4  a limit was not met (--max-rmse, verify, an INVALID session)\n  \
         5  stopped by the operator (the session up to there is kept)";
 }
 

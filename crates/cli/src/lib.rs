@@ -6,6 +6,7 @@ pub mod terminal;
 
 pub mod args;
 pub mod check;
+pub mod contacts;
 pub mod devices;
 pub mod exit;
 pub mod export;

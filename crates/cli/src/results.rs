@@ -6,9 +6,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 use skinrig_analysis::reference_code::reference_code;
 use skinrig_analysis::{Analysis, Keep, SessionInput};
-use skinrig_model::{
-    AnalysisSettings, CameraId, HostDuration, HostTime, PressOutcome, RigGeometry, RunHeader,
-};
+use skinrig_model::{AnalysisSettings, CameraId, RigGeometry, RunHeader};
 use skinrig_recorder::{RecorderError, SessionReader};
 use skinrig_report::{Provenance, ReportInput};
 
@@ -166,43 +164,24 @@ fn session_input(
         .map(|(planned, _)| planned)
         .collect();
     let outcomes = reader.last_outcomes()?;
-    let pose_interval_us = pose_interval_us(reader, &outcomes)?;
+    let (pose_interval_us, crossing_se_us) = crate::contacts::timing(reader, &outcomes)?;
     let [one, two] = CameraId::ALL;
     Ok(SessionInput {
         planned,
         outcomes,
         edges: [reader.trigger_edges(one)?, reader.trigger_edges(two)?],
         marks: reader.marks_sent()?,
+        box_reports: reader
+            .box_reports()?
+            .into_iter()
+            .map(|(_, said)| said)
+            .collect(),
         gaps: [reader.gaps(one)?, reader.gaps(two)?],
         pose_interval_us,
+        crossing_se_us,
         rig,
         settings,
     })
-}
-
-/// RMS interval between the two pose samples around a measured contact, over at most 100 contacts, evenly spread, µs:
-/// the contact is interpolated between them. `None` without measured contacts.
-fn pose_interval_us(
-    reader: &SessionReader,
-    outcomes: &[Option<PressOutcome>],
-) -> Result<Option<f64>, RecorderError> {
-    const MOST: usize = 100;
-    let side = HostDuration::from_millis(20);
-    let measured = outcomes.iter().flatten().filter(|o| !o.scheduled);
-    let contacts: Vec<HostTime> = measured.filter_map(|o| Some(o.timing?.contact)).collect();
-    let (mut squares, mut n) = (0.0, 0);
-    for contact in contacts
-        .iter()
-        .step_by(contacts.len().div_ceil(MOST).max(1))
-    {
-        let poses = reader.poses(*contact - side, *contact + side)?;
-        let after = poses.partition_point(|p| p.t < *contact);
-        if let Some([before, after]) = poses.get(after.saturating_sub(1)..=after) {
-            squares += ((after.t.0 - before.t.0) as f64 * 1e-3).powi(2);
-            n += 1;
-        }
-    }
-    Ok((n > 0).then(|| (squares / f64::from(n)).sqrt()))
 }
 
 /// Writes the results beside the session (or to `json_path`) and the report; returns both paths.
@@ -271,11 +250,19 @@ pub fn print_results(results: &Results, json: bool, paths: &(PathBuf, PathBuf)) 
     }
 }
 
-/// Ok, or code 4 when the scored RMSE is above the limit (or there is none to compare).
+/// Ok, or code 4 when the session's alignment is invalid or the scored RMSE is above the limit (or there is none to compare).
 ///
 /// # Errors
 /// [`Failure::limit`].
 pub fn check_limit(results: &Results, max_rmse_mm: Option<f64>) -> Outcome {
+    let alignment = &results.analysis.alignment;
+    if !alignment.is_usable() {
+        return Err(Failure::limit(format!(
+            "the session is INVALID: its clocks are not known well enough\n  {}\n  \
+             next: see the alignment certificate in the report; limits are below `analysis.alignment`",
+            alignment.violations.join("\n  ")
+        )));
+    }
     let Some(limit) = max_rmse_mm else {
         return Ok(Exit::Ok);
     };
@@ -327,5 +314,5 @@ pub fn report(args: &ReportArgs, json: bool) -> Outcome {
     } else {
         outln!("{}", paths.1.display());
     }
-    Ok(Exit::Ok)
+    check_limit(&results, None)
 }

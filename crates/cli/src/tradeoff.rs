@@ -3,6 +3,7 @@
 use std::io::IsTerminal;
 
 use rustix::time::{ClockId, clock_gettime};
+use skinrig_analysis::AnalysisError;
 use skinrig_analysis::tradeoff::{Cost, Plan, Row, Tradeoff, measure};
 use skinrig_report::tradeoff::{label, page, protocol_lines, terminal_table};
 
@@ -90,7 +91,11 @@ pub fn tradeoff(args: &TradeoffArgs, json: bool) -> Outcome {
         repeats: args.repeats,
         least_located: args.min_located.map(|percent| percent / 100.0),
     };
-    let result = measure(&input, &events, plan, &mut thread_cpu_s).map_err(Failure::input)?;
+    let measured = measure(&input, &events, plan, &mut thread_cpu_s);
+    let result = measured.map_err(|e| match e {
+        AnalysisError::NotAligned(_) => Failure::limit(e),
+        other => Failure::input(other),
+    })?;
     let answers = answers(&result, args);
     let mut document = serde_json::json!({ "format": "skinrig-tradeoff", "format_version": 1, "rig": rig, "tradeoff": result });
     let found = answers.iter().map(|a| {

@@ -187,7 +187,15 @@ impl<'a> Core<'a> {
             let t = self.clock.now();
             self.journal.emit(Record::BoxReports { t, reports })?;
         }
-        Ok(answer?)
+        match answer {
+            // Something went by, and the box goes on: the alignment certificate weighs what is missing.
+            Err(e @ DeviceError::State { .. }) => {
+                let (t, text) = (self.clock.now(), e.to_string());
+                self.journal.problem(text.clone());
+                self.journal.emit(Record::Note { t, text })
+            }
+            other => Ok(other?),
+        }
     }
 
     fn observe_poses(&mut self) -> Result<(), ControllerError> {

@@ -35,8 +35,8 @@ pub use record::{
 };
 pub use scene::{SceneNeed, SimLevel};
 pub use settings::{
-    AnalysisSettings, Background, CalibrationModel, CentroidRule, CmreSettings, Estimator,
-    LatencySettings, LensKind, Precision, ReductionSettings, RigGeometry, ThresholdRule,
+    AlignmentSettings, AnalysisSettings, Background, CalibrationModel, CentroidRule, CmreSettings,
+    Estimator, LatencySettings, LensKind, Precision, ReductionSettings, RigGeometry, ThresholdRule,
     WindowAnchor,
 };
 pub use skin::SkinOutline;

@@ -232,6 +232,12 @@ impl PulseTrain {
         }
     }
 
+    /// The 31 data and check bits, the first one sent on top.
+    #[must_use]
+    pub const fn bits(self) -> u32 {
+        self.bits
+    }
+
     /// (offset of the rising edge from the train's instant, width) of each pulse, µs.
     pub fn pulses(self) -> impl Iterator<Item = (u64, u64)> {
         (0..PULSES_PER_TRAIN).map(move |k| {
@@ -273,7 +279,7 @@ pub struct SeenSync {
     pub t_us: u64,
 }
 
-pub use decode::{DecodedMarks, decode_marks};
+pub use decode::{DecodedMarks, ReadTrain, decode_marks, read_trains};
 
 #[cfg(test)]
 mod tests {

@@ -197,6 +197,45 @@ impl Default for CmreSettings {
     }
 }
 
+/// Limits of the alignment certificate: a session beyond one of them is invalid.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct AlignmentSettings {
+    /// Largest RMS residual of trains about a camera's map, µs. Trigger inputs show whole µs, optocouplers add some: more is
+    /// a line that does not carry what the box sends.
+    pub max_residual_us: f64,
+    /// Largest half width of the 95 % interval of camera over box time at a press, µs: a quarter of the latency study's bin.
+    pub max_camera_interval_us: f64,
+    /// Largest half width of the certain interval of host over box time at a press, µs: a tenth of the margin of a press
+    /// window.
+    pub max_host_interval_us: f64,
+    /// Largest rate difference between two clocks, ppm: a ceramic resonator's and a crystal's, twice.
+    pub max_drift_ppm: f64,
+    /// Largest share of lost edges: half as many again as labels and intervals are proven for (20 %).
+    pub max_lost: f64,
+    /// Largest share of doubled and spurious edges: three times as many as labels and intervals are proven for (5 %).
+    pub max_spurious: f64,
+    /// Least share of held-out trains in the 95 % interval stated for them.
+    pub min_coverage: f64,
+    /// The robot's poses are stamped late by at most this, µs: one interval of a 1 kHz stream. Stated, not measured.
+    pub robot_delay_us: f64,
+}
+
+impl Default for AlignmentSettings {
+    fn default() -> Self {
+        Self {
+            max_residual_us: 10.0,
+            max_camera_interval_us: 50.0,
+            max_host_interval_us: 5_000.0,
+            max_drift_ppm: 10_000.0,
+            max_lost: 0.3,
+            max_spurious: 0.15,
+            min_coverage: 0.85,
+            robot_delay_us: 1_000.0,
+        }
+    }
+}
+
 /// Settings of an analysis. A session recorded before a setting existed gets that setting's default.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
@@ -262,6 +301,8 @@ pub struct AnalysisSettings {
     pub latency: LatencySettings,
     /// The contact map reconstruction error.
     pub cmre: CmreSettings,
+    /// Limits of the alignment certificate.
+    pub alignment: AlignmentSettings,
     /// Resamples of the bootstrap over locations.
     pub bootstrap_resamples: u32,
     /// Seed of the bootstrap.
@@ -301,6 +342,7 @@ impl Default for AnalysisSettings {
             reduction: ReductionSettings::default(),
             latency: LatencySettings::default(),
             cmre: CmreSettings::default(),
+            alignment: AlignmentSettings::default(),
             bootstrap_resamples: 2000,
             seed: 1,
             rate_bin_ms: 10.0,

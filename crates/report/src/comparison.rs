@@ -44,6 +44,9 @@ pub struct Row {
 pub fn rows(analysis: &Analysis) -> Vec<Row> {
     let thinned = reduced_row(analysis);
     let cells = |metric| {
+        if !analysis.alignment.is_usable() {
+            return (Cell::Text("INVALID"), Cell::Missing);
+        }
         (
             whole(analysis, metric),
             thinned.map_or(Cell::Missing, |row| reduced(analysis, &row, metric)),

@@ -24,6 +24,7 @@ pub(crate) fn json(input: &ReportInput<'_>) -> Value {
     object!({
         "format": JSON_FORMAT,
         "format_version": JSON_VERSION,
+        "valid": input.analysis.alignment.is_usable(),
         "provenance": input.provenance,
         "analysis": analysis,
         "comparison": comparison::rows(input.analysis),

@@ -59,6 +59,7 @@ pub fn html(input: &ReportInput<'_>) -> Result<String, ReportError> {
 }
 
 /// The results as JSON for programs: `format` ([`JSON_FORMAT`]), `format_version` ([`JSON_VERSION`]),
+/// `valid` (false when the alignment certificate is beyond its limits: the numbers are not to be used),
 /// `provenance` ([`Provenance`]), `analysis` (the fields of [`Analysis`] without the bulk series `rates`, `pictures`,
 /// `zooms` and `activity`) and `comparison` ([`comparison::Row`]s: the session beside the published numbers).
 ///

@@ -74,6 +74,41 @@ fn counts_that_do_not_add_up_are_called_out() {
     );
 }
 
+/// The numbers of a session whose clocks are not known are nowhere given as results.
+#[test]
+fn an_invalid_session_says_so_in_the_place_of_every_metric() {
+    let mut analysis = support::analysis(16, 10);
+    let read = |analysis: &_| {
+        let input = ReportInput {
+            analysis,
+            provenance: support::provenance(),
+        };
+        let page = skinrig_report::html(&input).unwrap();
+        (terminal_table(&input, false), json(&input), page)
+    };
+    let (table, document, page) = read(&analysis);
+    let rmse = format!("{:.2}", analysis.scored.rmse_mm.value.unwrap());
+    assert!(
+        table.contains(&rmse) && !table.contains("INVALID"),
+        "{table}"
+    );
+    assert_eq!(document["valid"], true);
+    assert!(!page.contains("INVALID") && page.contains("data-testid=\"alignment\""));
+
+    analysis.alignment.status = skinrig_analysis::result::AlignmentStatus::Invalid;
+    analysis.alignment.violations = vec!["camera 2 from box: expected a clock, found none".into()];
+    let (table, document, page) = read(&analysis);
+    insta::assert_snapshot!("terminal_table_invalid", table);
+    assert!(!table.contains(&rmse), "{table}");
+    assert_eq!(document["valid"], false);
+    assert_eq!(document["comparison"][0]["session"], "INVALID");
+    let banner = "data-testid=\"invalid\"><strong>INVALID.</strong>";
+    assert!(page.contains(banner) && page.contains("expected a clock, found none"));
+    let hero = page.split("data-testid=\"metric-rmse\"").nth(1).unwrap();
+    let hero = &hero[..hero.find("</div>").unwrap()];
+    assert!(hero.contains("INVALID") && !hero.contains(&rmse), "{hero}");
+}
+
 #[test]
 fn json_document_has_this_layout() {
     let mut analysis = support::analysis(2, 2);

@@ -1,7 +1,7 @@
 //! Camera clocks: where host time lies on a camera's clock, and how surely.
 
 mod correlate;
-mod line;
+pub(crate) mod line;
 mod marks;
 mod presses;
 
@@ -16,7 +16,7 @@ use crate::result::ClockFit;
 /// windows and views about them would end beyond 64 bits.
 const NO_TIME_US: u64 = 1 << 62;
 /// A line with a larger drift is no clock.
-const NO_CLOCK_DRIFT: f64 = 0.01;
+pub(crate) const NO_CLOCK_DRIFT: f64 = 0.01;
 
 impl ClockFit {
     /// Camera time (µs) of a host time.

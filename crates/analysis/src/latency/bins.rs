@@ -50,16 +50,19 @@ impl Grid {
 #[derive(Debug, Clone, Copy)]
 pub struct Sight<'a> {
     view: &'a KeptView,
+    /// The contact, camera time after the view's start, µs.
+    contact_us: f64,
     /// Camera µs per host µs.
     rate: f64,
 }
 
 impl<'a> Sight<'a> {
-    /// A view and the clock of its camera.
+    /// A view and the clock of its camera, on which the contact is `late_us` later than the one line through it says.
     #[must_use]
-    pub fn new(view: &'a KeptView, clock: &ClockFit) -> Self {
+    pub fn new(view: &'a KeptView, clock: &ClockFit, late_us: f64) -> Self {
         Self {
             view,
+            contact_us: view.contact_us + late_us,
             rate: 1.0 + clock.drift_ppm * 1e-6,
         }
     }
@@ -67,7 +70,7 @@ impl<'a> Sight<'a> {
     /// Host time after the contact of a camera time after the view's start, µs.
     #[must_use]
     pub fn host_us(&self, camera_us: f64) -> f64 {
-        (camera_us - self.view.contact_us) / self.rate
+        (camera_us - self.contact_us) / self.rate
     }
 
     /// The view.
@@ -78,7 +81,7 @@ impl<'a> Sight<'a> {
 
     /// Where an event lies, in bins after the contact.
     fn position(&self, event: KeptEvent, bin_us: f64) -> f64 {
-        (f64::from(event.t_us()) - self.view.contact_us) / (self.rate * bin_us)
+        (f64::from(event.t_us()) - self.contact_us) / (self.rate * bin_us)
     }
 
     /// The events in the bins of `grid`.

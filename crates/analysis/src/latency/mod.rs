@@ -30,7 +30,7 @@ use self::trial::{Detector, Label, Trial};
 use crate::kept::{Kept, KeptPress};
 use crate::metrics::quantile;
 use crate::result::{
-    Analysis, ClockFit, ClockMethod, ContactLatency, Latency, ReducedLatency, ThresholdRow,
+    Analysis, ClockFit, ClockMethod, ContactLatency, Latency, MapName, ReducedLatency, ThresholdRow,
 };
 use crate::seeded;
 use crate::verdict;
@@ -141,7 +141,9 @@ fn usable<'a>(
         if !verdict::is_done_as_planned(press) {
             return None;
         }
-        let sights = [0, 1].map(|k| Sight::new(&kept.views[k], &clocks[k]));
+        let contact_us = press.timing.map_or(0.0, |t| t.contact.0 as f64 * 1e-3);
+        let late_us = |k: usize| analysis.alignment.off_line_us(k, &clocks[k], contact_us);
+        let sights = [0, 1].map(|k| Sight::new(&kept.views[k], &clocks[k], late_us(k)));
         let background = analysis.settings.latency.background;
         Some(Usable {
             row: kept.row,
@@ -219,7 +221,28 @@ fn decision_delay_ms(detector: &Detector) -> f64 {
     rest * detector.bin_ms + reach_ms(detector)
 }
 
-/// Latencies from the measured contact. The trigger marks tie host time, on which the contact was measured, to each
+/// Standard uncertainty of a camera's time of a host time, ms, without what cannot be known from the clocks.
+fn from_clocks_ms(analysis: &Analysis, clocks: &[ClockFit; 2]) -> f64 {
+    let certificate = &analysis.alignment;
+    let cameras = [MapName::Camera1FromBox, MapName::Camera2FromBox]
+        .map(|name| certificate.interval_us(name));
+    if let ([Some(one), Some(two)], Some(host_us)) =
+        (cameras, certificate.interval_us(MapName::HostFromBox))
+    {
+        // A 95 % interval of the cameras; the host lies anywhere within bounds.
+        return 1e-3 * libm::hypot(one.max(two) / 1.96, uniform(2.0 * host_us));
+    }
+    let residual_us = clocks[0].residual_rms_us.max(clocks[1].residual_rms_us);
+    let half_width_us = analysis.contact_timing.mark_half_width_us;
+    1e-3 * libm::hypot(residual_us, uniform(2.0 * half_width_us))
+}
+
+/// Standard deviation of something that lies anywhere in an interval of this width.
+fn uniform(width: f64) -> f64 {
+    width / 12f64.sqrt()
+}
+
+/// Latencies from the measured contact. The trigger box ties host time, on which the contact was measured, to each
 /// camera's clock.
 fn from_contact(
     analysis: &Analysis,
@@ -229,17 +252,19 @@ fn from_contact(
     found: &Found,
 ) -> Option<ContactLatency> {
     let timing = &analysis.contact_timing;
-    if timing.scheduled || clocks.iter().any(|c| c.method != ClockMethod::TriggerMarks) {
+    if timing.scheduled || clocks.iter().any(|c| c.method == ClockMethod::EventRates) {
         return None;
     }
     let onset = |t: &Trial| found.chosen.and_then(|i| t.onsets_ms[i]);
     let onsets = || trials.iter().map(onset);
-    // Standard deviation of something that lies anywhere in an interval of this width.
-    let uniform = |width: f64| width / 12f64.sqrt();
     let from_bins_ms = uniform(detector.bin_ms);
-    let residual_us = clocks[0].residual_rms_us.max(clocks[1].residual_rms_us);
-    let from_clocks_ms = 1e-3 * libm::hypot(residual_us, uniform(2.0 * timing.mark_half_width_us));
-    let from_contact_ms = 1e-3 * uniform(timing.pose_interval_us);
+    let from_clocks_ms = from_clocks_ms(analysis, clocks);
+    let stamped = analysis.alignment.interval_us(MapName::RobotFromHost);
+    let pose_us = libm::hypot(
+        uniform(timing.pose_interval_us),
+        uniform(stamped.unwrap_or(0.0)),
+    );
+    let from_contact_ms = 1e-3 * libm::hypot(pose_us, timing.crossing_se_us);
     let [p5_ms, median_ms, p95_ms] = found.estimates.from_contact_ms;
     Some(ContactLatency {
         p5_ms,

@@ -16,6 +16,9 @@ pub struct ContactTiming {
     /// Largest half width of the interval in which the instant of a sent trigger mark certainly lies, µs; 0 without
     /// marks.
     pub mark_half_width_us: f64,
+    /// RMS standard error of the instant at which the measured pose crossed the surface, µs; 0 when not known.
+    #[serde(default)]
+    pub crossing_se_us: f64,
 }
 
 /// When the cameras know of a touch.
@@ -107,9 +110,13 @@ pub struct ContactLatency {
     pub uncertainty_ms: f64,
     /// Width of a bin / sqrt(12), ms.
     pub from_bins_ms: f64,
-    /// RMS residual of the clock fits (the worse camera) and half width of the marks / sqrt(3), in quadrature, ms.
+    /// Clocks, ms: the half widths of the alignment certificate at the presses, camera over box (the worse one) / 1.96 and
+    /// host over box / sqrt(3), in quadrature; without a certificate the RMS residual of the clock fits (the worse camera)
+    /// and the half width of the marks / sqrt(3).
     pub from_clocks_ms: f64,
-    /// Resolution of the measured contact: one interval of the pose samples / sqrt(12), ms; 0 when not known.
+    /// Resolution of the measured contact, ms: one interval of the pose samples / sqrt(12), the stated delay of its stamps
+    /// / sqrt(12), and the standard error of the instant at which the pose crossed the surface, in quadrature; 0 when not
+    /// known.
     pub from_contact_ms: f64,
 }
 

@@ -1,5 +1,6 @@
 //! The result of an analysis: every number that a report shows, with its n.
 
+mod alignment;
 mod audit;
 mod calibration;
 mod coverage;
@@ -7,6 +8,7 @@ mod latency;
 mod reduction;
 mod reference;
 
+pub use alignment::{Alignment, AlignmentStatus, ClockMap, Knot, LineCounts, MapName};
 pub use audit::{Fault, Finding, Law};
 pub use calibration::{CalibrationResult, ModelComparison, ThresholdChoice};
 pub use coverage::{Activity, BitRates, Cmre, Coverage};
@@ -23,7 +25,7 @@ use skinrig_model::{
 };
 
 /// Version of this layout and of the algorithms behind it; part of every result.
-pub const ANALYSIS_VERSION: u32 = 2;
+pub const ANALYSIS_VERSION: u32 = 3;
 
 /// The result of analysing one session.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -40,6 +42,9 @@ pub struct Analysis {
     pub counts: PressCounts,
     /// Clock fits, camera 1 and camera 2; `None` where no alignment was possible.
     pub clocks: [Option<ClockFit>; 2],
+    /// The alignment certificate: whether the clocks are known well enough for the numbers to be used.
+    #[serde(default)]
+    pub alignment: Alignment,
     /// How the contacts were timed.
     pub contact_timing: ContactTiming,
     /// The calibration, when there was one.
@@ -132,6 +137,8 @@ pub struct ClockFit {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ClockMethod {
+    /// From the reports of the trigger box and the coded edges that the cameras saw of it.
+    TimeBase,
     /// From coded marks on the trigger line.
     TriggerMarks,
     /// From the presses found in the event rates.

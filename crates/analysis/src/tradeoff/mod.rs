@@ -98,7 +98,7 @@ pub struct Row {
 /// Reads the session once and measures every choice of the plan. `stopwatch` gives the CPU time of this thread, s.
 ///
 /// # Errors
-/// Those of [`crate::analyze`], and [`AnalysisError::NothingToCompare`].
+/// Those of [`crate::analyze`], [`AnalysisError::NotAligned`] and [`AnalysisError::NothingToCompare`].
 pub fn measure(
     input: &SessionInput,
     source: &dyn EventSource,
@@ -118,6 +118,11 @@ pub fn measure(
         ..session.clone()
     };
     let (analysis, kept) = crate::analyze_and_keep(&reading, source, Keep::All)?;
+    if !analysis.alignment.is_usable() {
+        return Err(AnalysisError::NotAligned(
+            analysis.alignment.violations.join("; "),
+        ));
+    }
     let replay = Replay::new(input, &analysis, &kept).ok_or(AnalysisError::NothingToCompare)?;
     let model = match (session.calibration, &analysis.calibration) {
         (CalibrationModel::Auto, Some(found)) => found.model,

@@ -82,7 +82,9 @@ pub fn session() -> (SessionInput, Memory) {
         edges: [Vec::new(), Vec::new()],
         marks: Vec::new(),
         gaps: [Vec::new(), Vec::new()],
+        box_reports: Vec::new(),
         pose_interval_us: None,
+        crossing_se_us: None,
         rig: RigGeometry {
             outline: SkinOutline::PAPER,
             nominal: StereoGeometry::PAPER,

@@ -161,6 +161,35 @@ fn a_limit_that_is_not_met_ends_with_code_4_and_keeps_the_results() {
 }
 
 #[test]
+fn a_session_whose_clocks_are_beyond_a_limit_is_invalid_everywhere() {
+    let lab = Lab::new();
+    let session = text(&lab.record("s", &[]));
+    let good = skinrig(&["analyze", &session, "--json"]).code(0).json();
+    assert_eq!(good["valid"], true);
+    let certificate = &good["analysis"]["alignment"];
+    assert_eq!(certificate["status"], "valid", "{certificate:#}");
+    assert_eq!(certificate["lines"][1]["lost"], 0);
+    assert_eq!(good["analysis"]["clocks"][0]["method"], "time_base");
+
+    let strict = "analysis.alignment.max_camera_interval=0.5us";
+    let said = skinrig(&["analyze", &session, "--json", "--set", strict]).code(4);
+    let document = said.json();
+    assert_eq!(document["valid"], false);
+    assert_eq!(document["analysis"]["alignment"]["status"], "invalid");
+    said.complains(&["INVALID", "camera 1 from box", "at most 0.5 µs", "next:"]);
+    let shown = skinrig(&["analyze", &session, "--set", strict]).code(4).out;
+    assert!(
+        shown.contains("RMSE                     INVALID"),
+        "{shown}"
+    );
+    let page = std::fs::read_to_string(only(&lab.path("s"), ".report.html")).unwrap();
+    assert!(page.contains("data-testid=\"invalid\""));
+    skinrig(&["tradeoff", &session, "--set", strict])
+        .code(4)
+        .complains(&["INVALID"]);
+}
+
+#[test]
 fn a_folder_that_cannot_be_written_ends_with_code_1_and_a_next_step() {
     let lab = Lab::new();
     let file = lab.path("a-file");

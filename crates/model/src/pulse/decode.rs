@@ -22,6 +22,19 @@ pub struct DecodedMarks {
     pub lost_edges: u64,
 }
 
+/// A train as it was seen, whatever it may say.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ReadTrain {
+    /// Rising edge of its start pulse on the camera's clock, µs; inferred from the first rising edge that is there.
+    pub t_us: u64,
+    /// Data and check bits, the first one sent on top (see [`PulseTrain::bits`]); 0 where unreadable.
+    pub bits: u32,
+    /// The bits that are unreadable: their falling edge is lost, or there are two of them.
+    pub erased: u32,
+    /// Edges that are where the train has them.
+    pub edges_seen: u32,
+}
+
 /// Finds the trains among the edges of one channel.
 ///
 /// Total: any edges give labels or strays. A train is read only when its name is certain, which means all of:
@@ -34,23 +47,21 @@ pub struct DecodedMarks {
 ///
 /// The error that remains needs at least three bits, each with its own falling edge lost and a spurious one within
 /// the tolerance of the other width, in the places that another word demands. On a line that loses 20 % of its edges and
-/// invents 5 %, about one train in ten is read, and no wrong one was seen in 10^7 (see the tests). What reads the rest
-/// is the trigger box's own list of what it sent: `skinrig_analysis::timebase`.
+/// invents 5 %, about one train in ten is read, and no wrong one was seen in 10^7 (see the tests). More can be read by
+/// who knows what was sent: see [`read_trains`].
 #[must_use]
 pub fn decode_marks(edges: &[TriggerEdge]) -> DecodedMarks {
-    let mut edges = edges.to_vec();
-    edges.sort_by_key(|e| e.t_us);
     let mut out = DecodedMarks::default();
+    let named = |read: ReadTrain| fill(read.bits, read.erased).map(|label| (read, label));
+    let mut readings = read_trains(edges).into_iter().filter_map(named).peekable();
     let mut used = 0;
-    let mut readings = readings(&edges).peekable();
-    while let Some(first) = readings.next() {
+    while let Some((first, label)) = readings.next() {
         let mut certain = true;
         // Everything that overlaps must say the same: a doubled start edge gives the same train twice.
-        while let Some(other) =
-            readings.next_if(|r| r.t_us < first.t_us.saturating_add(PulseTrain::DURATION_US))
+        while let Some((other, says)) =
+            readings.next_if(|(r, _)| r.t_us < first.t_us.saturating_add(PulseTrain::DURATION_US))
         {
-            certain &=
-                other.label == first.label && other.t_us.abs_diff(first.t_us) <= 2 * TOLERANCE_US;
+            certain &= says == label && other.t_us.abs_diff(first.t_us) <= 2 * TOLERANCE_US;
         }
         if !certain {
             continue;
@@ -58,7 +69,7 @@ pub fn decode_marks(edges: &[TriggerEdge]) -> DecodedMarks {
         used += u64::from(first.edges_seen);
         out.lost_edges += 2 * PULSES_PER_TRAIN - u64::from(first.edges_seen);
         let t_us = first.t_us;
-        match first.label {
+        match label {
             Label::Mark(mark) => out.marks.push(SeenMark { mark, t_us }),
             Label::Sync(count) => out.syncs.push(SeenSync { count, t_us }),
         }
@@ -67,16 +78,14 @@ pub fn decode_marks(edges: &[TriggerEdge]) -> DecodedMarks {
     out
 }
 
-/// A train read from one anchor.
-struct Reading {
-    label: Label,
-    t_us: u64,
-    edges_seen: u32,
-}
-
-/// All readings, by the falling edges that may be a start pulse's, in time order.
-fn readings(edges: &[TriggerEdge]) -> impl Iterator<Item = Reading> {
-    edges
+/// Everything among the edges of one channel that may be a train, in time order: anything with the falling edge of a start
+/// pulse, and no edge where the pulse before the first or after the last would have one. Most of it is noise or the same
+/// train again, seen from a bit whose width looks like a start; what it says tells.
+#[must_use]
+pub fn read_trains(edges: &[TriggerEdge]) -> Vec<ReadTrain> {
+    let mut edges = edges.to_vec();
+    edges.sort_by_key(|e| e.t_us);
+    let mut found: Vec<ReadTrain> = edges
         .iter()
         .enumerate()
         .filter(|(_, e)| !e.rising)
@@ -87,24 +96,30 @@ fn readings(edges: &[TriggerEdge]) -> impl Iterator<Item = Reading> {
                 .iter()
                 .rposition(|e| e.t_us < from.saturating_sub(PULSE_PERIOD_US + TOLERANCE_US))
                 .map_or(0, |k| k + 1);
-            read_train(&edges[first..], from)
+            // And nothing is later than the pulse that must not follow it.
+            let end = from.saturating_add(PulseTrain::DURATION_US);
+            let last = i + edges[i..].partition_point(|e| e.t_us <= end);
+            read_train(&edges[first..last], from)
         })
+        .collect();
+    found.sort_by_key(|read| read.t_us);
+    found
 }
 
 /// Reads the train that starts about `start_us`.
-fn read_train(edges: &[TriggerEdge], start_us: u64) -> Option<Reading> {
+fn read_train(edges: &[TriggerEdge], start_us: u64) -> Option<ReadTrain> {
     let line = Line { edges };
     if line.has_pulse(start_us.checked_sub(PULSE_PERIOD_US)?) {
         return None;
     }
-    let mut seen = 1;
+    let mut edges_seen = 1;
     // Each rising edge that is there sets the place of the next, so that the clocks' rates need not agree.
     let mut rise_us = start_us;
     let mut t_us = None;
     let (mut bits, mut erased) = (0u32, 0u32);
     for k in 0..PULSES_PER_TRAIN {
         if let Some(found) = line.near(rise_us, true) {
-            seen += 1;
+            edges_seen += 1;
             rise_us = found;
             t_us.get_or_insert(found.saturating_sub(k * PULSE_PERIOD_US));
         }
@@ -115,19 +130,20 @@ fn read_train(edges: &[TriggerEdge], start_us: u64) -> Option<Reading> {
             let zero = line
                 .near(rise_us.saturating_add(ZERO_WIDTH_US), false)
                 .is_some();
-            bits = (bits << 1) | u32::from(one);
+            bits = (bits << 1) | u32::from(one && !zero);
             erased = (erased << 1) | u32::from(one == zero);
-            seen += u32::from(one != zero);
+            edges_seen += u32::from(one != zero);
         }
         rise_us = rise_us.saturating_add(PULSE_PERIOD_US);
     }
     if line.has_pulse(rise_us) {
         return None;
     }
-    Some(Reading {
-        label: fill(bits, erased)?,
+    Some(ReadTrain {
         t_us: t_us?,
-        edges_seen: seen,
+        bits,
+        erased,
+        edges_seen,
     })
 }
 
@@ -136,11 +152,10 @@ fn fill(bits: u32, erased: u32) -> Option<Label> {
     if erased.count_ones() > MOST_ERASED {
         return None;
     }
-    let known = bits & !erased;
     // All subsets of the erased places; the code's distance leaves at most one.
     let mut subset = 0u32;
     loop {
-        let word = known | subset;
+        let word = bits | subset;
         let data = word >> CHECK_BITS;
         if word & ((1 << CHECK_BITS) - 1) == check_bits(data) {
             return Label::from_data(data & ((1 << DATA_BITS) - 1));

@@ -1,8 +1,9 @@
 //! The keys of `analysis` as settings of the analysis.
 
 use skinrig_model::{
-    AnalysisSettings, Background, CalibrationModel, CentroidRule, CmreSettings, Estimator,
-    LatencySettings, LensKind, Precision, ReductionSettings, ThresholdRule, WindowAnchor,
+    AlignmentSettings, AnalysisSettings, Background, CalibrationModel, CentroidRule, CmreSettings,
+    Estimator, LatencySettings, LensKind, Precision, ReductionSettings, ThresholdRule,
+    WindowAnchor,
 };
 
 use crate::diagnostic::Collector;
@@ -105,6 +106,7 @@ pub(crate) fn analysis(f: &Field, out: &mut Collector) -> Option<AnalysisSetting
         reduction: reduction(f.get("reduction")?)?,
         latency: latency(f.get("latency")?, out)?,
         cmre: cmre(f.get("cmre")?)?,
+        alignment: alignment(f.get("alignment")?)?,
         bootstrap_resamples: f.count("bootstrap_resamples")?,
         seed: f.whole("seed")?.unsigned_abs(),
         rate_bin_ms: milliseconds(f.quantity("rate_bin")?),
@@ -157,6 +159,20 @@ fn cmre(f: &Field) -> Option<CmreSettings> {
         cell_mm: f.quantity("cell")?,
         sigma_mm: f.quantity("sigma")?,
         sr_mm: f.quantity("sr")?,
+    })
+}
+
+fn alignment(f: &Field) -> Option<AlignmentSettings> {
+    let microseconds = |key: &str| f.quantity(key).map(|s| (s * 1e9).round() / 1e3);
+    Some(AlignmentSettings {
+        max_residual_us: microseconds("max_residual")?,
+        max_camera_interval_us: microseconds("max_camera_interval")?,
+        max_host_interval_us: microseconds("max_host_interval")?,
+        max_drift_ppm: f.number("max_drift")?,
+        max_lost: f.number("max_lost")?,
+        max_spurious: f.number("max_spurious")?,
+        min_coverage: f.number("min_coverage")?,
+        robot_delay_us: microseconds("robot_delay")?,
     })
 }
 

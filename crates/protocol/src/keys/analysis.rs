@@ -184,6 +184,12 @@ pub(crate) static ANALYSIS: Table = Table {
             "The contact map reconstruction error; none of its values is published.",
         ),
         default(
+            "alignment",
+            Shape::Map(&ALIGNMENT),
+            "{}",
+            "Limits of the alignment certificate: a session beyond one of them is invalid.",
+        ),
+        default(
             "bootstrap_resamples",
             count(1, 1_000_000),
             "2000",
@@ -400,6 +406,64 @@ pub(crate) const BACKGROUNDS: &[Word] = &[
     ("before", "idle time before the press, as the paper says"),
     ("after", "after the press, as the public code does"),
 ];
+
+const SHARE: Shape = Shape::Number(Range::from_zero(1.0));
+
+pub(crate) static ALIGNMENT: Table = Table {
+    name: "alignment",
+    doc: "Limits of the alignment certificate (docs/time-base.md gives the reasons); a session beyond one of them is invalid.",
+    keys: &[
+        default(
+            "max_residual",
+            Shape::Quantity(&[Time], Range::above_zero(1.0)),
+            "10 us",
+            "Largest RMS residual of sync trains and marks about a camera's clock.",
+        ),
+        default(
+            "max_camera_interval",
+            Shape::Quantity(&[Time], Range::above_zero(1.0)),
+            "50 us",
+            "Largest half width of the 95 % interval of a camera's clock over the trigger box's, at a press.",
+        ),
+        default(
+            "max_host_interval",
+            Shape::Quantity(&[Time], Range::above_zero(1.0)),
+            "5 ms",
+            "Largest half width of the certain interval of the host's clock over the trigger box's, at a press.",
+        ),
+        default(
+            "max_drift",
+            Shape::Number(Range::above_zero(1e6)),
+            "10000",
+            "Largest rate difference between two clocks, parts per million.",
+        ),
+        default(
+            "max_lost",
+            SHARE,
+            "0.3",
+            "Largest share of the edges sent that a camera did not see.",
+        ),
+        default(
+            "max_spurious",
+            SHARE,
+            "0.15",
+            "Largest share, of the edges sent, of edges that a camera saw twice or that nobody sent.",
+        ),
+        default(
+            "min_coverage",
+            SHARE,
+            "0.85",
+            "Least share of held-out trains within the 95 % interval stated for them, by more than chance (3 standard errors).",
+        ),
+        default(
+            "robot_delay",
+            Shape::Quantity(&[Time], Range::from_zero(1.0)),
+            "1 ms",
+            "The robot's poses are stamped late by at most this; stated, not measured.",
+        ),
+    ],
+    exactly_one: &[],
+};
 
 pub(crate) static CMRE: Table = Table {
     name: "cmre",

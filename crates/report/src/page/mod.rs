@@ -4,6 +4,7 @@
 //! `assets/figure.css`, the script `assets/report.js`. The script gets one JSON value with named tables
 //! (columns and column-wise data): the press table, tooltips and CSV downloads all read it.
 
+mod alignment;
 mod areas;
 mod calibration;
 mod comparison;
@@ -118,6 +119,7 @@ pub(crate) fn render(input: &ReportInput<'_>) -> Result<String, ReportError> {
         .map(|f| (f.id, figure_value(f)))
         .collect();
     let c = &a.counts;
+    let usable = a.alignment.is_usable();
     let count = |key: &str, name: &str, n: u32| context! { key, name, n };
     let page = env.get_template("page.html")?.render(context! {
         page_css => safe(PAGE_CSS),
@@ -131,6 +133,8 @@ pub(crate) fn render(input: &ReportInput<'_>) -> Result<String, ReportError> {
         stand_in => p.stand_in(),
         rig_name => or_missing(&p.rig_name),
         rig_kind => p.rig_kind.clone(),
+        violations => if usable { Vec::new() } else { a.alignment.violations.clone() },
+        usable,
         started => or_missing(&p.started),
         prototype => or_missing(&p.prototype),
         run_end => or_missing(&p.run_end),
@@ -138,18 +142,18 @@ pub(crate) fn render(input: &ReportInput<'_>) -> Result<String, ReportError> {
         run_end_s => p.interruptions.iter().find(|i| p.ended_by(i)).map(|i| number(Some(i.t_s), 1)),
         metrics => metrics(input),
         rmse_all => context! {
-            differs => a.scored_without_exclusions != a.scored,
+            differs => usable && a.scored_without_exclusions != a.scored,
             value => number(a.scored_without_exclusions.rmse_mm.value, 2),
             interval => interval(&a.scored_without_exclusions.rmse_mm, 1.0, 2),
             n => a.scored_without_exclusions.rmse_mm.n,
         },
-        penalised => penalised(a),
+        penalised => penalised(a).filter(|_| usable),
         threshold_note => threshold_note(a),
         findings => findings::values(&a.findings),
         contents => contents(input),
         grids => grids(input),
         has_cells => a.coverage.as_ref().is_some_and(|c| c.cell_mm.is_some()),
-        diagonal => a.scored.rmse_diagonal_percent.map(|v| number(Some(v), 2)),
+        diagonal => a.scored.rmse_diagonal_percent.filter(|_| usable).map(|v| number(Some(v), 2)),
         counts => [
             count("valid", "valid", c.valid),
             count("missed", "missed", c.missed),
@@ -173,7 +177,7 @@ pub(crate) fn render(input: &ReportInput<'_>) -> Result<String, ReportError> {
             .collect::<Vec<_>>(),
         rejections => rejections(a, false),
         sync_rejections => rejections(a, true),
-        depths => a.depths.iter()
+        depths => a.depths.iter().filter(|_| usable)
             .map(|d| context! {
                 depth => d.depth_mm.to_string(), value => number(d.rmse_mm.value, 2),
                 interval => interval(&d.rmse_mm, 1.0, 2), n => d.rmse_mm.n,
@@ -205,6 +209,8 @@ pub(crate) fn render(input: &ReportInput<'_>) -> Result<String, ReportError> {
 fn grids(input: &ReportInput<'_>) -> BTreeMap<&'static str, Value> {
     let a = input.analysis;
     [
+        ("alignment", alignment::maps(a)),
+        ("trigger_lines", alignment::lines(a)),
         ("coverage", areas::coverage(a)),
         ("cmre", areas::cmre(a)),
         ("bit_rates", areas::bit_rates(a)),

@@ -4,7 +4,9 @@ mod studies;
 
 use std::fmt::Write as _;
 
-use skinrig_analysis::result::{Analysis, ClockFit, ClockMethod, Estimate};
+use skinrig_analysis::result::{
+    Alignment, AlignmentStatus, Analysis, ClockFit, ClockMethod, Estimate, MapName, Metrics,
+};
 
 use crate::ReportInput;
 use crate::format::{digits_of_error, grouped, interval, number, or_missing};
@@ -25,6 +27,22 @@ pub(crate) struct MetricRow {
 /// The metrics in the order in which they are read.
 pub(crate) fn metric_rows(a: &Analysis) -> Vec<MetricRow> {
     let m = &a.scored;
+    let rows = vec_of_metrics(a, m);
+    if a.alignment.is_usable() {
+        return rows;
+    }
+    // Numbers of an invalid session are not to be read: their places say so.
+    rows.into_iter()
+        .map(|row| MetricRow {
+            value: "INVALID".to_owned(),
+            unit: "",
+            interval: String::new(),
+            ..row
+        })
+        .collect()
+}
+
+fn vec_of_metrics(a: &Analysis, m: &Metrics) -> Vec<MetricRow> {
     let mm = |key, name: &str, e: &Estimate, what_n| MetricRow {
         key,
         name: name.to_owned(),
@@ -73,6 +91,7 @@ pub(crate) fn metric_rows(a: &Analysis) -> Vec<MetricRow> {
 /// One line about a clock fit, without the camera's name.
 pub(crate) fn clock_method(method: ClockMethod) -> &'static str {
     match method {
+        ClockMethod::TimeBase => "the trigger box's time base",
         ClockMethod::TriggerMarks => "trigger marks",
         ClockMethod::EventRates => "event rates",
     }
@@ -172,6 +191,11 @@ pub(crate) fn table(input: &ReportInput<'_>, color: bool) -> String {
     out += &wrap("run       ", &plain(&end));
     out.push('\n');
     let before = out.len();
+    for violation in &a.alignment.violations {
+        if !a.alignment.is_usable() {
+            out += &paint.warn(&wrap("INVALID   ", &plain(violation)));
+        }
+    }
     out += &paint.warn(&findings(a));
     if let Some(text) = crate::derive::disagreement(a) {
         out += &paint.warn(&wrap("warning   ", &text));
@@ -200,7 +224,8 @@ pub(crate) fn table(input: &ReportInput<'_>, color: bool) -> String {
         };
         let _ = writeln!(out, "{line}");
     }
-    if let Some(share) = a.scored.rmse_diagonal_percent {
+    let usable = a.alignment.is_usable();
+    if let Some(share) = a.scored.rmse_diagonal_percent.filter(|_| usable) {
         let _ = writeln!(
             out,
             "{:<24}{:>8} %   of the skin's diagonal",
@@ -208,7 +233,7 @@ pub(crate) fn table(input: &ReportInput<'_>, color: bool) -> String {
             number(Some(share), 2)
         );
     }
-    if a.scored_without_exclusions != a.scored {
+    if usable && a.scored_without_exclusions != a.scored {
         let e = &a.scored_without_exclusions.rmse_mm;
         let _ = writeln!(
             out,
@@ -220,7 +245,7 @@ pub(crate) fn table(input: &ReportInput<'_>, color: bool) -> String {
         );
     }
     let f = &a.penalised;
-    if f.failures > 0 {
+    if usable && f.failures > 0 {
         let _ = writeln!(
             out,
             "{:<24}{:>8} mm  {:^20}{:>7} presses",
@@ -230,7 +255,7 @@ pub(crate) fn table(input: &ReportInput<'_>, color: bool) -> String {
             f.rmse_mm.n,
         );
     }
-    for d in &a.depths {
+    for d in a.depths.iter().filter(|_| usable) {
         let _ = writeln!(
             out,
             "{:<24}{:>8} mm  {:^20}{:>7} presses",
@@ -276,6 +301,7 @@ pub(crate) fn table(input: &ReportInput<'_>, color: bool) -> String {
     for (i, clock) in a.clocks.iter().enumerate() {
         out += &clock_lines(i + 1, clock.as_ref());
     }
+    out += &alignment_lines(&a.alignment);
     out += &studies::calibration(a);
     for (i, lost) in p.lost_bytes.iter().enumerate().filter(|(_, l)| **l > 0) {
         let text = format!("camera {}: {} bytes lost", i + 1, grouped(*lost));
@@ -339,6 +365,43 @@ fn left_out(a: &Analysis, sync: bool) -> String {
         );
     }
     out
+}
+
+/// The alignment certificate in a line or two.
+fn alignment_lines(certificate: &Alignment) -> String {
+    let text = match certificate.status {
+        AlignmentStatus::NotCertified => {
+            "not certified: no usable reports of a trigger box".to_owned()
+        }
+        status => {
+            let mut parts = Vec::new();
+            for (name, what) in [
+                (MapName::Camera1FromBox, "camera 1"),
+                (MapName::Camera2FromBox, "camera 2"),
+                (MapName::HostFromBox, "host"),
+            ] {
+                if let Some(half_us) = certificate.interval_us(name) {
+                    parts.push(format!("{what} ± {} µs", number(Some(half_us), 1)));
+                }
+            }
+            for (k, line) in certificate.lines.iter().enumerate() {
+                let extra = line.doubled + line.spurious;
+                parts.push(format!(
+                    "input {}: {} % lost, {} % doubled or spurious",
+                    k + 1,
+                    number(Some(100.0 * line.share(line.lost)), 1),
+                    number(Some(100.0 * line.share(extra)), 1)
+                ));
+            }
+            let verdict = if status == AlignmentStatus::Valid {
+                "valid"
+            } else {
+                "INVALID"
+            };
+            format!("{verdict}: on the box's clock {}", parts.join(", "))
+        }
+    };
+    wrap("alignment ", &text)
 }
 
 fn clock_lines(camera: usize, clock: Option<&ClockFit>) -> String {

@@ -1,0 +1,322 @@
+//! `camera_from_box`: which edge on a camera's trigger input is which edge that the box sent, and the map that follows.
+//!
+//! First *anchors*: trains whose bits, as far as they can be read, agree with one train that the box sent and contradict
+//! every other one in at least [`LEAST_CONTRADICTED`] bits. Then every edge that was sent is looked for where the anchors
+//! put it. What is found gives each train an instant, and these the map. The label of an edge is thus never counted off,
+//! and no lost, doubled or spurious edge can shift those after it.
+
+use std::collections::HashMap;
+
+use skinrig_model::TriggerEdge;
+use skinrig_model::pulse::{PulseTrain, ReadTrain, read_trains};
+
+use super::epochs::{Epoch, Sent};
+use super::piecewise::{Piecewise, Point};
+use crate::clock::line::median;
+use crate::result::LineCounts;
+
+/// Bits of an anchor that may be unreadable: the others still name it among what was sent.
+const MOST_ERASED: u32 = 12;
+/// Readable bits that contradict every other train that was sent.
+const LEAST_CONTRADICTED: u32 = 3;
+/// Edges are looked for within this of where anchors, and then trains, put them, µs. Edges of the same direction are at least
+/// 300 µs apart.
+const NEAR_US: [f64; 2] = [60.0, 25.0];
+/// An edge this soon after another of the same direction is its double, µs.
+const DOUBLE_US: u64 = 20;
+/// A train with fewer rising edges than this gives no instant.
+const LEAST_RISES: usize = 4;
+/// Knots are at least this far apart, µs.
+const SPACING_US: f64 = 60e6;
+/// Instants of trains are never judged finer than this, µs: both clocks show whole µs.
+const FLOOR_US: f64 = 0.5;
+/// The first reading of a train may rest on an edge that is off by this, µs.
+const ANCHOR_FLOOR_US: f64 = 3.0;
+
+/// A camera's clock over the box's.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CameraFromBox {
+    /// The map, from box time to camera time, both relative to their references.
+    pub map: Piecewise,
+    /// Camera time to which the map is relative, µs.
+    pub reference_us: u64,
+    /// Box times of all trains that were sent, relative to the epoch's reference, µs.
+    pub sent_us: Vec<f64>,
+    /// For each of them its instant on the camera's clock relative to the reference, if it was seen.
+    pub instants: Vec<Option<f64>>,
+    /// Standard deviation of a rising edge about the instant of its train, µs.
+    pub edge_sigma_us: f64,
+    /// Edges sent, seen, lost, doubled, spurious.
+    pub counts: LineCounts,
+    /// Anchors that the others contradict.
+    pub contradicted: u32,
+}
+
+impl CameraFromBox {
+    /// Half width of the 95 % interval of the map at a box time, µs: 1.96 standard errors, and what no number of edges
+    /// averages out: edges come late by an unknown mean, of the size of their scatter (less than 2 standard deviations for
+    /// any delay that is spread evenly or dies away), and the box shows whole µs.
+    pub fn interval_us(&self, box_us: f64) -> f64 {
+        1.96 * self.map.standard_error(box_us) + 2.0 * self.edge_sigma_us + 0.5
+    }
+}
+
+/// The edges of one channel, sorted; those used are struck out.
+pub struct Edges {
+    all: Vec<TriggerEdge>,
+    used: Vec<bool>,
+    trains: Vec<ReadTrain>,
+}
+
+impl Edges {
+    pub fn new(edges: &[TriggerEdge], channel: u8) -> Self {
+        let mut all: Vec<TriggerEdge> = edges
+            .iter()
+            .copied()
+            .filter(|e| e.channel == channel)
+            .collect();
+        all.sort_by_key(|e| e.t_us);
+        Self {
+            trains: read_trains(&all),
+            used: vec![false; all.len()],
+            all,
+        }
+    }
+
+    /// The map of one epoch, or why there is none.
+    pub fn map(&mut self, epoch: &Epoch) -> Result<CameraFromBox, String> {
+        let anchors = anchors(&self.trains, &epoch.trains);
+        let Some(reference_us) = anchors.first().map(|a| a.1) else {
+            return Err(format!(
+                "none of {} trains sent is certain among {} edges",
+                epoch.trains.len(),
+                self.all.len()
+            ));
+        };
+        let points: Vec<Point> = anchors
+            .iter()
+            .map(|(box_us, t_us)| Point {
+                from_us: *box_us,
+                to_us: relative(*t_us, reference_us),
+            })
+            .collect();
+        let mut map = Piecewise::fit(&points, SPACING_US, ANCHOR_FLOOR_US)
+            .filter(|map| map.drift.abs() <= crate::clock::NO_CLOCK_DRIFT)
+            .ok_or_else(|| {
+                format!(
+                    "{} of {} trains sent are certain, and they are on no clock's line",
+                    anchors.len(),
+                    epoch.trains.len()
+                )
+            })?;
+        let contradicted = (points.len() - map.n()) as u32;
+        let mut matched = Vec::new();
+        let mut instants = Vec::new();
+        for near_us in NEAR_US {
+            matched = self.look(&epoch.trains, &map, reference_us, near_us);
+            instants = matched.iter().map(Matched::instant).collect::<Vec<_>>();
+            let seen: Vec<Point> = epoch
+                .trains
+                .iter()
+                .zip(&instants)
+                .filter_map(|(sent, at)| {
+                    Some(Point {
+                        from_us: sent.box_us,
+                        to_us: (*at)?,
+                    })
+                })
+                .collect();
+            map = Piecewise::fit(&seen, SPACING_US, FLOOR_US)
+                .ok_or_else(|| format!("only {} trains were seen", seen.len()))?;
+        }
+        let edge_sigma_us = edge_sigma_us(&matched);
+        let counts = self.count(&epoch.trains, &matched, &map, reference_us);
+        Ok(CameraFromBox {
+            map,
+            reference_us,
+            sent_us: epoch.trains.iter().map(|t| t.box_us).collect(),
+            instants,
+            edge_sigma_us,
+            counts,
+            contradicted,
+        })
+    }
+
+    /// Looks for every edge that was sent where the map puts it.
+    fn look(
+        &self,
+        sent: &[Sent],
+        map: &Piecewise,
+        reference_us: u64,
+        near_us: f64,
+    ) -> Vec<Matched> {
+        sent.iter()
+            .map(|train| {
+                let start = map.value(train.box_us);
+                let mut out = Matched {
+                    start_us: start,
+                    ..Matched::default()
+                };
+                for (offset, rising) in train.train.edges() {
+                    let at = map.value(train.box_us + offset as f64);
+                    if let Some((index, off)) = self.nearest(at, rising, reference_us, near_us) {
+                        out.edges.push(index);
+                        if rising {
+                            out.rises.push(off);
+                        }
+                    }
+                }
+                out
+            })
+            .collect()
+    }
+
+    /// The edge nearest to a time relative to the reference, and how much later it is.
+    fn nearest(
+        &self,
+        at_us: f64,
+        rising: bool,
+        reference_us: u64,
+        near_us: f64,
+    ) -> Option<(usize, f64)> {
+        let from = self
+            .all
+            .partition_point(|e| relative(e.t_us, reference_us) < at_us - near_us);
+        self.all[from..]
+            .iter()
+            .enumerate()
+            .map(|(k, e)| (k, e.rising, relative(e.t_us, reference_us) - at_us))
+            .take_while(|(_, _, off)| *off <= near_us)
+            .filter(|(_, up, _)| *up == rising)
+            .map(|(k, _, off)| (from + k, off))
+            .min_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))
+    }
+
+    /// Counts over the trains from the first to the last that were seen, and strikes out their edges.
+    fn count(
+        &mut self,
+        sent: &[Sent],
+        matched: &[Matched],
+        map: &Piecewise,
+        reference_us: u64,
+    ) -> LineCounts {
+        let seen = |m: &Matched| m.rises.len() >= LEAST_RISES;
+        let (Some(first), Some(last)) = (
+            matched.iter().position(seen),
+            matched.iter().rposition(seen),
+        ) else {
+            return LineCounts::default();
+        };
+        let within = &matched[first..=last];
+        let mut counts = LineCounts {
+            trains_sent: within.len() as u32,
+            trains_seen: within.iter().filter(|m| seen(m)).count() as u32,
+            sent: within.len() as u64 * EDGES_PER_TRAIN,
+            ..LineCounts::default()
+        };
+        for index in within.iter().flat_map(|m| &m.edges) {
+            if !std::mem::replace(&mut self.used[*index], true) {
+                counts.seen += 1;
+            }
+        }
+        counts.lost = counts.sent - counts.seen;
+        let end_us = map.value(sent[last].box_us + PulseTrain::DURATION_US as f64);
+        let (mut rise, mut fall) = (None, None);
+        for (edge, used) in self.all.iter().zip(&mut self.used) {
+            let at_us = relative(edge.t_us, reference_us);
+            let before = if edge.rising { &mut rise } else { &mut fall };
+            let double = before.is_some_and(|t| edge.t_us - t <= DOUBLE_US);
+            let inside = (within[0].start_us - NEAR_US[0]..=end_us).contains(&at_us);
+            if inside && !*used {
+                *used = true;
+                *(if double {
+                    &mut counts.doubled
+                } else {
+                    &mut counts.spurious
+                }) += 1;
+            }
+            *before = Some(edge.t_us);
+        }
+        counts
+    }
+}
+
+/// Edges of a train.
+const EDGES_PER_TRAIN: u64 = 2 * skinrig_model::pulse::PULSES_PER_TRAIN;
+
+/// What was found of a train.
+#[derive(Debug, Default)]
+struct Matched {
+    /// Where its first edge should be.
+    start_us: f64,
+    /// Edges found.
+    edges: Vec<usize>,
+    /// How much later than it should be each of the rising edges is: falling ones may have another delay.
+    rises: Vec<f64>,
+}
+
+impl Matched {
+    /// The instant of the train: where the median of its rising edges puts it.
+    fn instant(&self) -> Option<f64> {
+        if self.rises.len() < LEAST_RISES {
+            return None;
+        }
+        Some(self.start_us + median(&mut self.rises.clone())?)
+    }
+}
+
+/// Robust standard deviation of rising edges about the instants of their trains.
+fn edge_sigma_us(matched: &[Matched]) -> f64 {
+    let mut off: Vec<f64> = matched
+        .iter()
+        .filter_map(|m| Some((m, m.instant()? - m.start_us)))
+        .flat_map(|(m, middle)| m.rises.iter().map(move |r| (r - middle).abs()))
+        .collect();
+    1.482_602_218_505_602 * median(&mut off).unwrap_or(0.0)
+}
+
+/// (box time, camera time) of the trains that are certain, in order of box time.
+fn anchors(read: &[ReadTrain], sent: &[Sent]) -> Vec<(f64, u64)> {
+    let by_word: HashMap<u32, usize> = sent
+        .iter()
+        .enumerate()
+        .map(|(k, s)| (s.train.bits(), k))
+        .collect();
+    let name = |r: &ReadTrain| {
+        let k = match r.erased {
+            0 => by_word.get(&r.bits).copied(),
+            _ => named(r, sent),
+        };
+        k.map(|k| &sent[k]).filter(|s| s.unique)
+    };
+    let mut found: Vec<(f64, u64)> = read
+        .iter()
+        .filter(|r| r.erased.count_ones() <= MOST_ERASED)
+        .filter_map(|r| Some((name(r)?.box_us, r.t_us)))
+        .collect();
+    found.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    // A doubled start edge gives a train twice.
+    found.dedup_by_key(|a| a.0);
+    found
+}
+
+/// The one train that was sent with which all readable bits agree, when they contradict all others.
+fn named(read: &ReadTrain, sent: &[Sent]) -> Option<usize> {
+    let contradicted = |s: &Sent| ((s.train.bits() ^ read.bits) & !read.erased & WORD).count_ones();
+    let mut found = None;
+    for (k, train) in sent.iter().enumerate() {
+        match contradicted(train) {
+            0 if found.is_none() => found = Some(k),
+            n if n < LEAST_CONTRADICTED => return None,
+            _ => {}
+        }
+    }
+    found
+}
+
+/// All bits of a train.
+const WORD: u32 = (1 << 31) - 1;
+
+fn relative(t_us: u64, reference_us: u64) -> f64 {
+    t_us.wrapping_sub(reference_us) as i64 as f64
+}

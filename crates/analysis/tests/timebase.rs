@@ -1,0 +1,424 @@
+//! The time base on emulated benches: labels, errors, intervals and limits, from edges and exchanges alone.
+
+#![expect(clippy::unwrap_used, reason = "tests")]
+
+use rayon::prelude::*;
+use skinrig_analysis::result::{AlignmentStatus, MapName};
+use skinrig_analysis::timebase::{Ties, TimeBase};
+use skinrig_model::{
+    AlignmentSettings, BoxReport, BoxTime, HostTime, Label, Mark, MarkKind, PressId, PulseTrain,
+    TriggerEdge,
+};
+
+/// SplitMix64 (public domain, S. Vigna).
+struct Random(u64);
+
+impl Random {
+    fn bits(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        z ^ (z >> 31)
+    }
+
+    fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * (self.bits() >> 11) as f64 / (1u64 << 53) as f64
+    }
+}
+
+/// A clock over host time, µs: an origin, a rate, and a rate that changes.
+#[derive(Debug, Clone, Copy)]
+struct Clock {
+    origin_us: f64,
+    drift: f64,
+    /// Change of the rate per µs.
+    wander: f64,
+}
+
+impl Clock {
+    fn at(&self, host_us: f64) -> f64 {
+        self.origin_us + host_us * (1.0 + self.drift) + 0.5 * self.wander * host_us * host_us
+    }
+}
+
+/// What goes wrong, and how far clocks are apart.
+#[derive(Debug, Clone, Copy)]
+struct Conditions {
+    span_s: f64,
+    most_drift: f64,
+    jitter_us: f64,
+    lost: f64,
+    doubled: f64,
+    spurious: f64,
+}
+
+const CLEAN: Conditions = Conditions {
+    span_s: 40.0,
+    most_drift: 500e-6,
+    jitter_us: 2.5,
+    lost: 0.0,
+    doubled: 0.0,
+    spurious: 0.0,
+};
+
+const NOISY: Conditions = Conditions {
+    lost: 0.2,
+    doubled: 0.02,
+    spurious: 0.05,
+    ..CLEAN
+};
+
+struct Bench {
+    boxed: Clock,
+    cameras: [Clock; 2],
+    reports: Vec<BoxReport>,
+    edges: [Vec<TriggerEdge>; 2],
+    /// Host times of the presses' contacts, µs.
+    presses: Vec<f64>,
+}
+
+/// A press each 2 s with a mark at contact, at depth and release, a sync train each second, an exchange each 0.1 s.
+fn bench(seed: u64, c: &Conditions) -> Bench {
+    let mut r = Random(seed);
+    let mut clock = |origin_us: f64| Clock {
+        origin_us: r.between(0.0, origin_us),
+        drift: r.between(-c.most_drift, c.most_drift),
+        // Up to 3 ppm per hour.
+        wander: r.between(-3e-6, 3e-6) / 3.6e9,
+    };
+    let boxed = clock(1e9);
+    let cameras = [clock(1e12), clock(1e12)];
+    let mut trains = Vec::new();
+    let mut presses = Vec::new();
+    let mut free_us = 0.0;
+    let mut send = |at_us: f64, label: Label, trains: &mut Vec<(f64, Label)>| {
+        let at_us = f64::max(at_us, free_us);
+        free_us = at_us + 14_000.0;
+        trains.push((at_us, label));
+    };
+    let seconds = c.span_s as u32;
+    for second in 0..seconds {
+        let begin = f64::from(second) * 1e6 + 20_000.0;
+        send(begin, Label::Sync(second), &mut trains);
+        if second % 2 == 0 {
+            let contact = begin + r.between(50_000.0, 300_000.0);
+            presses.push(contact);
+            for (after, kind) in [
+                (0.0, MarkKind::Contact),
+                (150_000.0, MarkKind::AtDepth),
+                (500_000.0, MarkKind::Release),
+            ] {
+                let mark = Mark {
+                    kind,
+                    press: PressId(second / 2),
+                };
+                send(contact + after, Label::Mark(mark), &mut trains);
+            }
+        }
+    }
+    let mut reports = Vec::new();
+    for k in 0..seconds * 10 {
+        let sent = f64::from(k) * 1e5;
+        // A serial line: 150 µs at least, mostly more, sometimes much more.
+        let mut delay = || 150.0 - 100.0 * r.between(0.0, 1.0).max(1e-9).ln();
+        let read = sent + delay();
+        let received = read + delay();
+        let at = BoxTime {
+            us: boxed.at(read) as u64,
+        };
+        reports.push(BoxReport::Exchange {
+            sent: HostTime((sent * 1e3) as i64),
+            received: HostTime((received * 1e3) as i64),
+            at,
+        });
+    }
+    let mut edges = [Vec::new(), Vec::new()];
+    for (at_us, label) in &trains {
+        let start = boxed.at(*at_us);
+        let at = BoxTime { us: start as u64 };
+        reports.push(match *label {
+            Label::Mark(mark) => BoxReport::Mark { mark, at },
+            Label::Sync(count) => BoxReport::Sync { count, at },
+        });
+        for (camera, edges) in cameras.iter().zip(&mut edges) {
+            let mut put = |host_us: f64, rising: bool| {
+                edges.push(TriggerEdge {
+                    t_us: camera.at(host_us) as u64,
+                    channel: 0,
+                    rising,
+                });
+            };
+            for (offset, rising) in PulseTrain::of(*label).unwrap().edges() {
+                // The box counts the offset on its own clock.
+                let host_us = at_us + offset as f64 / (1.0 + boxed.drift);
+                let late = r.between(0.0, c.jitter_us);
+                if r.between(0.0, 1.0) >= c.lost {
+                    put(host_us + late, rising);
+                }
+                if r.between(0.0, 1.0) < c.doubled {
+                    put(host_us + late + r.between(1.0, 10.0), rising);
+                }
+                if r.between(0.0, 1.0) < c.spurious {
+                    let up = r.between(0.0, 1.0) < 0.5;
+                    put(at_us + r.between(0.0, PulseTrain::DURATION_US as f64), up);
+                }
+            }
+        }
+    }
+    edges.iter_mut().for_each(|e| e.sort_by_key(|e| e.t_us));
+    Bench {
+        boxed,
+        cameras,
+        reports,
+        edges,
+        presses,
+    }
+}
+
+impl Bench {
+    fn align(&self, limits: &AlignmentSettings) -> TimeBase {
+        let ties = Ties {
+            reports: &self.reports,
+            edges: [&self.edges[0], &self.edges[1]],
+            channel: 0,
+            used_at_us: &self.presses,
+        };
+        TimeBase::new(&ties, limits).unwrap()
+    }
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values[values.len() / 2]
+}
+
+/// What one bench says of itself, and how it really was.
+struct Judged {
+    /// Errors of both cameras over the box's clock at one press, µs, with the half width stated.
+    errors: [(f64, f64); 2],
+    host_inside: bool,
+    held_out_coverage: f64,
+}
+
+fn judge(seed: u64) -> Judged {
+    let b = bench(seed, &NOISY);
+    let base = b.align(&AlignmentSettings::default());
+    let a = &base.alignment;
+    assert_eq!(a.status, AlignmentStatus::Valid, "seed {seed}: {a:#?}");
+    // A wrong label is wrong by a train's length at least.
+    for (one, two) in base.shared_trains() {
+        let host_us = (one - b.cameras[0].origin_us) / (1.0 + b.cameras[0].drift);
+        let off = two - b.cameras[1].at(host_us);
+        assert!(off.abs() < 500.0, "seed {seed}: {off} µs");
+    }
+    for (k, line) in a.lines.iter().enumerate() {
+        assert!(line.trains_seen > 90, "seed {seed}: {line:?}");
+        let lost = line.share(line.lost);
+        assert!(
+            (0.16..0.24).contains(&lost),
+            "seed {seed}, camera {k}: {line:?}"
+        );
+        let extra = line.share(line.doubled + line.spurious);
+        assert!(
+            (0.04..0.10).contains(&extra),
+            "seed {seed}, camera {k}: {line:?}"
+        );
+    }
+    // One press of each bench, so that benches count, not presses.
+    let at = b.presses[seed as usize % b.presses.len()];
+    let box_us = b.boxed.at(at);
+    let (host, host_half) = base.host_us_of_box(box_us as u64).unwrap();
+    let errors = [0, 1].map(|k| {
+        let camera = &b.cameras[k];
+        let (found, half) = base.camera_us(k, at).unwrap();
+        assert!(
+            (found - camera.at(at)).abs() <= half,
+            "seed {seed}: over the host's clock"
+        );
+        let (found, half) = base.camera_us_of_box(k, box_us as u64).unwrap();
+        (found - camera.at(at - box_us.fract()), half)
+    });
+    let map = |name| a.maps.iter().find(|m| m.map == name).unwrap();
+    Judged {
+        errors,
+        host_inside: (host - at).abs() <= host_half + 1.0,
+        held_out_coverage: map(MapName::Camera1FromBox).coverage.unwrap(),
+    }
+}
+
+/// 500 benches with drifts up to 500 ppm, jitter, 20 % of the edges lost and 5 % spurious.
+#[test]
+fn labels_are_right_and_errors_within_what_is_stated_on_500_noisy_benches() {
+    let judged: Vec<Judged> = (0..500u64).into_par_iter().map(judge).collect();
+    assert!(judged.iter().all(|j| j.host_inside));
+    let errors = || judged.iter().flat_map(|j| j.errors);
+    let inside = errors().filter(|(off, half)| off.abs() <= *half).count();
+    assert!(inside >= 950, "{inside} of 1000 inside");
+    let typical = median(errors().map(|(off, _)| off.abs()).collect());
+    assert!(typical < 2.0, "median error {typical} µs");
+    let widest = errors().fold(0.0, |m: f64, (_, half)| m.max(half));
+    assert!(widest < 5.0, "half width {widest} µs");
+    let mean = judged.iter().map(|j| j.held_out_coverage).sum::<f64>() / 500.0;
+    assert!((0.92..0.98).contains(&mean), "held-out coverage {mean}");
+}
+
+fn status(b: &Bench, limits: &AlignmentSettings) -> (AlignmentStatus, String) {
+    let a = b.align(limits).alignment;
+    (a.status, a.violations.join("; "))
+}
+
+#[test]
+fn a_session_beyond_any_limit_is_invalid_and_says_which() {
+    let clean = bench(1, &CLEAN);
+    let limits = AlignmentSettings::default();
+    assert_eq!(
+        status(&clean, &limits),
+        (AlignmentStatus::Valid, String::new())
+    );
+    let noisy = bench(1, &NOISY);
+    for (limits, said) in [
+        (
+            AlignmentSettings {
+                max_residual_us: 0.01,
+                ..limits
+            },
+            "residual rms",
+        ),
+        (
+            AlignmentSettings {
+                max_camera_interval_us: 1.0,
+                ..limits
+            },
+            "95 % interval at the presses",
+        ),
+        (
+            AlignmentSettings {
+                max_host_interval_us: 100.0,
+                ..limits
+            },
+            "host from box, interval",
+        ),
+        (
+            AlignmentSettings {
+                max_drift_ppm: 0.001,
+                ..limits
+            },
+            "drift",
+        ),
+        (
+            AlignmentSettings {
+                max_lost: 0.1,
+                ..limits
+            },
+            "lost edges",
+        ),
+        (
+            AlignmentSettings {
+                max_spurious: 0.01,
+                ..limits
+            },
+            "doubled and spurious edges",
+        ),
+        (
+            AlignmentSettings {
+                min_coverage: 1.0,
+                ..limits
+            },
+            "share outside the stated interval",
+        ),
+    ] {
+        let (found, words) = status(&noisy, &limits);
+        assert_eq!(found, AlignmentStatus::Invalid, "{said}");
+        assert!(words.contains(said), "{said}: {words}");
+    }
+    // No edge of one camera, as when its cable is off.
+    let mut dead = bench(2, &CLEAN);
+    dead.edges[1].clear();
+    let (found, words) = status(&dead, &limits);
+    assert_eq!(found, AlignmentStatus::Invalid);
+    assert!(words.contains("camera 2 from box"), "{words}");
+    // The wrong camera's cable: another bench's trains have the same names at other times.
+    let mut swapped = bench(3, &CLEAN);
+    swapped.edges[0] = bench(4, &CLEAN).edges[0].clone();
+    assert_eq!(status(&swapped, &limits).0, AlignmentStatus::Invalid);
+    // No exchange with the host.
+    let mut silent = bench(5, &CLEAN);
+    silent
+        .reports
+        .retain(|r| !matches!(r, BoxReport::Exchange { .. }));
+    let (found, words) = status(&silent, &limits);
+    assert_eq!(found, AlignmentStatus::Invalid);
+    assert!(words.contains("host from box"), "{words}");
+    // A host clock that jumped in the middle.
+    let mut jumped = bench(6, &CLEAN);
+    for report in &mut jumped.reports {
+        if let BoxReport::Exchange { sent, received, .. } = report
+            && sent.0 > 20_000_000_000
+        {
+            sent.0 += 50_000_000;
+            received.0 += 50_000_000;
+        }
+    }
+    assert_eq!(status(&jumped, &limits).0, AlignmentStatus::Invalid);
+}
+
+#[test]
+fn nothing_is_certified_without_a_press_and_nothing_is_said_without_a_box() {
+    let mut b = bench(7, &CLEAN);
+    b.presses.clear();
+    b.edges[0].clear();
+    assert_eq!(
+        status(&b, &AlignmentSettings::default()).0,
+        AlignmentStatus::NotCertified
+    );
+    let ties = Ties {
+        reports: &[],
+        edges: [&[], &[]],
+        channel: 0,
+        used_at_us: &[1.0],
+    };
+    assert_eq!(TimeBase::new(&ties, &AlignmentSettings::default()), None);
+}
+
+#[test]
+fn a_reset_of_the_box_in_the_middle_is_bridged() {
+    // Two benches after one another; the box goes on counting its trains, its clock starts anew.
+    let mut b = bench(8, &NOISY);
+    let half_us = 21e6;
+    let jump_us = b.boxed.at(half_us) as u64 - 5_000;
+    let late = |us: u64| us > jump_us;
+    let at_of = |r: &BoxReport| match *r {
+        BoxReport::Exchange { at, .. }
+        | BoxReport::Mark { at, .. }
+        | BoxReport::Sync { at, .. }
+        | BoxReport::Input { at, .. } => at.us,
+        BoxReport::Reset { .. } => 0,
+    };
+    let (mut after, before): (Vec<_>, Vec<_>) =
+        b.reports.iter().copied().partition(|r| late(at_of(r)));
+    for report in &mut after {
+        match report {
+            BoxReport::Exchange { at, .. }
+            | BoxReport::Mark { at, .. }
+            | BoxReport::Sync { at, .. }
+            | BoxReport::Input { at, .. } => at.us -= jump_us,
+            BoxReport::Reset { .. } => {}
+        }
+    }
+    let noticed = HostTime((half_us * 1e3) as i64);
+    b.reports = [before, vec![BoxReport::Reset { noticed }], after].concat();
+    let base = b.align(&AlignmentSettings::default());
+    assert_eq!(
+        (base.alignment.status, base.alignment.resets),
+        (AlignmentStatus::Valid, 1),
+        "{:#?}",
+        base.alignment
+    );
+    for at in &b.presses {
+        for (k, camera) in b.cameras.iter().enumerate() {
+            let (found, half) = base.camera_us(k, *at).unwrap();
+            assert!((found - camera.at(*at)).abs() <= half, "{at}");
+        }
+    }
+}

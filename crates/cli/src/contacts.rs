@@ -1,0 +1,117 @@
+//! How well the measured contacts of a session are timed by its pose stream.
+
+use skinrig_model::{HostDuration, HostTime, PoseSample, PressOutcome};
+use skinrig_recorder::{RecorderError, SessionReader};
+
+/// Contacts that are looked at, at most, evenly spread.
+const MOST: usize = 100;
+/// The pose is read this far to either side of a contact, ms.
+const SIDE_MS: i64 = 20;
+/// The tip's path is taken as straight this far to either side of a contact, ms.
+const STRAIGHT_MS: i64 = 5;
+
+/// (RMS interval between the two pose samples around a measured contact, RMS standard error of the instant at which the
+/// pose crossed the surface), µs: the contact is interpolated between those samples, and each sample is noisy. `None`
+/// without measured contacts.
+///
+/// # Errors
+/// When the poses cannot be read.
+pub fn timing(
+    reader: &SessionReader,
+    outcomes: &[Option<PressOutcome>],
+) -> Result<(Option<f64>, Option<f64>), RecorderError> {
+    let side = HostDuration::from_millis(SIDE_MS);
+    let measured = outcomes.iter().flatten().filter(|o| !o.scheduled);
+    let contacts: Vec<HostTime> = measured.filter_map(|o| Some(o.timing?.contact)).collect();
+    let (mut intervals, mut errors) = (Squares::default(), Squares::default());
+    for contact in contacts
+        .iter()
+        .step_by(contacts.len().div_ceil(MOST).max(1))
+    {
+        let poses = reader.poses(*contact - side, *contact + side)?;
+        let after = poses.partition_point(|p| p.t < *contact);
+        if let Some([before, after]) = poses.get(after.saturating_sub(1)..=after) {
+            intervals.add((after.t.0 - before.t.0) as f64 * 1e-3);
+        }
+        if let Some(error_us) = crossing_se_us(&poses, *contact) {
+            errors.add(error_us);
+        }
+    }
+    Ok((intervals.rms(), errors.rms()))
+}
+
+/// Standard error of the instant at which a straight line through the heights about `contact` is at the line's height
+/// there, µs: that of the height over the speed. `None` when the tip does not move.
+fn crossing_se_us(poses: &[PoseSample], contact: HostTime) -> Option<f64> {
+    let near = HostDuration::from_millis(STRAIGHT_MS);
+    let points: Vec<(f64, f64)> = poses
+        .iter()
+        .filter(|p| contact - near <= p.t && p.t <= contact + near)
+        .map(|p| ((p.t - contact).as_secs_f64(), p.measured.z_mm))
+        .collect();
+    let n = points.len() as f64;
+    if points.len() < 4 {
+        return None;
+    }
+    let (mean_t, mean_z) = (
+        points.iter().map(|p| p.0).sum::<f64>() / n,
+        points.iter().map(|p| p.1).sum::<f64>() / n,
+    );
+    let spread: f64 = points.iter().map(|p| (p.0 - mean_t).powi(2)).sum();
+    let product: f64 = points.iter().map(|p| (p.0 - mean_t) * (p.1 - mean_z)).sum();
+    let speed_mm_s = product / spread;
+    let squares: f64 = points
+        .iter()
+        .map(|p| (p.1 - mean_z - speed_mm_s * (p.0 - mean_t)).powi(2))
+        .sum();
+    let height_se_mm = (squares / (n - 2.0) * (1.0 / n + mean_t * mean_t / spread)).sqrt();
+    let error_us = height_se_mm / speed_mm_s.abs() * 1e6;
+    error_us.is_finite().then_some(error_us)
+}
+
+/// Squares of values.
+#[derive(Default)]
+struct Squares {
+    sum: f64,
+    n: u32,
+}
+
+impl Squares {
+    fn add(&mut self, value: f64) {
+        self.sum += value * value;
+        self.n += 1;
+    }
+
+    fn rms(&self) -> Option<f64> {
+        (self.n > 0).then(|| (self.sum / f64::from(self.n)).sqrt())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use skinrig_model::Point3;
+
+    #[test]
+    fn a_crossing_is_known_to_the_noise_over_the_speed() {
+        let pose = |ms: i64, z_mm: f64| {
+            let at = Point3::new(0.0, 0.0, z_mm);
+            PoseSample {
+                t: HostTime(1_000_000_000 + ms * 1_000_000),
+                commanded: at,
+                measured: at,
+                force_n: 0.0,
+            }
+        };
+        // 20 mm/s downwards, heights off by 10 µm up and down: residuals of 10 µm, 11 samples.
+        let off = |ms: i64| if ms % 2 == 0 { 0.01 } else { -0.01 };
+        let poses: Vec<_> = (-20..=20)
+            .map(|ms| pose(ms, -0.02 * ms as f64 + off(ms)))
+            .collect();
+        let found = crossing_se_us(&poses, HostTime(1_000_000_000)).unwrap();
+        let wanted = 10.0 * (11.0f64 / 9.0).sqrt() / 11f64.sqrt() / 20.0 * 1e3;
+        assert!((found / wanted - 1.0).abs() < 0.02, "{found} {wanted}");
+        let still: Vec<_> = (-20..=20).map(|ms| pose(ms, 1.0)).collect();
+        assert_eq!(crossing_se_us(&still, HostTime(1_000_000_000)), None);
+    }
+}

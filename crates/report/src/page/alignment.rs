@@ -1,0 +1,101 @@
+//! Owns the tables of the alignment certificate.
+
+use skinrig_analysis::result::{Alignment, AlignmentStatus, Analysis};
+
+use super::grid::Grid;
+use crate::format::{NONE, number};
+
+/// One row per map between two clocks.
+pub(super) fn maps(a: &Analysis) -> Option<Grid> {
+    let certificate = &a.alignment;
+    if certificate.maps.is_empty() {
+        return None;
+    }
+    let mut grid = Grid::new(
+        "alignment",
+        "Alignment certificate",
+        &[
+            "Clock on clock",
+            "#drift (ppm)",
+            "#residual, rms (µs)",
+            "#largest (µs)",
+            "#95 % interval at presses (µs)",
+            "#held-out coverage (%)",
+            "#points (left out)",
+            "#pieces",
+        ],
+    );
+    for map in &certificate.maps {
+        let or_none =
+            |value: Option<f64>, digits| value.map_or(NONE.to_owned(), |v| number(Some(v), digits));
+        grid.row([
+            map.map.name().to_owned(),
+            or_none(map.drift_ppm, 3),
+            or_none(map.residual_rms_us, 2),
+            or_none(map.residual_max_us, 2),
+            map.interval_us.map_or(NONE.to_owned(), |(usual, largest)| {
+                format!(
+                    "± {} (largest {})",
+                    number(Some(usual), 1),
+                    number(Some(largest), 1)
+                )
+            }),
+            or_none(map.coverage.map(|share| 100.0 * share), 1),
+            format!("{} ({})", map.n, map.rejected),
+            map.pieces.to_string(),
+        ]);
+    }
+    grid.note(words(certificate));
+    grid.note(
+        "The interval of host from box holds for certain: the box's clock was read between two instants of the host. Robot \
+         from host is the identity with a stated delay. A constant delay of the trigger inputs cannot be seen here beyond \
+         what the interval allows for.",
+    );
+    Some(grid)
+}
+
+/// One row per camera: what became of the edges.
+pub(super) fn lines(a: &Analysis) -> Option<Grid> {
+    let lines = &a.alignment.lines;
+    if lines.is_empty() {
+        return None;
+    }
+    let mut grid = Grid::new(
+        "trigger-lines",
+        "Trigger inputs",
+        &[
+            "Camera",
+            "#trains sent",
+            "#trains seen",
+            "#edges sent",
+            "#lost",
+            "#doubled",
+            "#spurious",
+        ],
+    );
+    for (k, line) in lines.iter().enumerate() {
+        let share = |n: u64| format!("{n} ({} %)", number(Some(100.0 * line.share(n)), 2));
+        grid.row([
+            format!("camera {}", k + 1),
+            line.trains_sent.to_string(),
+            line.trains_seen.to_string(),
+            line.sent.to_string(),
+            share(line.lost),
+            share(line.doubled),
+            share(line.spurious),
+        ]);
+    }
+    grid.note("Counted from the first train that a camera saw to the last.");
+    Some(grid)
+}
+
+/// The verdict in one sentence.
+pub(crate) fn words(certificate: &Alignment) -> String {
+    match certificate.status {
+        AlignmentStatus::Valid => "Valid: every figure is within its limit.".to_owned(),
+        AlignmentStatus::Invalid => format!("INVALID: {}.", certificate.violations.join("; ")),
+        AlignmentStatus::NotCertified => {
+            "Not certified: the session has no usable reports of a trigger box.".to_owned()
+        }
+    }
+}
