@@ -150,7 +150,7 @@ fn triggers(input: &SessionInput, analysis: &Analysis) -> Vec<Finding> {
     }
     let lost = |camera: CameraId| {
         let clock = analysis.clocks[camera.index()];
-        let used = clock.filter(|c| c.method == ClockMethod::TriggerMarks);
+        let used = clock.filter(|c| c.method != ClockMethod::EventRates);
         let used = used.map_or(0, |c| c.n);
         let edges = input.edges[camera.index()].iter();
         let edges = edges.filter(|e| e.channel == channel).count();

@@ -109,20 +109,17 @@ impl TimeBase {
             camera_from_host: [0, 1].map(|k| base.knots(k)),
         };
         // What could not be mapped matters where the session has presses.
-        if !ties.used_at_us.is_empty() {
-            for at in ties.used_at_us {
-                for k in 0..2 {
-                    if base.at(*at).is_none_or(|p| p.cameras[k].is_none()) {
-                        violations.push(format!(
-                            "camera {} from host: expected a map at {:.3} s, found none",
-                            k + 1,
-                            at * 1e-6
-                        ));
-                    }
-                }
+        for k in 0..2 {
+            let unknown = |at: &&f64| base.at(**at).is_none_or(|p| p.cameras[k].is_none());
+            if let Some(at) = ties.used_at_us.iter().find(unknown) {
+                violations.push(format!(
+                    "camera {} from host: expected a map at {:.3} s, found none",
+                    k + 1,
+                    at * 1e-6
+                ));
             }
-            // One line each is enough.
-            violations.dedup_by(|a, b| a[..18.min(a.len())] == b[..18.min(b.len())]);
+        }
+        if !ties.used_at_us.is_empty() {
             violations.extend(beyond(&alignment, limits));
         }
         if !violations.is_empty() {

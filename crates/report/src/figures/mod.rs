@@ -152,11 +152,12 @@ impl<'a> Canvas<'a> {
     /// Writes the foot line (session, simulated or not, n) and closes.
     fn finish(mut self, n: &str, table: &'static str, interaction: &'static str) -> Figure {
         let p = &self.input.provenance;
-        let id = or_missing(&p.session_id);
-        let foot = match p.stand_in() {
-            Some(word) => format!("session {id} · {word} rig"),
-            None => format!("session {id}"),
-        };
+        let stand_in = p
+            .stand_in()
+            .map_or_else(String::new, |word| format!(" · {word} rig"));
+        let usable = self.input.analysis.alignment.is_usable();
+        let invalid = if usable { "" } else { "INVALID · " };
+        let foot = format!("{invalid}session {}{stand_in}", or_missing(&p.session_id));
         let (w, h) = self.size;
         self.svg.text((10.0, h - 8.0), "foot", "start", &foot);
         self.svg.text((w - 10.0, h - 8.0), "foot", "end", n);

@@ -226,6 +226,11 @@ fn grids(input: &ReportInput<'_>) -> BTreeMap<&'static str, Value> {
         ("reference_reduction", comparison::reference_reduction(a)),
     ]
     .into_iter()
+    // Of an invalid session only what says why.
+    .filter(|(name, _)| {
+        a.alignment.is_usable()
+            || ["alignment", "trigger_lines", "msows", "skins", "sensors"].contains(name)
+    })
     .filter_map(|(name, grid)| Some((name, Value::from(Serde(grid?)))))
     .collect()
 }
@@ -234,7 +239,7 @@ fn grids(input: &ReportInput<'_>) -> BTreeMap<&'static str, Value> {
 fn contents(input: &ReportInput<'_>) -> Vec<(&'static str, &'static str)> {
     let a = input.analysis;
     let single = !a.pictures.is_empty() || !a.zooms.is_empty();
-    let rates = a.bit_rates.is_some() || a.cmre.is_some();
+    let rates = a.alignment.is_usable() && (a.bit_rates.is_some() || a.cmre.is_some());
     [
         ("results", "Results", true),
         ("provenance", "Provenance", true),

@@ -288,7 +288,7 @@ pub(crate) fn table(input: &ReportInput<'_>, color: bool) -> String {
             c.sync
         );
     }
-    if f.failures > 0 {
+    if usable && f.failures > 0 {
         let text = format!(
             "{} failed, each counted as {} mm where failures count",
             f.failures,
@@ -302,7 +302,9 @@ pub(crate) fn table(input: &ReportInput<'_>, color: bool) -> String {
         out += &clock_lines(i + 1, clock.as_ref());
     }
     out += &alignment_lines(&a.alignment);
-    out += &studies::calibration(a);
+    if usable {
+        out += &studies::calibration(a);
+    }
     for (i, lost) in p.lost_bytes.iter().enumerate().filter(|(_, l)| **l > 0) {
         let text = format!("camera {}: {} bytes lost", i + 1, grouped(*lost));
         out += &paint.warn(&wrap("loss      ", &text));
@@ -316,7 +318,11 @@ pub(crate) fn table(input: &ReportInput<'_>, color: bool) -> String {
         let text = plain(&text);
         out += &paint.warn(&wrap("event     ", &text));
     }
-    let studies = studies::all(a);
+    let studies = if usable {
+        studies::all(a)
+    } else {
+        wrap("studies   ", "withheld: the session is INVALID")
+    };
     if !studies.is_empty() {
         out.push('\n');
         out += &studies;
