@@ -19,8 +19,11 @@ pub struct MayBeLive {
     pub last: String,
 }
 
-/// Brakes the arm: stops the regulation; if that is refused or the motors stay live, takes the force away directly;
-/// waits and tries again. Returns the number of attempts.
+/// Brakes the arm: stops the regulation; if that is refused, or the status does not show the motors off after it, takes
+/// the force away directly; waits and tries again. Returns the number of attempts.
+///
+/// What the library does when asked to stop a regulation that this process never started is not documented: a success
+/// is never believed without the status.
 ///
 /// # Errors
 /// [`MayBeLive`] after all attempts.
@@ -47,14 +50,26 @@ pub fn brake(
 }
 
 fn attempt_to_brake(sdk: &dyn Sdk, id: DeviceId) -> Result<(), String> {
-    if let Err(refused) = sdk.stop(id) {
-        // Both, whatever the first one answers: each alone may do.
-        let stopped = sdk.emergency_stop(id);
-        let off = sdk.force_off(id);
-        stopped
-            .and(off)
-            .map_err(|e: CallError| format!("{refused}, then {e}"))?;
+    let stopped = sdk.stop(id);
+    if stopped.is_ok() && confirmed_off(sdk, id).is_ok() {
+        return Ok(());
     }
+    // Both, whatever the first one answers: each alone may do.
+    let halted = sdk.emergency_stop(id);
+    let off = sdk.force_off(id);
+    let direct = halted.and(off);
+    if let Err(refused) = stopped {
+        direct.map_err(|e: CallError| format!("{refused}, then {e}"))?;
+        return confirmed_off(sdk, id);
+    }
+    confirmed_off(sdk, id).map_err(|why| match direct {
+        Ok(()) => why,
+        Err(e) => format!("{why}, and {e}"),
+    })
+}
+
+/// Whether the status says that the motors are off.
+fn confirmed_off(sdk: &dyn Sdk, id: DeviceId) -> Result<(), String> {
     match sdk.status(id) {
         Ok(status) if status.is(StatusField::Force) => {
             Err("it confirmed, but its status says that the motors are live".to_owned())

@@ -209,6 +209,10 @@ pub struct Trips {
     pub min_control_khz: f64,
     /// How far outside the run's box the tip may be measured, mm.
     pub box_margin_mm: f64,
+    /// Longest time without a poll or a command while the motors are live: whoever drives the arm may hang while the
+    /// regulation goes on pushing. 2 s is far above the milliseconds between two polls, and bounds how long the skin
+    /// is pressed unseen.
+    pub max_unwatched: Duration,
 }
 
 impl Default for Trips {
@@ -224,6 +228,7 @@ impl Default for Trips {
             max_silence: Duration::from_millis(200),
             min_control_khz: 1.0,
             box_margin_mm: 2.0,
+            max_unwatched: Duration::from_secs(2),
         }
     }
 }
@@ -319,6 +324,12 @@ impl OmegaConfig {
             ("trips.box_margin_mm", t.box_margin_mm),
         ] {
             positive(name, value)?;
+        }
+        for (name, time) in [
+            ("trips.max_silence", t.max_silence),
+            ("trips.max_unwatched", t.max_unwatched),
+        ] {
+            positive(name, time.as_secs_f64())?;
         }
         let within = |name, value: f64, low: f64, high: f64| {
             let words = format!("{low} to {high}");
@@ -416,7 +427,7 @@ mod tests {
     fn the_defaults_are_sound_and_nonsense_is_named() {
         assert_eq!(OmegaConfig::default().check(), Ok(()));
         type Spoil = fn(&mut OmegaConfig);
-        let spoilt: [(&str, Spoil); 10] = [
+        let spoilt: [(&str, Spoil); 11] = [
             ("envelope.least_ratio", |c| c.envelope.max_ratio = 0.01),
             ("envelope.min_mm", |c| c.envelope.min_mm[2] = f64::NAN),
             ("envelope.max_force_n", |c| c.envelope.max_force_n = 13.0),
@@ -425,6 +436,9 @@ mod tests {
             }),
             ("motion.cycle_hz", |c| c.motion.cycle_hz = 100.0),
             ("trips.max_deviation_mm", |c| c.motion.max_lead_mm = 9.0),
+            ("trips.max_unwatched", |c| {
+                c.trips.max_unwatched = Duration::ZERO;
+            }),
             ("gains", |c| c.gains.p = Some(-1.0)),
             ("watchdog", |c| c.watchdog = Watchdog::Off),
             ("watchdog", |c| {

@@ -8,7 +8,7 @@ use skinrig_drd_abi::{ErrorCode, ForceOffCause, StatusField};
 use skinrig_model::{DeviceRole, HostDuration, HostTime, Point3, Robot, Setting};
 
 use crate::brake::{MayBeLive, brake};
-use crate::config::{OmegaConfig, Trips};
+use crate::config::{OmegaConfig, Patience, Trips};
 use crate::correction::Correction;
 use crate::monitor::{Freshness, Monitor, Trip};
 use crate::open::{NotSet, Opened};
@@ -50,6 +50,9 @@ struct Armed {
     tare: Tare,
     last: HostTime,
     heard: HostTime,
+    watched: HostTime,
+    /// The cause that the device told when it was armed, of some earlier time.
+    old_cause: Option<ForceOffCause>,
     tip: Point3<Robot>,
     status_due: HostTime,
     control_due: HostTime,
@@ -125,7 +128,7 @@ impl<C: Clock> Engine<C> {
     }
 
     fn of_trip(&self, trip: &Trip) -> DeviceError {
-        if trip.is_loss() {
+        if trip.is_loss() || matches!(trip, Trip::NotBraked(_)) {
             self.lost(trip)
         } else {
             self.wrong_state("armed", format!("braked: {trip}"))
@@ -144,6 +147,7 @@ impl<C: Clock> Engine<C> {
 
     /// Writes the limits and reads them back.
     pub(crate) fn configure(&mut self, wanted: &MotionLimits) -> Result<Vec<Setting>, DeviceError> {
+        self.stream.watch();
         if let State::Lost(trip) = &self.state {
             return Err(self.lost(trip));
         }
@@ -204,13 +208,13 @@ impl<C: Clock> Engine<C> {
                         "still, to take the force at rest as zero",
                         "moving or without new readings; see that the arm hangs free",
                     );
-                    self.state = State::Parked;
                     return Err(self.brake_after(e));
                 }
                 _ => {
                     // The failure is told here, and not again by the next poll.
                     let failure = self.stream.failure();
-                    if matches!(self.state, State::Tripped(_)) {
+                    if matches!(&self.state, State::Tripped(trip) if !matches!(trip, Trip::NotBraked(_)))
+                    {
                         self.state = State::Parked;
                         self.stream.heal();
                     }
@@ -246,7 +250,7 @@ impl<C: Clock> Engine<C> {
             return Err(self.wrong_state("at a known position", "without one (not a number)"));
         }
         regulation::start(&*sdk, id, &self.config, limits).map_err(|e| self.not_set(e))?;
-        let khz = self.await_regulation()?;
+        let (khz, old_cause) = self.await_regulation()?;
         // A braked arm sinks: the set point begins where the regulation holds it now.
         let now = self.clock.now();
         let here = sdk.regulated_position(id).map_err(|e| self.of_call(e))?;
@@ -264,6 +268,8 @@ impl<C: Clock> Engine<C> {
             tare: Tare::Taking(Weighing::begin(now)),
             last: now,
             heard: now,
+            watched: now,
+            old_cause,
             tip,
             status_due: now,
             control_due: now + CONTROL_EVERY,
@@ -275,8 +281,9 @@ impl<C: Clock> Engine<C> {
         Ok(())
     }
 
-    /// Waits until the regulation runs, the motors are live and the loop is fast enough; gives its rate, kHz.
-    fn await_regulation(&mut self) -> Result<f64, DeviceError> {
+    /// Waits until the regulation runs, the motors are live and the loop is fast enough; gives its rate, kHz, and why
+    /// the device says that the motors went off the last time.
+    fn await_regulation(&mut self) -> Result<(f64, Option<ForceOffCause>), DeviceError> {
         let (sdk, id) = (Arc::clone(&self.sdk), self.opened.id);
         let least = self.config.trips.min_control_khz;
         let deadline = self.clock.now() + span(self.config.patience.regulation);
@@ -290,7 +297,7 @@ impl<C: Clock> Engine<C> {
             let live = status.is(StatusField::Force);
             let khz = sdk.control_khz(id).unwrap_or(0.0);
             if running && live && khz >= least {
-                return Ok(khz);
+                return Ok((khz, status.force_off_cause()));
             }
             if self.clock.now() >= deadline {
                 let found = if !running {
@@ -313,9 +320,21 @@ impl<C: Clock> Engine<C> {
     /// Brakes after `error`; tells both if that fails too.
     fn brake_after(&mut self, error: DeviceError) -> DeviceError {
         match self.brake() {
-            Ok(()) => error,
-            Err(live) => self.lost(format!("{error}; {live}")),
+            Ok(()) => {
+                self.state = State::Parked;
+                error
+            }
+            Err(live) => self.not_braked(format!("{error}; {live}")),
         }
+    }
+
+    /// The brake failed: nothing is commanded any more, every poll says so, and disarming tries again.
+    fn not_braked(&mut self, why: String) -> DeviceError {
+        let error = self.lost(&why);
+        self.state = State::Tripped(Trip::NotBraked(why));
+        self.stream.heal();
+        self.stream.fail(error.clone());
+        error
     }
 
     fn brake(&mut self) -> Result<(), MayBeLive> {
@@ -330,6 +349,7 @@ impl<C: Clock> Engine<C> {
 
     /// Sends the set point to `target`.
     pub(crate) fn go(&mut self, target: Point3<Robot>, speed_mm_s: f64) -> Result<(), DeviceError> {
+        self.stream.watch();
         let limits = self.limits;
         let (armed, limits) = match (&mut self.state, limits) {
             (State::Armed(armed), Some(limits)) => (armed, limits),
@@ -340,15 +360,15 @@ impl<C: Clock> Engine<C> {
             _ => return Err(self.wrong_state("armed", "disarmed")),
         };
         limits::check_command(&self.opened.serial, &limits, target, speed_mm_s)?;
-        let rises = target.z_mm > armed.tip.z_mm;
+        let rises = rises(armed.trajectory.set_point(), target);
         if !rises && (armed.must_rise || armed.overloaded) {
             return Err(limits::refused(
                 &self.opened.serial,
                 format!(
-                    "a target above the tip after more than {} N",
+                    "a target above the set point, and no further aside than above, after more than {} N",
                     limits.max_force_n
                 ),
-                format!("z = {} mm", target.z_mm),
+                format!("{target:?}"),
             ));
         }
         armed.rising = rises;
@@ -359,6 +379,7 @@ impl<C: Clock> Engine<C> {
 
     /// Brings the set point to rest.
     pub(crate) fn hold(&mut self) -> Result<(), DeviceError> {
+        self.stream.watch();
         match &mut self.state {
             State::Armed(armed) => {
                 armed.trajectory.hold();
@@ -372,12 +393,20 @@ impl<C: Clock> Engine<C> {
         }
     }
 
-    /// Motors off, brake on, faults forgotten.
+    /// Motors off, brake on, faults forgotten. When the robot does not confirm, it stays tripped.
     pub(crate) fn disarm(&mut self) -> Result<(), DeviceError> {
         if let State::Lost(trip) = &self.state {
             let error = self.lost(trip);
-            let _ = self.sdk.stop(self.opened.id);
+            let once = Patience {
+                brake_attempts: 1,
+                ..self.config.patience
+            };
+            // Best effort: it may be there again, and live.
+            let _ = brake(&*self.sdk, self.opened.id, &once, |_| ());
             return Err(error);
+        }
+        if let State::Armed(armed) = &mut self.state {
+            armed.trajectory.halt();
         }
         match self.brake() {
             Ok(()) => {
@@ -385,7 +414,7 @@ impl<C: Clock> Engine<C> {
                 self.stream.heal();
                 Ok(())
             }
-            Err(live) => Err(self.lost(live)),
+            Err(live) => Err(self.not_braked(live.to_string())),
         }
     }
 
@@ -412,12 +441,16 @@ impl<C: Clock> Engine<C> {
             {
                 self.why_regulation_ended()
             }
+            // It names what was the matter some earlier time.
+            Trip::ForceOff(cause) if Some(cause) == self.old_cause() => Trip::ForceOffAgain(cause),
             other => other,
         };
         self.stream.fail(self.of_trip(&trip));
         if let Err(live) = self.brake() {
-            self.stream.heal();
-            self.stream.fail(self.lost(format!("{trip}; {live}")));
+            let _ = self.not_braked(format!("{trip}; {live}"));
+            if !trip.is_loss() {
+                return;
+            }
         }
         self.state = if trip.is_loss() {
             State::Lost(trip)
@@ -426,11 +459,22 @@ impl<C: Clock> Engine<C> {
         };
     }
 
+    /// The cause that the device told already when it was armed.
+    fn old_cause(&self) -> Option<ForceOffCause> {
+        match &self.state {
+            State::Armed(armed) => armed
+                .old_cause
+                .filter(|cause| *cause != ForceOffCause::None),
+            _ => None,
+        }
+    }
+
     fn why_regulation_ended(&self) -> Trip {
         match self.sdk.status(self.opened.id) {
             Err(e) => Trip::Call(e),
             Ok(status) => match status.force_off_cause() {
                 None | Some(ForceOffCause::None | ForceOffCause::Software) => Trip::RegulationEnded,
+                cause if cause == self.old_cause() => Trip::RegulationEnded,
                 Some(cause) => Trip::ForceOff(cause),
             },
         }
@@ -476,12 +520,19 @@ impl<C: Clock> Engine<C> {
             return Err(Trip::RegulationEnded);
         }
         let now = clock.now();
-        let reading = sdk.regulated_position(id);
-        let Some(reading) = tolerate(&mut armed.hiccups, reading)? else {
-            return Ok(());
-        };
-        let Some(force) = tolerate(&mut armed.hiccups, sdk.force(id))? else {
-            return Ok(());
+        // Arming itself waits for nobody.
+        if stream.was_watched() || matches!(armed.tare, Tare::Taking(_)) {
+            armed.watched = now;
+        } else if now - armed.watched > span(config.trips.max_unwatched) {
+            let limit = config.trips.max_unwatched;
+            return Err(Trip::Unwatched { limit });
+        }
+        // One counter for both: the reading is good when position and force are.
+        let reading = sdk
+            .regulated_position(id)
+            .and_then(|reading| sdk.force(id).map(|force| (reading, force)));
+        let Some((reading, force)) = tolerate(&mut armed.hiccups, reading)? else {
+            return armed.not_silent(now, &config.trips);
         };
         let axes = config.mount.axes;
         let tip = axes.point_from_metres(reading.position_m);
@@ -526,15 +577,33 @@ impl<C: Clock> Engine<C> {
                 measured: tip,
                 force_n,
             });
-        } else if now - armed.heard > span(config.trips.max_silence) {
-            let limit = config.trips.max_silence;
+            return Ok(());
+        }
+        armed.not_silent(now, &config.trips)
+    }
+}
+
+/// Distance aside that a vertical rise may have, mm: far below what a tip of millimetres feels.
+const ASIDE_MM: f64 = 0.05;
+
+/// Whether the way from the set point to `target` leads up: at least as far up as aside. The set point, not the tip, is
+/// where the way begins: under load the tip lags behind, and a level way would seem to rise or to fall.
+fn rises(set_point: Point3<Robot>, target: Point3<Robot>) -> bool {
+    let [dx, dy, up] = std::array::from_fn(|i| target.to_array()[i] - set_point.to_array()[i]);
+    let aside = f64::hypot(dx, dy);
+    up > 0.0 && (up >= aside || aside <= ASIDE_MM)
+}
+
+impl Armed {
+    /// Checks that a reading was heard within the time.
+    fn not_silent(&self, now: HostTime, trips: &Trips) -> Result<(), Trip> {
+        let limit = trips.max_silence;
+        if now - self.heard > span(limit) {
             return Err(Trip::Silent { limit });
         }
         Ok(())
     }
-}
 
-impl Armed {
     /// Moves the set point on; gives what the regulation is told.
     fn advance(&mut self, dt_s: f64) -> Point3<Robot> {
         let tip = self.tip.to_array();

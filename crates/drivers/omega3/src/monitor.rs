@@ -30,8 +30,17 @@ pub enum Trip {
         /// Mean since the last look.
         found_khz: f64,
     },
+    /// Nobody polled or commanded the robot.
+    Unwatched {
+        /// For how long.
+        limit: Duration,
+    },
     /// The controller took the motors' power away.
     ForceOff(ForceOffCause),
+    /// The motors' power is away, and the controller names the cause that it already named before arming.
+    ForceOffAgain(ForceOffCause),
+    /// The robot did not confirm its brake.
+    NotBraked(String),
     /// The force is above the hard limit, N.
     Force {
         /// Hard limit.
@@ -109,7 +118,18 @@ impl fmt::Display for Trip {
                 f,
                 "the regulation loop is slow: expected {expected_khz} kHz or more, found {found_khz:.3}"
             ),
+            Self::Unwatched { limit } => write!(
+                f,
+                "nobody looked at the live arm for {limit:?}: the program that drives it hangs or its disk stalls; \
+                 see that the recording keeps up, then disarm and arm again"
+            ),
             Self::ForceOff(cause) => write!(f, "motors went off: {}", cause_words(*cause)),
+            Self::ForceOffAgain(cause) => write!(
+                f,
+                "motors went off without a new cause; the one told before arming was {}",
+                cause_words(*cause)
+            ),
+            Self::NotBraked(why) => write!(f, "{why}"),
             Self::Force { limit_n, found_n } => write!(
                 f,
                 "force: expected at most {limit_n:.2} N, found {found_n:.2} N"

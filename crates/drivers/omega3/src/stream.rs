@@ -18,6 +18,7 @@ struct Inside {
     samples: Vec<RobotSample>,
     dropped: u64,
     failure: Option<DeviceError>,
+    watched: bool,
 }
 
 impl Stream {
@@ -51,9 +52,20 @@ impl Stream {
         self.lock().failure.clone()
     }
 
+    /// Somebody looks after the robot.
+    pub(crate) fn watch(&self) {
+        self.lock().watched = true;
+    }
+
+    /// Whether somebody did since the last call; taking samples counts.
+    pub(crate) fn was_watched(&self) -> bool {
+        std::mem::take(&mut self.lock().watched)
+    }
+
     /// Moves all samples to the end of `into`; gives how many found no room since the last call.
     pub(crate) fn take(&self, into: &mut Vec<RobotSample>) -> u64 {
         let mut inside = self.lock();
+        inside.watched = true;
         into.append(&mut inside.samples);
         std::mem::take(&mut inside.dropped)
     }

@@ -4,14 +4,18 @@
 //! driver; when the pipe ends without a goodbye, the driver is dead and the device free: the supervisor opens it and
 //! brakes until the robot confirms. It has its own process group, so that Ctrl-C in a terminal does not end it first.
 //!
-//! It does not help against a driver that hangs while alive (the driver's own time limits do), nor against a broken
-//! computer (the device's watchdog does).
+//! It does not help against a program that hangs while alive. When the thread that owns the library hangs in a call, or
+//! the whole process is stopped, the device's watchdog does, as far as the vendor's own regulation thread stands still
+//! too; when whoever drives the arm stops polling, the engine does ([`crate::config::Trips::max_unwatched`]). Against a
+//! broken computer only the device's watchdog helps.
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, Command, Stdio};
 use std::sync::mpsc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
+
+use skinrig_drd_abi::SERIAL_UNKNOWN;
 
 use crate::brake::brake;
 use crate::config::{Patience, SupervisorCommand};
@@ -22,6 +26,9 @@ use crate::sdk::Sdk;
 const GREETING: &str = "skinrig supervise-arm 1";
 const READY: &str = "ready";
 const GOODBYE: &str = "goodbye";
+
+/// Longest time that a dismissed supervisor may take to end by itself.
+const DISMISSED_WITHIN: Duration = Duration::from_secs(2);
 
 /// The driver's end: the running supervisor.
 #[derive(Debug)]
@@ -78,9 +85,16 @@ impl Supervisor {
     pub(crate) fn dismiss(mut self) {
         let said = writeln!(self.pipe, "{GOODBYE}").and_then(|()| self.pipe.flush());
         drop(self.pipe);
-        if said.is_ok() {
-            let _ = self.child.wait();
+        let deadline = Instant::now() + DISMISSED_WITHIN;
+        while said.is_ok() && Instant::now() < deadline {
+            if !matches!(self.child.try_wait(), Ok(None)) {
+                return;
+            }
+            std::thread::sleep(Duration::from_millis(5));
         }
+        // It does not hear; there is nothing left to guard.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
     }
 }
 
@@ -203,27 +217,40 @@ fn rescue(sdk: &dyn Sdk, serial: Option<u16>) -> Result<u32, WatchError> {
     })
 }
 
-/// Opens the robot (every one, when its serial is not known) and brakes it.
-fn brake_all(sdk: &dyn Sdk, serial: Option<u16>, once: &Patience) -> Result<(), String> {
+/// Opens the robot and brakes it; every one whose serial is not known to be another is taken for it.
+pub(crate) fn brake_all(sdk: &dyn Sdk, serial: Option<u16>, once: &Patience) -> Result<(), String> {
     let count = sdk.device_count().map_err(|e| e.to_string())?;
-    let mut answer = Err(format!("it is not among the {count} connected devices"));
+    let mut braked = 0;
+    let mut problems = Vec::new();
     for index in 0..count {
         let id = match sdk.open(index) {
             Ok(id) => id,
             Err(e) => {
-                answer = Err(e.to_string());
+                problems.push(e.to_string());
                 continue;
             }
         };
         // A robot whose serial cannot be read may be the one: braking another one that is free harms nobody.
-        let ours = serial.is_none_or(|wanted| sdk.serial(id).is_ok_and(|found| found == wanted));
-        if ours {
-            answer = brake(sdk, id, once, |_| ()).map(drop).map_err(|e| e.last);
+        let found = sdk.serial(id).ok().filter(|s| *s != SERIAL_UNKNOWN);
+        let another = serial.is_some() && found.is_some() && found != serial;
+        if another {
+            let _ = sdk.close(id);
+            continue;
         }
+        let answer = brake(sdk, id, once, |_| ());
         let _ = sdk.close(id);
-        if ours && answer.is_ok() && serial.is_some() {
-            return Ok(());
+        match answer {
+            Ok(_) if serial.is_some() && found == serial => return Ok(()),
+            Ok(_) => braked += 1,
+            Err(e) => problems.push(e.last),
         }
     }
-    answer
+    if !problems.is_empty() {
+        // One that could not be opened or braked may be the one.
+        return Err(problems.join("; "));
+    }
+    if braked == 0 {
+        return Err(format!("it is not among the {count} connected devices"));
+    }
+    Ok(())
 }

@@ -232,6 +232,8 @@ pub enum Fault {
     Ignore(Setting),
     /// The next n calls of `drdStop` and of `dhdStop` fail.
     StopFails(u32),
+    /// `drdStop` answers 0 and does nothing unless a regulation runs: what the vendor's does then is not documented.
+    StopNeedsRegulation,
     /// The next n calls of `drdClose` fail.
     CloseFails(u32),
     /// The status vector has only this many words.

@@ -389,6 +389,123 @@ fn an_arm_that_rests_on_something_is_not_armed() {
 }
 
 #[test]
+fn an_arm_that_nobody_looks_at_is_braked_and_one_that_is_polled_is_not() {
+    let bench = Bench::armed();
+    bench.go([20.0, 0.0, 5.0], 20.0).unwrap();
+    for _ in 0..5 {
+        bench.run_ms(1900);
+        bench.poll();
+    }
+    bench.run_ms(1990);
+    assert_eq!(bench.stream.failure(), None);
+    assert!(bench.sdk.with(|s| s.live));
+    bench.run_ms(20);
+    assert!(!bench.sdk.with(|s| s.live));
+    let failure = bench.stream.failure().unwrap().to_string();
+    assert!(
+        failure.contains("nobody looked at the live arm for 2s"),
+        "{failure}"
+    );
+    // Braked, it may be left alone.
+    bench.ask(Engine::disarm).unwrap();
+    bench.run_ms(10_000);
+    assert_eq!(bench.stream.failure(), None);
+}
+
+#[test]
+fn a_way_aside_is_no_rise_however_far_the_arm_sags() {
+    let bench = Bench::armed();
+    // It hangs 1 mm below its set point.
+    bench
+        .sdk
+        .with(|s| (s.follows, s.position_m[2]) = (false, 0.009));
+    bench.go([25.0, 0.0, 10.0], 20.0).unwrap();
+    bench.run_ms(100);
+    bench.sdk.with(|s| s.force_n = [0.0, 0.0, 0.2 - 4.1]);
+    bench.run_ms(1);
+    let stopped = bench.sdk.with(|s| s.target_m);
+    bench.run_ms(50);
+    assert_eq!(bench.sdk.with(|s| s.target_m), stopped, "it went on");
+    let [x, y, _] = stopped.map(|m| m * 1e3);
+    for (to, allowed) in [
+        ([x, y, 10.0], false),
+        ([x + 5.0, y, 10.5], false),
+        ([x + 5.0, y, 20.0], true),
+        ([x, y, 20.0], true),
+    ] {
+        assert_eq!(bench.go(to, 20.0).is_ok(), allowed, "{to:?}");
+    }
+}
+
+#[test]
+fn forces_that_cannot_be_read_trip_though_positions_can() {
+    let bench = Bench::armed();
+    bench.sdk.fail("dhdGetForce", ErrorCode::TIMEOUT);
+    bench.run_ms(20);
+    let failure = bench.stream.failure().unwrap().to_string();
+    assert!(failure.contains("dhdGetForce"), "{failure}");
+    assert!(!bench.sdk.with(|s| s.live));
+}
+
+#[test]
+fn readings_that_fail_slowly_are_a_silence() {
+    let bench = Bench::armed();
+    bench.go([20.0, 0.0, 0.0], 5.0).unwrap();
+    bench
+        .sdk
+        .with(|s| s.fail.insert("dhdGetForce", (ErrorCode::TIMEOUT.0, 5)));
+    let mut clock = bench.clock.clone();
+    for _ in 0..4 {
+        // Each call takes 100 ms to fail.
+        let later = clock.now() + HostDuration::from_millis(100);
+        clock.wait_until(later);
+        bench.ask(Engine::tick);
+    }
+    let failure = bench.stream.failure().unwrap().to_string();
+    assert!(failure.contains("no new position"), "{failure}");
+}
+
+#[test]
+fn a_brake_that_fails_ends_the_motion_and_is_tried_again() {
+    let bench = Bench::armed();
+    bench.go([20.0, 0.0, -20.0], 20.0).unwrap();
+    bench.run_ms(50);
+    for call in ["drdStop", "dhdStop", "dhdEnableForce"] {
+        bench.sdk.fail(call, ErrorCode::DHC_BUSY);
+    }
+    let error = bench.ask(Engine::disarm).unwrap_err();
+    assert_eq!(bench.stream.failure(), Some(error));
+    let target = bench.sdk.with(|s| s.target_m);
+    bench.run_ms(100);
+    assert_eq!(bench.sdk.with(|s| s.target_m), target, "it moves on");
+    assert!(bench.go([20.0, 0.0, 20.0], 20.0).is_err());
+    bench.sdk.with(|s| s.fail.clear());
+    bench.ask(Engine::disarm).unwrap();
+    assert!(!bench.sdk.with(|s| s.live));
+    bench.ask(Engine::arm).unwrap();
+    assert_eq!(bench.stream.failure(), None);
+}
+
+#[test]
+fn a_cause_from_before_arming_is_not_taken_for_a_new_one() {
+    for (cause, ended, word) in [
+        (5, true, "regulation thread ended"),
+        (1, true, "regulation thread ended"),
+        (1, false, "without a new cause"),
+    ] {
+        let bench = Bench::new();
+        bench.sdk.with(|s| s.cause = cause);
+        bench.ask(|e| e.configure(&LIMITS)).unwrap();
+        bench.ask(Engine::arm).unwrap();
+        bench.sdk.with(|s| (s.running, s.live) = (!ended, false));
+        bench.run_ms(30);
+        let failure = bench.stream.failure().unwrap();
+        assert!(matches!(failure, DeviceError::State { .. }), "{failure}");
+        assert!(failure.to_string().contains(word), "{word}: {failure}");
+    }
+}
+
+#[test]
 fn a_stuck_arm_pulls_no_further_than_the_lead() {
     let bench = Bench::armed();
     bench.sdk.with(|s| s.follows = false);
@@ -425,7 +542,8 @@ fn a_robot_that_presses_to_its_front_has_the_robot_frame_turned() {
     bench.sdk.with(|s| s.force_n = [0.0; 3]);
     bench.ask(Engine::arm).unwrap();
     bench.go([5.0, -3.0, -25.0], 20.0).unwrap();
-    bench.run_ms(2000);
+    bench.run_ms(1900);
+    bench.poll();
     let at = bench.sdk.with(|s| s.position_m);
     let off: f64 = (0..3)
         .map(|i| (at[i] - [0.025, -0.003, 0.005][i]).abs())
@@ -442,7 +560,11 @@ fn a_robot_that_presses_to_its_front_has_the_robot_frame_turned() {
 #[test]
 fn an_unread_stream_is_bounded_and_counts_what_it_lost() {
     let bench = Bench::armed();
-    bench.run_ms(10_000);
+    for _ in 0..10 {
+        // Somebody is there, and takes no samples.
+        bench.ask(Engine::hold).unwrap();
+        bench.run_ms(1000);
+    }
     let (samples, dropped) = bench.poll();
     assert_eq!(samples.len(), crate::stream::CAPACITY);
     assert!(dropped > 3_000, "{dropped}");
@@ -459,6 +581,7 @@ fn late_cycles_slow_the_motion_and_never_lengthen_a_step() {
     for _ in 0..100 {
         let later = clock.now() + HostDuration::from_millis(50);
         clock.wait_until(later);
+        bench.poll();
         bench.ask(Engine::tick);
         let now = bench.sdk.with(|s| s.target_m);
         let step = (now[2] - last[2]).abs() * 1e3;

@@ -4,9 +4,10 @@ use skinrig_drd_abi::ErrorCode;
 
 use super::scripted::Scripted;
 use crate::OmegaConfig;
-use crate::config::{Initialise, SupervisorCommand, Watchdog};
+use crate::config::{Initialise, Patience, SupervisorCommand, Watchdog};
 use crate::enumerate;
 use crate::open::open;
+use crate::supervisor::brake_all;
 
 /// What is wrong, and words that the error must hold.
 type Obstacle = (fn(&Scripted), &'static [&'static str]);
@@ -164,4 +165,41 @@ fn motors_left_live_by_a_dead_program_are_braked_first() {
     let opened = open(&sdk, &OmegaConfig::default()).unwrap();
     assert!(!sdk.with(|s| s.live));
     assert!(opened.remarks.iter().any(|r| r.contains("were live")));
+}
+
+#[test]
+fn a_stop_that_only_answers_is_followed_by_the_direct_ones() {
+    let sdk = Scripted::default();
+    sdk.with(|s| (s.live, s.stop_needs_regulation) = (true, true));
+    open(&sdk, &OmegaConfig::default()).unwrap();
+    assert!(!sdk.with(|s| s.live));
+    let log = sdk.log();
+    let at = log.iter().position(|c| c == "drdStop").unwrap();
+    assert_eq!(log[at..at + 3], ["drdStop", "dhdStop", "dhdEnableForce"]);
+}
+
+#[test]
+fn a_rescue_brakes_every_robot_that_may_be_the_one_and_no_other() {
+    let once = Patience {
+        brake_attempts: 1,
+        ..Patience::default()
+    };
+    // Places 0 to 2 have the serial numbers 77 to 79.
+    for (wanted, nameless, opened, braked) in [
+        (Some(78), vec![], 2, 1),
+        (Some(78), vec![0], 2, 2),
+        (Some(78), vec![1], 3, 1),
+        (None, vec![], 3, 3),
+    ] {
+        let sdk = Scripted::default();
+        sdk.with(|s| (s.devices, s.nameless) = (3, nameless));
+        brake_all(&sdk, wanted, &once).unwrap();
+        let count = |call| sdk.log().iter().filter(|c| *c == call).count();
+        assert_eq!((count("drdOpenID"), count("drdStop")), (opened, braked));
+        assert_eq!(count("drdClose"), opened);
+    }
+    let sdk = Scripted::default();
+    assert!(brake_all(&sdk, Some(80), &once).is_err());
+    sdk.fail("drdOpenID", ErrorCode::DEVICE_IN_USE);
+    assert!(brake_all(&sdk, Some(77), &once).is_err(), "not free yet");
 }

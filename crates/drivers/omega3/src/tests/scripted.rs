@@ -40,6 +40,12 @@ pub struct Script {
     pub values: BTreeMap<&'static str, f64>,
     pub paces: [Pace; 2],
     pub status: BTreeMap<usize, i32>,
+    /// `drdStop` answers 0 and does nothing unless a regulation runs.
+    pub stop_needs_regulation: bool,
+    /// Calls that need a running regulation.
+    pub needs_regulation: Vec<&'static str>,
+    /// Devices, by their place, whose serial number cannot be read.
+    pub nameless: Vec<i8>,
     /// A call that never returns.
     pub hangs: Option<&'static str>,
 }
@@ -74,6 +80,9 @@ impl Default for Scripted {
             values: BTreeMap::new(),
             paces: [fast; 2],
             status: BTreeMap::new(),
+            stop_needs_regulation: false,
+            needs_regulation: Vec::new(),
+            nameless: Vec::new(),
             hangs: None,
         };
         Self {
@@ -118,6 +127,13 @@ impl Scripted {
                     text: String::new(),
                 });
             }
+            if !s.running && s.needs_regulation.contains(&call) {
+                return Err(CallError {
+                    call,
+                    code: ErrorCode::NO_REGULATION,
+                    text: String::new(),
+                });
+            }
             Ok(look(s))
         })
     }
@@ -149,7 +165,12 @@ impl Sdk for Scripted {
     }
     fn serial(&self, id: DeviceId) -> Answer<u16> {
         // Further devices have the following serial numbers.
-        self.read("dhdGetSerialNumber", |s| s.serial + id as u16)
+        if self.with(|s| s.nameless.contains(&id)) {
+            self.fail("dhdGetSerialNumber", ErrorCode::NOT_AVAILABLE);
+        }
+        let answer = self.read("dhdGetSerialNumber", |s| s.serial + id as u16);
+        self.with(|s| s.fail.remove("dhdGetSerialNumber"));
+        answer
     }
     fn firmware(&self, _: DeviceId) -> Answer<f64> {
         self.read("dhdGetVersion", |_| 3.0)
@@ -221,10 +242,15 @@ impl Sdk for Scripted {
             s.target_m = s.position_m;
             // The worst case: a start forgets everything.
             s.values.clear();
+            s.watchdog = 3;
         })
     }
     fn stop(&self, _: DeviceId) -> Answer<()> {
-        self.act("drdStop", power_off)
+        self.act("drdStop", |s| {
+            if s.running || !s.stop_needs_regulation {
+                power_off(s);
+            }
+        })
     }
     fn is_running(&self, _: DeviceId) -> bool {
         self.with(|s| s.running)

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
-use emulated_libdrd::{EmulatedArm, Mode};
+use emulated_libdrd::{EmulatedArm, Fault, Mode, When};
 use skinrig_device::Indenter;
 use skinrig_omega3::OmegaConfig;
 use skinrig_omega3::config::{SupervisorCommand, Watchdog};
@@ -151,6 +151,9 @@ fn a_supervisor_that_ends_takes_the_arm_down_with_it() {
 #[test]
 fn the_supervisor_brakes_the_arm_of_a_killed_program() {
     let arm = arm();
+    // In the supervisor's process no regulation runs: what the vendor's drdStop does there is not documented.
+    arm.inject(When::Now, Fault::StopNeedsRegulation)
+        .expect("is injected");
     let child = victim(&arm, 0.0, true);
     assert_eq!(arm.state().expect("lives").mode, Mode::Force);
     kill(child);

@@ -34,6 +34,7 @@ pub fn config(arm: &EmulatedArm) -> OmegaConfig {
     config.trips.min_control_khz = 0.05;
     config.trips.tare = Duration::from_millis(100);
     config.trips.max_silence = Duration::from_secs(5);
+    config.trips.max_unwatched = PATIENCE;
     config.trips.max_jump_mm = 8.0;
     config.patience.brake_retry = Duration::from_millis(20);
     config.patience.reply = Duration::from_secs(10);

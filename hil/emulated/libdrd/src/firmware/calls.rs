@@ -280,6 +280,10 @@ impl World {
         if self.faults.stop_fails() {
             return Err(ErrorCode::COM);
         }
+        let idle = self.regulation.is_none() && self.initialisation.is_none();
+        if idle && self.faults.is(|f| matches!(f, Fault::StopNeedsRegulation)) {
+            return Ok(Vec::new());
+        }
         self.regulation = None;
         self.initialisation = None;
         if !keep_force {
