@@ -94,7 +94,8 @@ pub fn record(
     let mut report = match preflight {
         Some(mut preflight) => {
             preflight.made.insert(0, gates::recorder(&path));
-            execute_checked(plan, header, rig, &control, &mut sink, preflight)
+            let settings = bench::settings(&rig.kind);
+            execute_checked(plan, header, rig, &control, &mut sink, preflight, settings)
         }
         None => execute(plan, header, rig, &control, &mut sink),
     };

@@ -10,6 +10,9 @@ use skinrig_model::{
 use crate::core::{Collect, Core};
 use crate::error::{ControllerError, Halt};
 
+/// How often the test mark is sent before the line counts as broken: one damaged train must not cost a night.
+const ATTEMPTS: u32 = 4;
+
 /// What a run checks before it powers the robot.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Preflight {
@@ -96,10 +99,12 @@ impl Watch {
         let what = match decoded.marks.as_slice() {
             [] if here.is_empty() => format!("no edge on channel {channel}"),
             [] => format!(
-                "{} edges on channel {channel} that make no mark",
-                here.len()
+                "no mark on channel {channel}, but {} edges: {} periodic trains, {} edges of no train",
+                here.len(),
+                decoded.syncs.len(),
+                decoded.stray_edges
             ),
-            [only] if only.mark == LOOPBACK => "the mark".to_owned(),
+            marks if marks.iter().all(|m| m.mark == LOOPBACK) => "the mark".to_owned(),
             [first, ..] => {
                 let n = decoded.marks.len();
                 format!(
@@ -217,13 +222,18 @@ impl Core<'_> {
         if self.trigger_box.is_none() {
             return Ok(());
         }
-        self.send_loopback()?;
         let seen = |w: &Watch| {
             CameraId::ALL
                 .into_iter()
                 .all(|c| w.saw_mark(c, loopback.channels[c.index()]))
         };
-        self.watch_until(loopback.within, seen)?;
+        let mut attempts = 0;
+        while attempts < ATTEMPTS && !self.watch.as_ref().is_some_and(seen) {
+            attempts += 1;
+            self.send_loopback()?;
+            let share = HostDuration(loopback.within.0 / i64::from(ATTEMPTS));
+            self.watch_until(share, seen)?;
+        }
         for camera in CameraId::ALL {
             let channel = loopback.channels[camera.index()];
             let watch = self.watch.as_ref();
@@ -233,7 +243,13 @@ impl Core<'_> {
                     "the mark on channel {channel} within {}",
                     seconds(loopback.within)
                 ),
-                watch.map_or_else(String::new, |w| w.describe(camera, channel)),
+                watch.map_or_else(String::new, |w| {
+                    let found = w.describe(camera, channel);
+                    match attempts {
+                        1 => found,
+                        n => format!("{found}; {n} marks were sent"),
+                    }
+                }),
                 watch.is_some_and(|w| w.saw_mark(camera, channel)),
                 "check the trigger cable, its channel in the rig file, and levels (docs/bench.md)",
             ));

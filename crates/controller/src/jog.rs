@@ -289,6 +289,10 @@ impl Jog {
         target: Point3<Skin>,
         speed_mm_s: f64,
     ) -> Result<HostTime, ControllerError> {
+        // A slow reader of what is said may have held this up: look again before moving.
+        if self.indenter.check_fresh(self.clock.now()).is_err() {
+            self.tick()?;
+        }
         self.indenter
             .command(target, speed_mm_s, self.clock.now())?;
         Ok(self.clock.now())

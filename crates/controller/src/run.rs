@@ -188,8 +188,10 @@ pub fn execute_checked(
     control: &ControlHandle,
     sink: &mut dyn RecordSink,
     preflight: Preflight,
+    settings: ControllerSettings,
 ) -> RunReport {
-    finish(Run::new(plan, header, rig, control, sink).checked(preflight))
+    let run = Run::with_settings(plan, header, rig, control, sink, settings);
+    finish(run.checked(preflight))
 }
 
 fn finish(run: Run<'_, Planned>) -> RunReport {

@@ -12,7 +12,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
 use std::time::Duration;
 
 use chrono::Utc;
-use skinrig_controller::{ControllerError, ControllerSettings, Jog, Moved, Touched};
+use skinrig_controller::{ControllerError, ControllerSettings, GuardError, Jog, Moved, Touched};
 use skinrig_device::{Clock, Indenter, MotionLimits, RealClock};
 use skinrig_model::{HostDuration, Point3, PoseSample, RigidTransform, Robot, SimLevel, Skin};
 use skinrig_protocol::plan::RunLimits;
@@ -147,7 +147,10 @@ pub fn jog(args: &JogArgs) -> Outcome {
         RigidTransform::identity(),
         run,
         &robot,
-        ControllerSettings::default(),
+        ControllerSettings {
+            stale_after: bench::SLOW_STALE,
+            ..ControllerSettings::default()
+        },
     )
     .map_err(Failure::rig)?;
     let mut table = Table {
@@ -349,6 +352,10 @@ enum Refusal {
 impl From<ControllerError> for Refusal {
     fn from(e: ControllerError) -> Self {
         match e {
+            // The robot is silent: no matter of what was typed.
+            ControllerError::Guard(GuardError::StalePose { .. } | GuardError::NotArmed) => {
+                Self::Rig(e)
+            }
             ControllerError::Guard(e) => Self::Input(e.to_string()),
             ControllerError::Device(e @ skinrig_device::DeviceError::Refused { .. }) => {
                 Self::Input(e.to_string())

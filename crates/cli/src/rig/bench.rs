@@ -2,17 +2,18 @@
 
 use std::path::Path;
 
+use skinrig_controller::ControllerSettings;
 use skinrig_device::{
     CameraSettings, EventCamera, Indenter, NoiseFilter, RealClock, Rig, Roi, SyncMode, TriggerBox,
 };
 use skinrig_evk1::biases::parse_bias_file;
 use skinrig_evk1::{Evk1, Evk1Config};
-use skinrig_model::{CameraId, RigGeometry, SkinOutline, StereoGeometry};
+use skinrig_model::{CameraId, HostDuration, RigGeometry, SkinOutline, StereoGeometry};
 use skinrig_omega3::axes::{Axes, Axis};
 use skinrig_omega3::config::{Initialise, SupervisorCommand, Watchdog};
 use skinrig_omega3::{Omega, OmegaConfig};
 use skinrig_protocol::Protocol;
-use skinrig_protocol::rig::{BoxSetup, CameraSetup, RigFile, SyncRole};
+use skinrig_protocol::rig::{BoxSetup, CameraSetup, RigFile, RigKind, SyncRole};
 use skinrig_trigger_box::{SerialTriggerBox, TriggerBoxConfig};
 
 use crate::exit::Failure;
@@ -71,6 +72,19 @@ pub fn open(rig: &RigFile, protocol: &Protocol) -> Result<Rig, Failure> {
         geometry: geometry(rig, protocol.surroundings.outline),
         description_json: serde_json::to_string(rig).map_err(Failure::internal)?,
     })
+}
+
+/// A pose this old still tells where a robot is that is moved by hand, or that shares a processor with everything else.
+pub const SLOW_STALE: HostDuration = HostDuration::from_millis(1_000);
+
+/// How patient a run is with a rig of this kind: stand-ins share the processors of this computer.
+#[must_use]
+pub fn settings(kind: &str) -> ControllerSettings {
+    let mut settings = ControllerSettings::default();
+    if kind == RigKind::Emulated.name() {
+        settings.stale_after = SLOW_STALE;
+    }
+    settings
 }
 
 /// The bench's name, which always says when it is emulated.

@@ -1,7 +1,8 @@
 //! The preflight on the simulated rig: what is checked, and that a failed check powers nothing.
 
 use skinrig_controller::{
-    ControlHandle, ExpectedDevice, Loopback, Preflight, RunReport, execute_checked,
+    ControlHandle, ControllerSettings, ExpectedDevice, Loopback, Preflight, RunReport,
+    execute_checked,
 };
 use skinrig_model::*;
 use skinrig_sim::config::SimConfig;
@@ -34,7 +35,15 @@ fn run(faults: Vec<Fault>, preflight: Preflight) -> (RunReport, Vec<PreflightChe
     let mut sink = Sink::default();
     let rig = simulated_rig(&config);
     let control = ControlHandle::new();
-    let report = execute_checked(&plan, header, rig, &control, &mut sink, preflight);
+    let report = execute_checked(
+        &plan,
+        header,
+        rig,
+        &control,
+        &mut sink,
+        preflight,
+        ControllerSettings::default(),
+    );
     let tables: Vec<_> = sink
         .records
         .iter()
@@ -108,12 +117,18 @@ fn refused(faults: Vec<Fault>, preflight: Preflight, expected: &[&str]) {
 
 #[test]
 fn a_lost_trigger_line_is_found_before_the_robot_is_powered() {
-    let start_pulse = Fault::PulseLost {
+    let start_pulse = |train| Fault::PulseLost {
         camera: CameraId::Two,
-        train: 0,
+        train,
         pulse: 0,
     };
-    refused(vec![start_pulse], full(), &["camera 2: trigger loop-back"]);
+    let broken = (0..4).map(start_pulse).collect();
+    refused(broken, full(), &["camera 2: trigger loop-back"]);
+    // One damaged train is told, and costs no run.
+    let (report, checks, _) = run(vec![start_pulse(0)], full());
+    assert_eq!((report.end, failed(&checks)), (RunEnd::Completed, vec![]));
+    let last = checks.last().unwrap();
+    assert_eq!(last.found, "the mark; 2 marks were sent", "{last:?}");
     let mut crossed = full();
     crossed.loopback = Some(Loopback {
         channels: [0, 7],
