@@ -11,7 +11,7 @@ use crate::brake::{MayBeLive, brake};
 use crate::config::{OmegaConfig, Patience, Trips};
 use crate::correction::Correction;
 use crate::monitor::{Freshness, Monitor, Trip};
-use crate::open::{NotSet, Opened};
+use crate::open::{NotSet, Opened, seen};
 use crate::regulation;
 use crate::sdk::{Answer, CallError, Sdk};
 use crate::stream::Stream;
@@ -79,6 +79,8 @@ pub(crate) struct Engine<C: Clock> {
     stream: Arc<Stream>,
     supervisor: Option<Supervisor>,
     limits: Option<MotionLimits>,
+    /// What the regulation read back when it was started last.
+    started: Vec<Setting>,
     state: State,
     parked_hiccups: u32,
 }
@@ -101,6 +103,7 @@ impl<C: Clock> Engine<C> {
             stream,
             supervisor,
             limits: None,
+            started: Vec::new(),
             state: State::Parked,
             parked_hiccups: 0,
         }
@@ -158,15 +161,21 @@ impl<C: Clock> Engine<C> {
             Err(NotSet::Call(e))
                 if regulation::needs_regulation(&e) && !matches!(self.state, State::Armed(_)) =>
             {
-                settings.push(Setting {
-                    name: "regulation".to_owned(),
-                    requested: "by these limits".to_owned(),
-                    read_back: "when armed: this library takes no settings before".to_owned(),
-                });
+                // Written and read back when armed; what the arming before this one read is told here.
+                settings.push(seen(
+                    "regulation",
+                    "set when armed: this library takes no settings before",
+                ));
+                settings.extend(self.started.iter().cloned());
             }
             Err(e) => return Err(self.not_set(e)),
         }
         settings.extend(self.opened.settings.iter().cloned());
+        settings.push(Setting {
+            name: "initialised".to_owned(),
+            requested: "true".to_owned(),
+            read_back: self.sdk.is_initialized(self.opened.id).to_string(),
+        });
         self.limits = Some(*wanted);
         if let State::Armed(armed) = &mut self.state {
             armed.monitor.set_limits(*wanted);
@@ -249,7 +258,8 @@ impl<C: Clock> Engine<C> {
         if !here.position_m.iter().all(|c| c.is_finite()) {
             return Err(self.wrong_state("at a known position", "without one (not a number)"));
         }
-        regulation::start(&*sdk, id, &self.config, limits).map_err(|e| self.not_set(e))?;
+        let started = regulation::start(&*sdk, id, &self.config, limits);
+        self.started = started.map_err(|e| self.not_set(e))?;
         let (khz, old_cause) = self.await_regulation()?;
         // A braked arm sinks: the set point begins where the regulation holds it now.
         let now = self.clock.now();

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use skinrig_drd_abi::{DEVICE_OMEGA3, DEVICE_OMEGA3_UNLISTED, DeviceId, ErrorCode, SERIAL_UNKNOWN};
+use skinrig_drd_abi::{DEVICE_OMEGA3, DeviceId, ErrorCode, SERIAL_UNKNOWN};
 
 use crate::error::next_step;
 use crate::sdk::{Answer, CallError, Sdk};
@@ -31,7 +31,7 @@ pub enum Availability {
     Busy,
     /// The operating system does not let us.
     NotPermitted,
-    /// It is not an omega.3.
+    /// It does not report the type number of an omega.3.
     OtherModel,
     /// Something else is wrong.
     Failed(CallError),
@@ -113,7 +113,7 @@ pub(crate) fn unknown(index: i8, error: CallError) -> Found {
 pub(crate) fn look(sdk: &dyn Sdk, index: i8, id: DeviceId) -> Found {
     let type_number = sdk.system_type(id);
     let availability = match &type_number {
-        Ok(DEVICE_OMEGA3 | DEVICE_OMEGA3_UNLISTED) => Availability::Free,
+        Ok(DEVICE_OMEGA3) => Availability::Free,
         Ok(_) => Availability::OtherModel,
         Err(e) => Availability::Failed(e.clone()),
     };

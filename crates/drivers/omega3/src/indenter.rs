@@ -10,6 +10,7 @@ use skinrig_model::{DeviceIdentity, DeviceRole, Point3, Robot, Setting};
 use crate::config::OmegaConfig;
 use crate::error::OmegaError;
 use crate::load;
+use crate::open::seen;
 use crate::owner::Owner;
 use crate::sdk::Sdk;
 use crate::stream::{CAPACITY, Stream};
@@ -131,7 +132,10 @@ impl Indenter for Omega {
 
     fn configure(&mut self, wanted: &MotionLimits) -> Result<Vec<Setting>, DeviceError> {
         check_wanted(&self.identity.serial, &self.config, wanted)?;
-        self.owner.configure(*wanted)
+        let mut settings = self.owner.configure(*wanted)?;
+        // What the operator was told belongs to the record of the session.
+        settings.extend(self.remarks.iter().map(|text| seen("remark", text)));
+        Ok(settings)
     }
 
     fn arm(&mut self) -> Result<(), DeviceError> {

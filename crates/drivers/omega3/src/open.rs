@@ -2,12 +2,13 @@
 //! says that the sample is off.
 
 use skinrig_drd_abi::{
-    DEVICE_OMEGA3, DeviceId, ErrorCode, ForceOffCause, StatusField, WATCHDOG_UNIT_US,
+    DEVICE_OMEGA3, DEVICE_OMEGA3_UNLISTED, DeviceId, ErrorCode, ForceOffCause, StatusField,
+    WATCHDOG_UNIT_US,
 };
 use skinrig_model::Setting;
 
 use crate::brake::brake;
-use crate::config::{Initialise, OmegaConfig, Watchdog};
+use crate::config::{Initialise, OmegaConfig, Patience, Watchdog};
 use crate::enumerate::{self, Found};
 use crate::error::OmegaError;
 use crate::sdk::{Answer, CallError, Quantity, Sdk};
@@ -29,11 +30,16 @@ pub struct Opened {
     pub remarks: Vec<String>,
 }
 
-/// Opens the robot of `config` and brings it to a known, braked state.
+/// Opens the robot of `config` and brings it to a known, braked state. `guard` is called with its serial number before
+/// anything may move: it sees to it that somebody else brakes the arm if this process dies.
 ///
 /// # Errors
-/// [`OmegaError`]; the robot is then closed again.
-pub fn open(sdk: &dyn Sdk, config: &OmegaConfig) -> Result<Opened, OmegaError> {
+/// [`OmegaError`], also of `guard`; the robot is then braked and closed again.
+pub fn open(
+    sdk: &dyn Sdk,
+    config: &OmegaConfig,
+    guard: impl FnOnce(Option<u16>) -> Result<(), OmegaError>,
+) -> Result<Opened, OmegaError> {
     let (id, found) = find(sdk, config)?;
     let serial = found
         .serial
@@ -52,11 +58,19 @@ pub fn open(sdk: &dyn Sdk, config: &OmegaConfig) -> Result<Opened, OmegaError> {
         settings: Vec::new(),
         remarks: Vec::new(),
     };
-    match procedure.run(&mut opened, found.type_number) {
+    let answer = procedure
+        .check(&mut opened, found.type_number)
+        .and_then(|()| guard(found.serial))
+        .and_then(|()| procedure.initialise(&mut opened));
+    match answer {
         Ok(()) => Ok(opened),
         Err(e) => {
             // Best effort: the first error is the one to tell.
-            let _ = sdk.stop(id);
+            let once = Patience {
+                brake_attempts: 1,
+                ..config.patience
+            };
+            let _ = brake(sdk, id, &once, |_| ());
             let _ = sdk.close(id);
             Err(e)
         }
@@ -130,12 +144,13 @@ struct Procedure<'a> {
 }
 
 impl Procedure<'_> {
-    fn run(&self, opened: &mut Opened, type_number: Option<i32>) -> Result<(), OmegaError> {
+    /// Everything before the arm may move.
+    fn check(&self, opened: &mut Opened, type_number: Option<i32>) -> Result<(), OmegaError> {
         self.identify(opened, type_number)?;
         self.check_status(opened)?;
         self.mount(opened)?;
         self.watchdog(opened)?;
-        self.initialised(opened)
+        self.allow_initialisation()
     }
 
     fn call<T>(&self, step: &'static str, answer: Answer<T>) -> Result<T, OmegaError> {
@@ -167,10 +182,16 @@ impl Procedure<'_> {
         };
         if number != DEVICE_OMEGA3 {
             if !self.config.also_accept_types.contains(&number) {
+                let next = if number == DEVICE_OMEGA3_UNLISTED {
+                    "this type is refused, although old firmware is said to report it for an omega.3: ask Force \
+                     Dimension for a firmware that reports type 33"
+                } else {
+                    "connect an omega.3: other types are refused"
+                };
                 return self.unfit(
                     format!("an omega.3 (type {DEVICE_OMEGA3})"),
                     format!("{} (type {number})", opened.model),
-                    "connect an omega.3, or accept this type in the rig file if you know it to be one",
+                    next,
                 );
             }
             opened
@@ -178,7 +199,8 @@ impl Procedure<'_> {
                 .push(format!("type {number} is taken for an omega.3"));
         }
         let firmware = self.call("ask for its firmware", self.sdk.firmware(self.id))?;
-        opened.firmware = format!("{firmware:.2}");
+        // As short as the number can be told: 3.0, not 3.00, and 3.123 in full.
+        opened.firmware = format!("{firmware:?}");
         match self.sdk.check_memory(self.id) {
             Some(answer) => self.call("check its controller's memory", answer)?,
             None => opened
@@ -277,47 +299,28 @@ impl Procedure<'_> {
 
     /// Arms the device's own watchdog. A device without one is accepted when a supervisor stands in.
     fn watchdog(&self, opened: &mut Opened) -> Result<(), OmegaError> {
-        let units = match self.config.watchdog {
-            // Within 1..=255: the configuration was checked.
-            Watchdog::ArmMilliseconds(ms) => (ms * 1e3 / f64::from(WATCHDOG_UNIT_US)).round() as u8,
-            Watchdog::Off => 0,
-        };
         let answer = self.sdk.enable_expert_mode();
         self.call("enable expert mode", answer)?;
-        let set = self
-            .sdk
-            .watchdog(self.id)
-            .and_then(|before| self.sdk.set_watchdog(self.id, units).map(|()| before))
-            .and_then(|before| self.sdk.watchdog(self.id).map(|after| (before, after)));
-        match set {
-            Ok((before, after)) if after == units => {
-                opened.settings.push(seen("watchdog_found_125us", before));
-                opened.settings.push(Setting {
-                    name: "watchdog_125us".to_owned(),
-                    requested: units.to_string(),
-                    read_back: after.to_string(),
-                });
+        let before = self.sdk.watchdog(self.id).ok();
+        match arm_watchdog(self.sdk, self.id, self.config) {
+            Ok(setting) => {
+                let before = before.map(|units| seen("watchdog_found_125us", units));
+                opened.settings.extend(before);
+                opened.settings.push(setting);
             }
-            Ok((_, after)) => {
-                return Err(OmegaError::ReadBack {
-                    serial: self.serial.to_owned(),
-                    name: "watchdog_125us".to_owned(),
-                    expected: units.to_string(),
-                    found: after.to_string(),
-                });
-            }
-            Err(e) if has_no_watchdog(&e) && self.config.supervisor.is_some() => {
+            Err(NotSet::Call(e)) if has_no_watchdog(&e) && self.config.supervisor.is_some() => {
                 let words = "no watchdog in this device: only the supervisor brakes the arm if this program dies";
                 opened.remarks.push(words.to_owned());
             }
-            Err(e) if has_no_watchdog(&e) => {
+            Err(NotSet::Call(e)) if has_no_watchdog(&e) => {
                 return self.unfit(
                     "a watchdog in the device",
                     format!("none ({e})"),
                     "configure a supervisor process",
                 );
             }
-            Err(cause) => return self.call("arm its watchdog", Err(cause)),
+            Err(NotSet::Call(cause)) => return self.call("arm its watchdog", Err(cause)),
+            Err(differs) => return Err(differs.into_omega(self.serial)),
         }
         let threshold = self.sdk.velocity_threshold(self.id);
         let threshold = self.call("read its velocity threshold", threshold)?;
@@ -329,29 +332,36 @@ impl Procedure<'_> {
         Ok(())
     }
 
-    fn initialised(&self, opened: &mut Opened) -> Result<(), OmegaError> {
-        if self.sdk.is_initialized(self.id) {
-            opened.settings.push(seen("initialised", true));
+    /// Refuses a robot that is not initialised and may not initialise itself.
+    fn allow_initialisation(&self) -> Result<(), OmegaError> {
+        if self.sdk.is_initialized(self.id) || self.config.initialise == Initialise::SampleIsOff {
             return Ok(());
         }
-        if self.config.initialise == Initialise::Never {
-            return self.unfit(
-                "a robot initialised since power-up",
-                "one that is not (its LED blinks)",
-                "take the sample and tools off, keep hands clear, and start once with `auto_init: true` and \
-                 `sample_is_off: true` in the rig file; or put the calibration pole into the pit by hand",
-            );
+        self.unfit(
+            "a robot initialised since power-up",
+            "one that is not (its LED blinks)",
+            "take the sample and tools off, keep hands clear, and start once with `auto_init: true` and \
+             `sample_is_off: true` in the rig file; or put the calibration pole into the pit by hand",
+        )
+    }
+
+    /// Lets the robot initialise itself, which moves the arm, when it has not yet.
+    fn initialise(&self, opened: &mut Opened) -> Result<(), OmegaError> {
+        if self.sdk.is_initialized(self.id) {
+            return Ok(());
         }
         let answer = self.sdk.auto_init(self.id);
         self.call("initialise itself", answer)?;
         // It leaves the regulation running.
-        let answer = self.sdk.stop(self.id);
-        self.call("brake after initialisation", answer)?;
+        let wait = std::thread::sleep;
+        if let Err(live) = brake(self.sdk, self.id, &self.config.patience, wait) {
+            let next = "press the force button on its base or switch it off at the mains";
+            return self.unfit("motors off after initialisation", live.to_string(), next);
+        }
         if !self.sdk.is_initialized(self.id) {
             let next = "power-cycle the robot and try again";
             return self.unfit("an initialised robot", "one that is still not", next);
         }
-        opened.settings.push(seen("initialised", true));
         opened
             .remarks
             .push("the robot initialised itself".to_owned());
@@ -359,18 +369,47 @@ impl Procedure<'_> {
     }
 }
 
-fn has_no_watchdog(error: &CallError) -> bool {
+/// True when the device has no watchdog at all.
+pub(crate) const fn has_no_watchdog(error: &CallError) -> bool {
     matches!(
         error.code,
         ErrorCode::NOT_AVAILABLE | ErrorCode::NOT_IMPLEMENTED
     )
 }
 
+/// Sets the device's own watchdog and reads it back. Needs expert mode.
+pub(crate) fn arm_watchdog(
+    sdk: &dyn Sdk,
+    id: DeviceId,
+    config: &OmegaConfig,
+) -> Result<Setting, NotSet> {
+    let units = match config.watchdog {
+        // Within 1..=255: the configuration was checked.
+        Watchdog::ArmMilliseconds(ms) => (ms * 1e3 / f64::from(WATCHDOG_UNIT_US)).round() as u8,
+        Watchdog::Off => 0,
+    };
+    sdk.set_watchdog(id, units).map_err(NotSet::Call)?;
+    let found = sdk.watchdog(id).map_err(NotSet::Call)?;
+    let (name, expected, found) = ("watchdog_125us", units.to_string(), found.to_string());
+    if found != expected {
+        return Err(NotSet::Differs {
+            name,
+            expected,
+            found,
+        });
+    }
+    Ok(Setting {
+        name: name.to_owned(),
+        requested: expected,
+        read_back: found,
+    })
+}
+
 /// A value that was only read.
-fn seen(name: &str, value: impl ToString) -> Setting {
+pub(crate) fn seen(name: &str, value: impl ToString) -> Setting {
     Setting {
         name: name.to_owned(),
-        requested: "as found".to_owned(),
+        requested: Setting::AS_FOUND.to_owned(),
         read_back: value.to_string(),
     }
 }
@@ -443,8 +482,17 @@ pub(crate) fn set_and_read_back(
     Ok(Some(Setting {
         name: quantity.name().to_owned(),
         requested: value.to_string(),
-        read_back: found.to_string(),
+        read_back: told(value, found),
     }))
+}
+
+/// What is told of a number that was read back: the written text when both are the same number in single precision,
+/// which a device may keep; else what was read.
+pub(crate) fn told(wanted: f64, found: f64) -> String {
+    if wanted as f32 == found as f32 {
+        return wanted.to_string();
+    }
+    found.to_string()
 }
 
 /// Why motors went off, for people.

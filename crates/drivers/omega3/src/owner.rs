@@ -63,24 +63,21 @@ impl Owner {
             let (sdk, config) = (thread_sdk, thread_config);
             // Dropped last, when the device is closed: whoever waits is woken.
             let _ended = tell_ended;
-            let opened = open::open(&*sdk, &config).and_then(|opened| {
-                let supervisor = match &config.supervisor {
-                    None => Ok(None),
-                    Some(command) => {
-                        let serial = opened.serial.parse().ok();
-                        Supervisor::start(command, &library, serial, patience.open).map(Some)
-                    }
-                };
-                if supervisor.is_err() {
-                    let _ = sdk.close(opened.id);
+            let mut supervisor = None;
+            let opened = open::open(&*sdk, &config, |serial| {
+                if let Some(command) = &config.supervisor {
+                    let started = Supervisor::start(command, &library, serial, patience.open)?;
+                    supervisor = Some(started);
                 }
-                Ok((opened, supervisor?))
+                Ok(())
             });
             match opened {
                 Err(e) => {
+                    // Not dismissed: it makes sure that an arm whose initialisation failed is braked.
+                    drop(supervisor);
                     let _ = tell_opened.send(Err(e));
                 }
-                Ok((opened, supervisor)) => {
+                Ok(opened) => {
                     let news = opened.clone();
                     let engine = Engine::new(sdk, config, opened, clock, stream, supervisor);
                     // Nobody waits any more: the engine's end closes the device.

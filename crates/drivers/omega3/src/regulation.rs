@@ -6,7 +6,7 @@ use skinrig_drd_abi::{DeviceId, ErrorCode};
 use skinrig_model::Setting;
 
 use crate::config::OmegaConfig;
-use crate::open::{NotSet, agrees, set_and_read_back};
+use crate::open::{NotSet, agrees, arm_watchdog, has_no_watchdog, set_and_read_back, told};
 use crate::sdk::{CallError, Generator, Pace, Quantity, Sdk};
 
 /// Writes gains, the motor ratio that caps the force, and the limits of both trajectory generators.
@@ -42,17 +42,18 @@ pub(crate) fn apply(
         jerk_m_s3: m.jerk_mm_s3 * metres,
     };
     for generator in [Generator::Move, Generator::Track] {
-        settings.push(set_pace(sdk, id, generator, pace)?);
+        settings.extend(set_pace(sdk, id, generator, pace)?);
     }
     Ok(settings)
 }
 
+/// One setting for each number: what is compared later is a number and not a sentence.
 fn set_pace(
     sdk: &dyn Sdk,
     id: DeviceId,
     generator: Generator,
     pace: Pace,
-) -> Result<Setting, NotSet> {
+) -> Result<[Setting; 3], NotSet> {
     sdk.set_pace(id, generator, pace).map_err(NotSet::Call)?;
     let found = sdk.pace(id, generator).map_err(NotSet::Call)?;
     let same = agrees(pace.acceleration_m_s2, found.acceleration_m_s2)
@@ -65,27 +66,42 @@ fn set_pace(
             found: found.to_string(),
         });
     }
-    Ok(Setting {
-        name: generator.name().to_owned(),
-        requested: pace.to_string(),
-        read_back: found.to_string(),
-    })
+    let setting = |quantity: &str, wanted: f64, found: f64| Setting {
+        name: format!("{}_{quantity}", generator.name()),
+        requested: wanted.to_string(),
+        read_back: told(wanted, found),
+    };
+    Ok([
+        setting(
+            "acceleration_m_s2",
+            pace.acceleration_m_s2,
+            found.acceleration_m_s2,
+        ),
+        setting("speed_m_s", pace.speed_m_s, found.speed_m_s),
+        setting("jerk_m_s3", pace.jerk_m_s3, found.jerk_m_s3),
+    ])
 }
 
-/// Starts the regulation, which holds where the arm is, writes its settings and turns position control and the track
-/// filter on.
+/// Starts the regulation, which holds where the arm is, writes its settings and the watchdog's, and turns position
+/// control and the track filter on. Gives what read back.
 pub(crate) fn start(
     sdk: &dyn Sdk,
     id: DeviceId,
     config: &OmegaConfig,
     limits: &MotionLimits,
-) -> Result<(), NotSet> {
+) -> Result<Vec<Setting>, NotSet> {
     sdk.start(id).map_err(NotSet::Call)?;
-    apply(sdk, id, config, limits)?;
+    let mut settings = apply(sdk, id, config, limits)?;
+    match arm_watchdog(sdk, id, config) {
+        Ok(setting) => settings.push(setting),
+        // Opening accepted that.
+        Err(NotSet::Call(e)) if has_no_watchdog(&e) && config.supervisor.is_some() => {}
+        Err(e) => return Err(e),
+    }
     sdk.regulate_position(id).map_err(NotSet::Call)?;
     sdk.enable_filter(id).map_err(NotSet::Call)?;
     if sdk.is_filtering(id) {
-        return Ok(());
+        return Ok(settings);
     }
     Err(NotSet::Differs {
         name: "track_filter",

@@ -50,7 +50,7 @@ impl Bench {
         let sdk = Arc::new(Scripted::default());
         let clock = Virtual::default();
         let stream = Arc::new(Stream::default());
-        let opened = open(&*sdk, &config).unwrap();
+        let opened = open(&*sdk, &config, |_| Ok(())).unwrap();
         let engine = Engine::new(
             sdk.clone(),
             Arc::new(config.clone()),
@@ -503,6 +503,58 @@ fn a_cause_from_before_arming_is_not_taken_for_a_new_one() {
         assert!(matches!(failure, DeviceError::State { .. }), "{failure}");
         assert!(failure.to_string().contains(word), "{word}: {failure}");
     }
+}
+
+#[test]
+fn what_the_device_answered_is_recorded_number_by_number() {
+    let bench = Bench::new();
+    let settings = bench.ask(|e| e.configure(&LIMITS)).unwrap();
+    let speed = settings
+        .iter()
+        .find(|s| s.name == "track_parameters_speed_m_s")
+        .unwrap();
+    assert_eq!((&*speed.requested, &*speed.read_back), ("0.08", "0.08"));
+    let read_of = |name: &str| {
+        let settings = bench.ask(|e| e.configure(&LIMITS)).unwrap();
+        let found = settings.into_iter().find(|s| s.name == name).unwrap();
+        (found.requested, found.read_back)
+    };
+    let pair = |a: &str, b: &str| (a.to_owned(), b.to_owned());
+    assert_eq!(read_of("initialised"), pair("true", "true"));
+    bench.sdk.with(|s| s.initialised = false);
+    assert_eq!(read_of("initialised"), pair("true", "false"));
+}
+
+#[test]
+fn a_library_that_takes_settings_only_while_regulating_is_no_difference() {
+    let bench = Bench::new();
+    bench
+        .sdk
+        .with(|s| s.needs_regulation.push("motor_ratio_max"));
+    let settings = bench.ask(|e| e.configure(&LIMITS)).unwrap();
+    for s in &settings {
+        let as_found = s.requested == Setting::AS_FOUND;
+        assert!(as_found || s.requested == s.read_back, "{s:?}");
+    }
+    assert!(settings.iter().all(|s| s.name != "gain_i"));
+    bench.ask(Engine::arm).unwrap();
+    bench.ask(Engine::disarm).unwrap();
+    let settings = bench.ask(|e| e.configure(&LIMITS)).unwrap();
+    assert!(settings.iter().any(|s| s.name == "gain_i"), "{settings:?}");
+}
+
+#[test]
+fn a_watchdog_that_a_start_forgets_is_set_again() {
+    let bench = Bench::armed();
+    assert_eq!(bench.sdk.with(|s| s.watchdog), 80);
+    bench.ask(Engine::disarm).unwrap();
+    bench.sdk.with(|s| s.ignore.push("watchdog"));
+    let error = bench.ask(Engine::arm).unwrap_err();
+    assert!(
+        matches!(&error, DeviceError::ReadBack { name, .. } if name == "watchdog_125us"),
+        "{error}"
+    );
+    assert!(!bench.sdk.with(|s| s.live));
 }
 
 #[test]

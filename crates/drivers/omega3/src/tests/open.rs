@@ -28,7 +28,7 @@ fn every_obstacle_is_named_and_leaves_a_braked_closed_robot() {
         (|s| s.with(|s| s.type_number = 60), &["type 33", "type 60"]),
         (
             |s| s.with(|s| s.type_number = 110),
-            &["type 110", "rig file"],
+            &["type 110", "refused"],
         ),
         (
             |s| s.fail("dhdCheckControllerMemory", ErrorCode::CONFIGURATION),
@@ -64,7 +64,7 @@ fn every_obstacle_is_named_and_leaves_a_braked_closed_robot() {
     for (spoil, words) in obstacles {
         let sdk = Scripted::default();
         spoil(&sdk);
-        let error = open(&sdk, &config).unwrap_err().to_string();
+        let error = open(&sdk, &config, |_| Ok(())).unwrap_err().to_string();
         for word in words {
             assert!(error.contains(word), "{word} is not in {error}");
         }
@@ -87,11 +87,13 @@ fn the_robot_is_chosen_by_its_serial_and_the_others_are_released() {
         serial: Some(78),
         ..OmegaConfig::default()
     };
-    let opened = open(&sdk, &config).unwrap();
+    let opened = open(&sdk, &config, |_| Ok(())).unwrap();
     assert_eq!((opened.id, opened.serial.as_str()), (1, "78"));
     assert_eq!(sdk.log()[..3], ["drdOpenID", "drdClose", "drdOpenID"]);
     // Several robots and no serial: it must be named.
-    let error = open(&sdk, &OmegaConfig::default()).unwrap_err().to_string();
+    let error = open(&sdk, &OmegaConfig::default(), |_| Ok(()))
+        .unwrap_err()
+        .to_string();
     assert!(error.contains("name the serial"), "{error}");
 }
 
@@ -103,7 +105,13 @@ fn initialisation_needs_word_that_the_sample_is_off_and_ends_braked() {
         initialise: Initialise::SampleIsOff,
         ..OmegaConfig::default()
     };
-    let opened = open(&sdk, &config).unwrap();
+    let mut before = None;
+    let opened = open(&sdk, &config, |serial| {
+        before = Some((serial, sdk.log().contains(&"drdAutoInit".to_owned())));
+        Ok(())
+    })
+    .unwrap();
+    assert_eq!(before, Some((Some(77), false)), "guarded before it moves");
     let log = sdk.log();
     assert_eq!(log[log.len() - 2..], ["drdAutoInit", "drdStop"]);
     assert!(
@@ -126,7 +134,7 @@ fn without_a_watchdog_a_supervisor_is_enough() {
         }),
         ..OmegaConfig::default()
     };
-    let opened = open(&sdk, &config).unwrap();
+    let opened = open(&sdk, &config, |_| Ok(())).unwrap();
     assert!(
         opened
             .remarks
@@ -142,6 +150,9 @@ fn a_list_names_what_is_busy_or_forbidden_and_touches_no_motor() {
     let all = enumerate::list(&sdk).unwrap();
     assert_eq!(all[1].to_string(), "scripted, serial 78: free");
     assert_eq!(all[1].next_step(), None);
+    sdk.with(|s| s.type_number = 110);
+    let all = enumerate::list(&sdk).unwrap();
+    assert!(all[0].to_string().contains("not an omega.3"), "{}", all[0]);
     for (code, word) in [
         (ErrorCode::DEVICE_IN_USE, "busy"),
         (ErrorCode::NO_DRIVER_FOUND, "not permitted"),
@@ -162,7 +173,7 @@ fn a_list_names_what_is_busy_or_forbidden_and_touches_no_motor() {
 fn motors_left_live_by_a_dead_program_are_braked_first() {
     let sdk = Scripted::default();
     sdk.with(|s| s.live = true);
-    let opened = open(&sdk, &OmegaConfig::default()).unwrap();
+    let opened = open(&sdk, &OmegaConfig::default(), |_| Ok(())).unwrap();
     assert!(!sdk.with(|s| s.live));
     assert!(opened.remarks.iter().any(|r| r.contains("were live")));
 }
@@ -171,7 +182,7 @@ fn motors_left_live_by_a_dead_program_are_braked_first() {
 fn a_stop_that_only_answers_is_followed_by_the_direct_ones() {
     let sdk = Scripted::default();
     sdk.with(|s| (s.live, s.stop_needs_regulation) = (true, true));
-    open(&sdk, &OmegaConfig::default()).unwrap();
+    open(&sdk, &OmegaConfig::default(), |_| Ok(())).unwrap();
     assert!(!sdk.with(|s| s.live));
     let log = sdk.log();
     let at = log.iter().position(|c| c == "drdStop").unwrap();

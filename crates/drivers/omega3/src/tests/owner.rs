@@ -5,6 +5,8 @@ use std::time::Duration;
 
 use skinrig_device::{DeviceError, Indenter, MotionLimits, RealClock};
 
+use skinrig_model::Setting;
+
 use super::scripted::Scripted;
 use crate::{Omega, OmegaConfig, OmegaError};
 
@@ -47,6 +49,19 @@ fn a_call_that_never_returns_is_given_up_and_the_arm_braked_from_elsewhere() {
     // Every later request fails at once, and says the same.
     assert_eq!(omega.arm(), Err(error));
     sdk.with(|s| s.hangs = None);
+}
+
+#[test]
+fn what_the_operator_is_told_is_recorded() {
+    let sdk = Arc::new(Scripted::default());
+    sdk.with(|s| s.live = true);
+    let settings = open(&sdk).unwrap().configure(&LIMITS).unwrap();
+    let told = settings.iter().filter(|s| s.name == "remark");
+    assert!(
+        told.clone().any(|s| s.read_back.contains("were live")),
+        "{settings:?}"
+    );
+    assert!(told.clone().all(|s| s.requested == Setting::AS_FOUND));
 }
 
 #[test]
