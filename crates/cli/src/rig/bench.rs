@@ -40,11 +40,19 @@ pub fn tighten(protocol: &mut Protocol, rig: &RigFile) {
     protocol.surface = protocol.surface.or(rig.surface);
 }
 
-/// Opens every device of `rig`. The robot stays braked, unless the file lets it initialise itself.
+/// Opens every device of `rig`. The robot stays braked.
 ///
 /// # Errors
-/// [`Failure::rig`] naming the device that could not be opened and the next step.
+/// [`Failure::input`] when the file says that the sample is off: a run presses it, and an arm that lost its power must not
+/// sweep through it. [`Failure::rig`] naming the device that could not be opened and the next step.
 pub fn open(rig: &RigFile, protocol: &Protocol) -> Result<Rig, Failure> {
+    if rig.robot.sample_is_off {
+        return Err(Failure::input(format!(
+            "{}: robot.sample_is_off: expected false, because a run presses the sample, found true\n  \
+             next: initialise the arm with `skinrig jog` while the sample is off, mount the sample, and set it to false",
+            rig.file_name
+        )));
+    }
     let clock = RealClock::start();
     // Settings first: a bad bias file is no reason to have opened a device.
     let camera_settings = [

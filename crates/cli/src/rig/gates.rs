@@ -6,7 +6,7 @@ use chrono::Utc;
 use skinrig_controller::{ExpectedDevice, Loopback, Preflight};
 use skinrig_device::Rig;
 use skinrig_model::{DeviceRole, HostDuration, PreflightCheck};
-use skinrig_protocol::rig::{Frame, PreflightLimits, RigFile};
+use skinrig_protocol::rig::{Frame, PreflightLimits, RigFile, RigKind};
 
 /// Space that must be left on the disk after a session of the simulated rig, bytes.
 const SIMULATED_RESERVE_B: f64 = 200e6;
@@ -24,7 +24,14 @@ pub fn of_bench(file: &RigFile, rig: &Rig, folder: &Path, expected_s: f64) -> Pr
         limits.data_rate_b_s * expected_s,
         limits.min_free_disk_b,
     )];
-    made.extend(frame(&file.frame, limits));
+    made.extend(match file.kind {
+        RigKind::Bench => frame(&file.frame, limits),
+        RigKind::Emulated => vec![PreflightCheck::skipped(
+            "frame",
+            "touched points",
+            "the stand-in's skin lies where the file says",
+        )],
+    });
     Preflight {
         made,
         expected: expected(file),

@@ -62,6 +62,13 @@ fn a_rig_file_is_read_with_the_same_care_as_a_protocol() {
         "the unit is missing",
         "write `8 N`",
     ]);
+    // A run presses what the file says is off: the arm might sweep through it.
+    let bare = std::fs::read_to_string(format!("{ROOT}/{EMULATED}")).unwrap();
+    let bare = bare.replace("\nrobot:\n", "\nrobot:\n  sample_is_off: true\n");
+    std::fs::write(lab.path("bare.yaml"), bare).unwrap();
+    run(&lab.text("bare.yaml"))
+        .code(2)
+        .complains(&["robot.sample_is_off: expected false", "skinrig jog"]);
     skinrig(&["run", QUICK, "--rig", EMULATED, "--level", "optical"]).code(2);
     assert_eq!(files(&lab.path("s"), "").len(), 0, "nothing was recorded");
 }
