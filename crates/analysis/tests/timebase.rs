@@ -101,7 +101,7 @@ fn bench(seed: u64, c: &Conditions) -> Bench {
     for second in 0..seconds {
         let begin = f64::from(second) * 1e6 + 20_000.0;
         send(begin, Label::Sync(second), &mut trains);
-        if second % 2 == 0 {
+        if second.is_multiple_of(2) {
             let contact = begin + r.between(50_000.0, 300_000.0);
             presses.push(contact);
             for (after, kind) in [

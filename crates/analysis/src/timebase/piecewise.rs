@@ -285,7 +285,7 @@ mod tests {
         let bend = |x: f64| 5e5 + 300e-6 * x + 2e-6 * x * x / (2.0 * 3.6e9);
         let mut all = points(3600, |x| {
             bend(x)
-                + if (x * 1e-6) as u64 % 2 == 0 {
+                + if ((x * 1e-6) as u64).is_multiple_of(2) {
                     1.0
                 } else {
                     -1.0
@@ -309,7 +309,7 @@ mod tests {
     #[test]
     fn standard_errors_are_those_of_the_line_through_one_segment() {
         let all = points(20, |x| {
-            if (x * 1e-6) as u64 % 2 == 0 {
+            if ((x * 1e-6) as u64).is_multiple_of(2) {
                 1.0
             } else {
                 -1.0
