@@ -23,7 +23,7 @@ use crate::report::StreamReport;
 use crate::settings::Checked;
 use crate::triggers::{self, CHANNELS, TriggerOut};
 use crate::usb::Transport;
-use crate::{sequences, sync};
+use crate::{noise_filter, sequences, sync};
 
 /// A Prophesee EVK1 Gen3.1, initialised. It is powered down when it is dropped.
 pub struct Evk1 {
@@ -165,11 +165,12 @@ impl Evk1 {
             return Ok(());
         }
         back.map_err(|e| e.during("stopping the stream"))?;
-        let mut registers = self.registers();
+        let mut registers =
+            Registers::new(self.transport.as_mut(), &self.config.read_back_exceptions);
         if streaming {
             sequences::stop(&mut registers)?;
         }
-        sequences::close(&mut registers)
+        sequences::close(&mut registers, self.clock.as_ref())
     }
 
     fn registers(&mut self) -> Registers<'_> {
@@ -259,7 +260,8 @@ impl Evk1 {
         let mut registers =
             Registers::new(self.transport.as_mut(), &self.config.read_back_exceptions);
         if std::mem::replace(&mut self.used, true) {
-            report.left_over_bytes = sequences::clear_left_over(&mut registers)?;
+            report.left_over_bytes =
+                sequences::clear_left_over(&mut registers, self.clock.as_ref())?;
         }
         if !channels.is_empty() {
             // By the public driver's contract they are off after a stop.
@@ -284,8 +286,7 @@ impl Evk1 {
         let exceptions = &self.config.read_back_exceptions;
         let mut registers = Registers::new(self.transport.as_mut(), exceptions);
         if let Err(error) = sequences::start(&mut registers, &mut wait) {
-            // The error that led here says more than one of the way back.
-            let _ = self.transport.stop_stream();
+            self.undo_start();
             return Err(error);
         }
         self.stream = Some(Stream {
@@ -293,6 +294,17 @@ impl Evk1 {
             overflow_hits,
         });
         Ok(())
+    }
+
+    /// Takes back a start that failed on its way: transfers, the running time base, and the noise filter, which drops
+    /// everything and which the next start would take for the setting. The error that led here says more than one of
+    /// the way back.
+    fn undo_start(&mut self) {
+        let filter = self.settings.as_ref().and_then(Checked::noise_filter);
+        let _ = self.transport.stop_stream();
+        let mut registers = self.registers();
+        let _ = sequences::stop(&mut registers);
+        let _ = noise_filter::write(&mut registers, filter);
     }
 
     /// Turns what was taken out of the inbox into chunks, and then tells what ended the stream.

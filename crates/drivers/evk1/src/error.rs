@@ -134,6 +134,14 @@ pub enum Evk1Error {
         /// The state it is in.
         found: &'static str,
     },
+    /// It was stopped and sends all the same.
+    #[error(
+        "expected the stopped camera to fall silent, found it still sending after {bytes} bytes: power it off and on"
+    )]
+    StillSending {
+        /// Bytes that came since it should have been silent.
+        bytes: u64,
+    },
     /// A line of a bias file.
     #[error("bias file, line {line}: expected {expected}, found {found}")]
     BiasFile {

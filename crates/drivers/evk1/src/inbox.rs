@@ -26,7 +26,8 @@ pub struct Block {
 pub struct Loss {
     /// How many.
     pub bytes: u64,
-    /// When the last bytes before the loss arrived, or the first lost ones if there were none.
+    /// When the last bytes before the loss arrived, kept or told as lost; when the first lost ones did if there were
+    /// none.
     pub since: HostTime,
     /// When the last lost ones arrived.
     pub until: HostTime,
@@ -50,6 +51,7 @@ struct State {
     waiting: usize,
     /// The block being filled; may end within a word.
     open: Vec<u8>,
+    /// When the last bytes arrived, kept or lost.
     last_arrival: Option<HostTime>,
     /// What was lost before `open`, or is being lost.
     loss: Option<Loss>,
@@ -177,6 +179,8 @@ impl State {
         let torn = std::mem::take(&mut self.open).len();
         self.phase = (self.phase + n) % WORD;
         self.add_loss(torn + n, at);
+        // A loss that goes on after it was told begins where the told one ended.
+        self.last_arrival = Some(at);
     }
 
     fn add_loss(&mut self, n: usize, at: HostTime) {

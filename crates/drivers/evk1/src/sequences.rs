@@ -6,7 +6,8 @@
 
 use std::time::Duration;
 
-use skinrig_model::{SENSOR_HEIGHT, SENSOR_WIDTH};
+use skinrig_device::Clock;
+use skinrig_model::{HostDuration, SENSOR_HEIGHT, SENSOR_WIDTH};
 
 use crate::access::Registers;
 use crate::error::Evk1Error;
@@ -189,6 +190,10 @@ pub fn stop(registers: &mut Registers<'_>) -> Result<(), Evk1Error> {
 /// Longest wait for bytes that may not be there.
 const READ_LIMIT: Duration = Duration::from_millis(100);
 
+/// Longest time for emptying the buffers. A camera that still sends its time base never lets a read come back empty,
+/// and sends too little to reach a bound in bytes soon.
+const EMPTYING_LIMIT: HostDuration = HostDuration::from_millis(2000);
+
 fn read_events(registers: &mut Registers<'_>, buffer: &mut [u8]) -> Result<usize, Evk1Error> {
     let read = registers.transport().read_events(buffer, READ_LIMIT);
     read.map_err(|e| e.during("emptying the event endpoint"))
@@ -198,44 +203,48 @@ fn read_events(registers: &mut Registers<'_>, buffer: &mut [u8]) -> Result<usize
 /// start, with times of its own; returns the number of bytes. The public driver leaves them there.
 ///
 /// # Errors
-/// [`Evk1Error::Usb`].
-pub fn clear_left_over(registers: &mut Registers<'_>) -> Result<u64, Evk1Error> {
-    /// More than any buffer on the way holds: what still comes then is no rest.
+/// [`Evk1Error::Usb`]; [`Evk1Error::StillSending`] when bytes still come after 2 s on `clock`, or after more of them
+/// than any buffer on the way holds.
+pub fn clear_left_over(registers: &mut Registers<'_>, clock: &dyn Clock) -> Result<u64, Evk1Error> {
     const ENOUGH_BYTES: u64 = 16 << 20;
+    let end = clock.now() + EMPTYING_LIMIT;
     let mut buffer = vec![0; 128 << 10];
     let mut total = 0;
-    while total <= ENOUGH_BYTES {
+    loop {
         match read_events(registers, &mut buffer)? {
-            0 => break,
+            0 => return Ok(total),
             n => total += n as u64,
         }
+        if total > ENOUGH_BYTES || clock.now() >= end {
+            return Err(Evk1Error::StillSending { bytes: total });
+        }
     }
-    Ok(total)
 }
 
 /// Powers down, and empties what is left in the camera's and the host's buffers: up to 8 rounds, ended by a round
-/// that brings nothing or by 300 000 bytes.
+/// that brings nothing, by 300 000 bytes, or by 2 s on `clock`: what comes then is left there.
 ///
 /// # Errors
 /// [`Evk1Error::Usb`], [`Evk1Error::ReadBack`].
-pub fn close(registers: &mut Registers<'_>) -> Result<(), Evk1Error> {
+pub fn close(registers: &mut Registers<'_>, clock: &dyn Clock) -> Result<(), Evk1Error> {
     const ROUNDS: u32 = 8;
     const ENOUGH_BYTES: usize = 300_000;
     power_down(registers)?;
     let cleared = registers.transport().clear_halt();
     cleared.map_err(|e| e.during("clearing the event endpoint"))?;
+    let end = clock.now() + EMPTYING_LIMIT;
     let mut total = 0;
     for _ in 0..ROUNDS {
         let before = total;
         registers.write_blind(r::TRIGGERS, 0)?;
         let mut buffer = [0; 1024];
-        while total <= ENOUGH_BYTES {
+        while total <= ENOUGH_BYTES && clock.now() < end {
             match read_events(registers, &mut buffer)? {
                 0 => break,
                 n => total += n,
             }
         }
-        if total == before || total > ENOUGH_BYTES {
+        if total == before || total > ENOUGH_BYTES || clock.now() >= end {
             break;
         }
     }

@@ -1,6 +1,6 @@
 //! The settings of a camera: checked as a whole, written in an order that keeps the camera's rules, read back.
 
-use skinrig_device::{CameraSettings, SyncMode};
+use skinrig_device::{CameraSettings, NoiseFilter, SyncMode};
 use skinrig_model::Setting;
 
 use crate::access::Registers;
@@ -43,6 +43,12 @@ impl Checked {
     #[must_use]
     pub fn trigger_channels(&self) -> &[u8] {
         &self.settings.trigger_channels
+    }
+
+    /// The noise filter, if there is to be one.
+    #[must_use]
+    pub fn noise_filter(&self) -> Option<NoiseFilter> {
+        self.settings.noise_filter
     }
 
     /// Writes everything; the camera is stopped.

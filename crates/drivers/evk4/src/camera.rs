@@ -106,14 +106,13 @@ impl Evk4 {
                 Ok(false) => break,
                 Err(error) => {
                     self.close(chunks);
+                    self.tell_last_loss(stream.dropped(), chunks);
                     return Err(self.lost(&error));
                 }
             }
             if after_loss {
                 self.close(chunks);
-                let dropped = stream.dropped();
-                let fresh = dropped.saturating_sub(self.filling.dropped).max(1);
-                self.filling.dropped = dropped;
+                let fresh = self.freshly_dropped(stream.dropped()).max(1);
                 // At most: how many bytes they held is not known.
                 self.filling.lost_before = fresh * most;
             }
@@ -126,6 +125,23 @@ impl Evk4 {
         }
         self.stream = Some(stream);
         Ok(())
+    }
+
+    /// How many of the `dropped` packets have not been counted yet; counts them.
+    fn freshly_dropped(&mut self, dropped: u64) -> u64 {
+        let counted = mem::replace(&mut self.filling.dropped, dropped);
+        dropped.saturating_sub(counted)
+    }
+
+    /// At the end of a stream, of which `dropped` packets were dropped: those after the last one that arrived are told
+    /// by a chunk without bytes.
+    fn tell_last_loss(&mut self, dropped: u64, chunks: &mut Vec<RawChunk>) {
+        let fresh = self.freshly_dropped(dropped);
+        if fresh > 0 {
+            self.filling.lost_before = fresh * self.link.packet_bytes() as u64;
+            self.filling.arrived = self.filling.arrived.max(self.clock.now());
+            self.close(chunks);
+        }
     }
 
     /// Closes the chunk under way, when there is anything to say.
@@ -204,7 +220,9 @@ impl EventCamera for Evk4 {
 
     fn stop(&mut self, chunks: &mut Vec<RawChunk>) -> Result<(), DeviceError> {
         let flushed = self.flush(chunks);
-        self.stream = None;
+        if let Some(stream) = self.stream.take() {
+            self.tell_last_loss(stream.dropped(), chunks);
+        }
         flushed
     }
 }

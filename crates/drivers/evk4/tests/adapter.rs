@@ -31,6 +31,8 @@ struct Script {
     clock: Jumping,
     /// Packets from this one to the next are dropped.
     drops: Option<(i64, i64)>,
+    /// From this packet on, all are dropped.
+    drops_rest: Option<i64>,
     /// The cable is pulled before this packet.
     ends: Option<i64>,
 }
@@ -68,6 +70,15 @@ impl Packets for Running {
             (self.next_ms, after_loss) = (to, true);
         }
         if (self.next_ms + 1) * MS > now {
+            return Ok(false);
+        }
+        if self
+            .script
+            .drops_rest
+            .is_some_and(|from| self.next_ms >= from)
+        {
+            self.dropped += (now / MS - self.next_ms) as u64;
+            self.next_ms = now / MS;
             return Ok(false);
         }
         if self.script.ends.is_some_and(|end| self.next_ms >= end) {
@@ -172,6 +183,27 @@ fn what_the_link_dropped_is_stated_before_the_chunk_that_follows() {
         .map(|c| (c.seq, c.lost_before, c.facts.cd_events))
         .collect();
     assert_eq!(told, [(0, 0, 5), (1, 3 * PACKET as u64, 2)]);
+}
+
+#[test]
+fn what_was_dropped_after_the_last_packet_is_stated_at_stop() {
+    let script = Script {
+        drops_rest: Some(6),
+        ..Script::default()
+    };
+    let mut camera = started(&script);
+    script.clock.clone().wait_until(HostTime(10 * MS));
+    let mut chunks = Vec::new();
+    camera.stop(&mut chunks).unwrap();
+    let told: Vec<_> = chunks
+        .iter()
+        .map(|c| (c.seq, c.lost_before, c.facts.cd_events, c.host_time))
+        .collect();
+    let lost = 4 * PACKET as u64;
+    assert_eq!(
+        told,
+        [(0, 0, 6, HostTime(6 * MS)), (1, lost, 0, HostTime(10 * MS))]
+    );
 }
 
 #[test]

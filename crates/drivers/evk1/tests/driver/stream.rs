@@ -5,7 +5,7 @@ use skinrig_device::{CameraSettings, Clock, DeviceError, EventCamera, NoiseFilte
 use skinrig_evk1::inbox::{Block, Inbox, Taken};
 use skinrig_evk1::registers as r;
 use skinrig_evk1::{Evk1Config, UsbError};
-use skinrig_model::{HostTime, RawChunk};
+use skinrig_model::{HostDuration, HostTime, RawChunk};
 
 use super::model::Bench;
 
@@ -309,4 +309,67 @@ fn what_a_stopped_stream_left_behind_is_let_go_before_the_next_and_told() {
     assert!(place("bulk read of 0") < place("queue 20 transfers"));
     camera.stop(&mut Vec::new()).unwrap();
     assert!(camera.report().notes()[0].contains("left over"));
+}
+
+#[test]
+fn a_camera_that_never_falls_silent_is_named_at_start_and_left_at_close() {
+    let bench = Bench::new();
+    let mut camera = bench.open().unwrap();
+    camera.start().unwrap();
+    camera.stop(&mut Vec::new()).unwrap();
+    bench.model().never_silent = true;
+    let before = bench.now();
+    let error = camera.start().unwrap_err().to_string();
+    assert!(
+        error.contains("found it still sending after 80 bytes"),
+        "{error}"
+    );
+    assert_eq!(bench.now() - before, HostDuration::from_millis(2000));
+    camera.close().unwrap();
+    assert_eq!(bench.now() - before, HostDuration::from_millis(4000));
+}
+
+#[test]
+fn a_start_that_fails_is_taken_back_with_the_noise_filter_as_set() {
+    let bench = Bench::new();
+    let mut camera = bench.open().unwrap();
+    let settings = CameraSettings {
+        noise_filter: Some(NoiseFilter {
+            min_rate_ev_s: 1_000_000,
+        }),
+        ..CameraSettings::default()
+    };
+    camera.configure(&settings).unwrap();
+    let filter = |bench: &Bench| {
+        let model = bench.model();
+        (model.word(r::NFL_THRESH), model.get(r::NFL_EN))
+    };
+    let set = filter(&bench);
+    let running = r::ROI_TD_RSTN;
+    let mask = running.put(0, 1);
+    let address = running.register.address;
+    bench.model().faults.stuck_at_zero.insert(address, mask);
+    camera.start().unwrap_err();
+    assert_eq!(filter(&bench), set);
+    assert_eq!(bench.model().get(r::STEREO_MERGE_ENABLE), 0);
+    bench.model().faults.stuck_at_zero.clear();
+    camera.start().unwrap();
+    assert_eq!(filter(&bench), set);
+}
+
+#[test]
+fn a_loss_that_goes_on_after_it_was_told_counts_its_time_once() {
+    let inbox = Inbox::new(400, 400);
+    inbox.push(&[0; 400], HostTime(10));
+    inbox.push(&[0; 401], HostTime(20));
+    let mut blocks = inbox.take_all().blocks;
+    // The rest of the word whose beginning is lost.
+    inbox.push(&[0; 11], HostTime(30));
+    blocks.extend(inbox.finish().blocks);
+    let losses: Vec<_> = blocks.iter().filter_map(|b| b.lost_before).collect();
+    let told: Vec<_> = losses
+        .iter()
+        .map(|l| (l.bytes, l.since.0, l.until.0))
+        .collect();
+    assert_eq!(told, [(401, 10, 20), (3, 20, 30)]);
 }
