@@ -289,6 +289,18 @@ impl<'a> Core<'a> {
         Ok(stopped?)
     }
 
+    /// Records what the trigger box has to say about the run.
+    pub(crate) fn emit_box_notes(&mut self) -> Result<(), ControllerError> {
+        let Some(trigger) = &mut self.trigger_box else {
+            return Ok(());
+        };
+        for note in trigger.take_notes() {
+            let (t, text) = (self.now(), format!("trigger box: {note}"));
+            self.journal.emit(Record::Note { t, text })?;
+        }
+        Ok(())
+    }
+
     fn emit_chunks(&mut self) -> Result<(), ControllerError> {
         let mut answer = Ok(());
         for chunk in std::mem::take(&mut self.chunks) {

@@ -131,7 +131,7 @@ impl Core<'_> {
         });
     }
 
-    /// Off the skin if the robot still answers; hold; disarm; cameras flushed and stopped. Gives whether
+    /// Off the skin if the robot still answers; hold; disarm; cameras flushed and stopped; notes. Gives whether
     /// the tip was seen at clearance height and whether the robot confirmed that it is disarmed.
     fn make_safe(&mut self) -> (bool, bool) {
         let mut retracted = true;
@@ -146,6 +146,7 @@ impl Core<'_> {
         for camera in CameraId::ALL {
             let _ = (0..TRIES).any(|_| self.attempt("stop", |core| core.stop_camera(camera)));
         }
+        self.attempt("notes", Self::emit_box_notes);
         (retracted, disarmed)
     }
 

@@ -33,4 +33,11 @@ pub trait TriggerBox: Send {
     /// # Errors
     /// [`DeviceError::Lost`]; reports already appended stay valid.
     fn poll(&mut self, reports: &mut Vec<BoxReport>) -> Result<(), DeviceError>;
+
+    /// What the box lost or noticed since it was armed, or since the last call, that its reports do not say, in
+    /// sentences with what to do: late edges, damaged frames, a clock that drifts too much. A box that notices nothing
+    /// of the kind has none.
+    fn take_notes(&mut self) -> Vec<String> {
+        Vec::new()
+    }
 }

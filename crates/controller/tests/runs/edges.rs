@@ -61,6 +61,18 @@ fn what_a_camera_says_about_its_stream_is_recorded() {
 }
 
 #[test]
+fn what_the_trigger_box_says_about_the_run_is_recorded() {
+    let box_remark = Some("2 edges were late".to_owned());
+    let faults = Faults {
+        box_remark,
+        ..faults()
+    };
+    let told = run_plan(&plan(), faults, START, Sink::default());
+    let said = |r: &&Record| matches!(r, Record::Note { text, .. } if text == "trigger box: 2 edges were late");
+    assert_eq!(told.records.iter().filter(said).count(), 1);
+}
+
+#[test]
 fn a_run_that_is_dropped_or_unwound_comes_to_rest() {
     // The last one: the robot panics once more while the caller's panic unwinds.
     for (unwound, second) in [(false, None), (true, None), (true, Some(Failure::Panic))] {

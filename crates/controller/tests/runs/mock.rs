@@ -43,6 +43,8 @@ pub struct Faults {
     pub loss: Option<(CameraId, u64, u64)>,
     /// A camera that has something to say about its stream, once.
     pub remark: Option<(CameraId, String)>,
+    /// What the trigger box has to say about the run, once.
+    pub box_remark: Option<String>,
     /// The tip stays where it is sideways from this time on, ms.
     pub stuck_sideways_ms: Option<i64>,
     /// The operator's hand at this tick.
@@ -418,6 +420,10 @@ impl TriggerBox for MockTriggerBox {
 
     fn poll(&mut self, _reports: &mut Vec<BoxReport>) -> Result<(), DeviceError> {
         Ok(())
+    }
+
+    fn take_notes(&mut self) -> Vec<String> {
+        Vec::from_iter(lock(&self.0).faults.box_remark.take())
     }
 }
 

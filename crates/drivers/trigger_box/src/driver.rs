@@ -14,10 +14,12 @@ use skinrig_model::{
 use crate::config::TriggerBoxConfig;
 use crate::greeting::greet;
 use crate::link::Link;
+use crate::notes::{Losses, note};
 use crate::protocol::{Counters, MAX_SERIAL, MIN_SYNC_PERIOD_MS, SelfTest};
 use crate::serial::SerialDial;
+use crate::shared::{Shared, lock};
 use crate::wire::{Dial, OpenError, dial_patiently};
-use crate::worker::{Command, Done, Job, Shared, Worker, lock};
+use crate::worker::{Command, Done, Job, Worker};
 
 /// Beyond its deadline a command may still be on the line for one more try or one hello.
 const GRACE: Duration = Duration::from_secs(2);
@@ -34,6 +36,17 @@ pub struct SerialTriggerBox {
     jobs: Option<SyncSender<Job>>,
     shared: Arc<Mutex<Shared>>,
     thread: Option<JoinHandle<()>>,
+    told: Told,
+}
+
+/// What notes need not tell (again).
+#[derive(Default)]
+struct Told {
+    /// What the box had counted; `None` before it was armed, or when it did not say.
+    losses: Option<Losses>,
+    /// Resets until then: after another one the box counts from 0.
+    resets: u64,
+    contradictions: u64,
 }
 
 impl SerialTriggerBox {
@@ -90,6 +103,7 @@ impl SerialTriggerBox {
             jobs: Some(jobs),
             shared,
             thread: Some(thread),
+            told: Told::default(),
         })
     }
 
@@ -98,7 +112,20 @@ impl SerialTriggerBox {
     /// # Errors
     /// [`DeviceError::Lost`].
     pub fn arm(&mut self) -> Result<(), DeviceError> {
-        self.ask(Command::Arm).map(|_| ())
+        self.ask(Command::Arm)?;
+        // Only for the notes: a box that does not say is armed all the same, and they tell what it counted since its reset.
+        let losses = self.counters().ok().map(Losses::from);
+        self.told = self.told_until_now(losses);
+        Ok(())
+    }
+
+    fn told_until_now(&self, losses: Option<Losses>) -> Told {
+        let shared = lock(&self.shared);
+        Told {
+            losses,
+            resets: shared.resets,
+            contradictions: shared.contradictions,
+        }
     }
 
     /// Forbids pulses and ends the sync trains.
@@ -241,11 +268,29 @@ impl TriggerBox for SerialTriggerBox {
         if let Some(why) = &shared.down {
             return Err(lost(&self.identity.serial, why.clone()));
         }
-        if shared.faults.is_empty() {
-            Ok(())
-        } else {
-            Err(shared.faults.remove(0))
+        shared.next_fault(&self.identity.serial).map_or(Ok(()), Err)
+    }
+
+    fn take_notes(&mut self) -> Vec<String> {
+        let counters = self.counters();
+        let now = self.told_until_now(counters.as_ref().ok().map(|&c| c.into()));
+        let before = std::mem::replace(&mut self.told, now);
+        let contradictions = self.told.contradictions - before.contradictions;
+        let (since, losses) = match before.losses {
+            Some(losses) if before.resets == self.told.resets => {
+                ("it was armed or last asked", losses)
+            }
+            _ => ("its reset", Losses::default()),
+        };
+        let mut notes = Vec::new();
+        if let Err(e) = counters {
+            notes.push(format!(
+                "what it lost is not known, because its counters could not be read ({e}): look at the alignment certificate"
+            ));
         }
+        let now = *self.told.losses.get_or_insert(losses);
+        notes.extend(note(since, losses, now, contradictions));
+        notes
     }
 }
 

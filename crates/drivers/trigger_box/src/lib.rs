@@ -10,9 +10,11 @@ pub mod driver;
 pub mod frame;
 pub mod greeting;
 pub mod link;
+mod notes;
 pub mod offset;
 pub mod protocol;
 pub mod serial;
+mod shared;
 pub mod wire;
 mod worker;
 

@@ -2,10 +2,11 @@
 //! the box's events, and brings a lost line back.
 
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use skinrig_device::{DeviceError, RealClock};
+use skinrig_model::pulse::MAX_MARKED_PRESS;
 use skinrig_model::{BoxReport, DeviceRole, Mark, SentMark};
 
 use crate::config::TriggerBoxConfig;
@@ -13,17 +14,15 @@ use crate::greeting::{Greeted, GreetingError, greet};
 use crate::link::{Answer, Link, LinkError, Patience};
 use crate::offset::{Exchange, HostFromBox};
 use crate::protocol::{Counters, Event, EventKind, Events, Outcome, Request, SelfTest, parse_mark};
+use crate::shared::{Shared, lock};
 use crate::wire::Dial;
 
-/// Reports that are kept for [`skinrig_device::TriggerBox::poll`]: an hour of exchanges and sync trains.
-const MAX_REPORTS: usize = 65_536;
-/// Faults that are kept for it: whoever does not ask learns of the first ones.
-const MAX_FAULTS: usize = 64;
 /// From one attempt to open a lost line to the next.
 const DIAL_INTERVAL: Duration = Duration::from_millis(100);
 /// How long a hello may take on a line that came back, before commands are looked at again.
 const GREETING_SLICE: Duration = Duration::from_millis(450);
-/// How many counts of sync trains are passed over after a reset, so that no count can mean two trains.
+/// How many counts of sync trains are passed over whenever the box is told anew where to begin, besides those that it may
+/// have used since its last word: no count may mean two trains.
 const SYNC_GAP: u32 = 64;
 
 /// What a caller may ask of the thread.
@@ -54,28 +53,33 @@ pub(crate) struct Job {
     pub deadline: Instant,
 }
 
-/// What the thread tells without being asked.
-#[derive(Default)]
-pub(crate) struct Shared {
-    pub reports: Vec<BoxReport>,
-    /// Each is told once.
-    pub faults: Vec<DeviceError>,
-    /// Why the line is down, if it is.
-    pub down: Option<String>,
-    pub contradictions: u64,
-}
-
-pub(crate) fn lock(shared: &Mutex<Shared>) -> MutexGuard<'_, Shared> {
-    // What is in there stays whole whatever panicked.
-    shared.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
 /// What the box should be doing: put back after each reset.
 #[derive(Default)]
 struct Desired {
     armed: bool,
     sync_ms: u16,
     next_sync: u32,
+    /// Period of the trains that the box was last told to send, ms, whether it still does or not.
+    told_sync_ms: u16,
+}
+
+impl Desired {
+    /// The train with this count began. One that is told late, after the box was given a later count, changes nothing.
+    fn saw_sync(&mut self, count: u32) {
+        let next = count.wrapping_add(1);
+        if next.wrapping_sub(self.next_sync) & MAX_MARKED_PRESS <= MAX_MARKED_PRESS / 2 {
+            self.next_sync = next & MAX_MARKED_PRESS;
+        }
+    }
+
+    /// Before the box is told where to begin: the host may have missed as many trains as fit into the silence that the
+    /// box bears, and a few more that were not fetched yet.
+    fn pass_over_used_counts(&mut self, silence_ms: u16) {
+        if let Some(missed) = silence_ms.checked_div(self.told_sync_ms) {
+            self.next_sync = (self.next_sync + u32::from(missed) + SYNC_GAP) & MAX_MARKED_PRESS;
+        }
+        self.told_sync_ms = self.sync_ms;
+    }
 }
 
 pub(crate) struct Worker {
@@ -312,7 +316,7 @@ impl Worker {
         let report = match event.kind {
             EventKind::Mark(mark) => BoxReport::Mark { mark, at },
             EventKind::Sync(count) => {
-                self.desired.next_sync = count.wrapping_add(1);
+                self.desired.saw_sync(count);
                 BoxReport::Sync { count, at }
             }
             EventKind::Input { rising } => BoxReport::Input { rising, at },
@@ -321,16 +325,7 @@ impl Worker {
     }
 
     fn report(&self, report: BoxReport) {
-        let mut shared = lock(&self.shared);
-        if shared.reports.len() < MAX_REPORTS {
-            shared.reports.push(report);
-            return;
-        }
-        drop(shared);
-        self.fault(
-            "asked for its reports",
-            format!("left alone until {MAX_REPORTS} of them were waiting; later ones are lost"),
-        );
+        lock(&self.shared).report(report);
     }
 
     fn fault(&self, expected: &str, found: String) {
@@ -339,10 +334,7 @@ impl Worker {
 
     /// Keeps a fault for the next poll.
     fn remember(&self, fault: DeviceError) {
-        let mut shared = lock(&self.shared);
-        if shared.faults.len() < MAX_FAULTS && !shared.faults.contains(&fault) {
-            shared.faults.push(fault);
-        }
+        lock(&self.shared).remember(fault);
     }
 
     /// Asks the box, and notices on the way that it was reset or has disarmed itself.
@@ -436,8 +428,8 @@ impl Worker {
             self.boot = greeted.boot;
             self.next_event = 0;
             self.dropped = 0;
-            self.desired.next_sync = self.desired.next_sync.wrapping_add(SYNC_GAP);
             self.host_from_box.clear();
+            lock(&self.shared).resets += 1;
             self.report(BoxReport::Reset {
                 noticed: self.clock.now(),
             });
@@ -461,6 +453,7 @@ impl Worker {
         if !self.desired.armed {
             return Ok(());
         }
+        self.desired.pass_over_used_counts(self.config.silence_ms);
         let arm = Request::Arm {
             silence_ms: self.config.silence_ms,
         };
@@ -535,5 +528,27 @@ fn exchange(answer: &Answer) -> Exchange {
         sent: answer.sent,
         received: answer.received,
         at: answer.reply.at,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_train_that_is_told_late_does_not_bring_its_count_back() {
+        let mut desired = Desired {
+            sync_ms: 100,
+            told_sync_ms: 100,
+            next_sync: MAX_MARKED_PRESS - 20,
+            ..Desired::default()
+        };
+        desired.pass_over_used_counts(5_000);
+        // 50 trains in the silence and 64 more, beyond the 17 bits.
+        assert_eq!(desired.next_sync, 93);
+        desired.saw_sync(MAX_MARKED_PRESS - 20);
+        assert_eq!(desired.next_sync, 93);
+        desired.saw_sync(93);
+        assert_eq!(desired.next_sync, 94);
     }
 }

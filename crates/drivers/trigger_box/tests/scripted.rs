@@ -15,6 +15,7 @@ const HELLO: u8 = 1;
 const ARM: u8 = 2;
 const DISARM: u8 = 3;
 const MARK: u8 = 4;
+const SYNC: u8 = 5;
 const EVENTS: u8 = 6;
 
 /// A box that does what the script says.
@@ -29,6 +30,8 @@ struct Script {
     arms: u32,
     last_mark: u32,
     trains: Vec<u32>,
+    /// First counts of the sync trains that it was told to send.
+    firsts: Vec<u32>,
     dropped: u16,
     // what goes wrong
     /// Swallows requests of this command, so many times.
@@ -64,6 +67,7 @@ impl Default for Script {
             arms: 0,
             last_mark: 0,
             trains: Vec::new(),
+            firsts: Vec::new(),
             dropped: 0,
             deaf_to: None,
             mute_after: None,
@@ -122,6 +126,7 @@ impl Script {
                 self.arms += 1;
             }
             DISARM => self.armed = false,
+            SYNC => self.firsts.push(number(2)),
             MARK if self.reset_at_mark => {
                 self.reset_at_mark = false;
                 self.reset();
@@ -510,6 +515,34 @@ fn what_went_wrong_at_the_box_is_told_once() {
     line.script().strange_event = true;
     let fault = next_fault(&mut device);
     assert!(fault.to_string().contains("expected events"), "{fault}");
+}
+
+#[test]
+fn no_count_of_a_sync_train_comes_again_however_the_box_came_back() {
+    let (line, mut device) = open();
+    line.script().firsts.clear();
+    device.set_sync(Some(28)).unwrap();
+    {
+        let mut script = line.script();
+        (script.armed, script.silent_disarm) = (false, true);
+    }
+    next_fault(&mut device);
+    line.script().reset_at_mark = true;
+    device.send(mark(1)).unwrap_err();
+    poll_until_well(&mut device);
+    {
+        let mut script = line.script();
+        (script.broken, script.absent) = (true, u32::MAX);
+    }
+    device.send(mark(2)).unwrap_err();
+    line.script().absent = 0;
+    poll_until_well(&mut device);
+    device.arm().unwrap();
+    // Within a silence of 5 s, the box sends 178 trains that the host may never hear of.
+    let firsts: Vec<u32> = (0..5).map(|k| k * (178 + 64)).collect();
+    let mut script = line.script();
+    script.firsts.dedup(); // a request may be repeated
+    assert_eq!(script.firsts, firsts);
 }
 
 #[test]
