@@ -8,6 +8,8 @@ use skinrig_device::{DeviceError, Indenter, MotionLimits, RealClock};
 use skinrig_model::Setting;
 
 use super::scripted::Scripted;
+use crate::config::SupervisorCommand;
+use crate::supervisor::Supervisor;
 use crate::{Omega, OmegaConfig, OmegaError};
 
 const LIMITS: MotionLimits = MotionLimits {
@@ -62,6 +64,25 @@ fn what_the_operator_is_told_is_recorded() {
         "{settings:?}"
     );
     assert!(told.clone().all(|s| s.requested == Setting::AS_FOUND));
+}
+
+#[test]
+#[cfg(unix)]
+fn a_supervisor_that_does_not_hear_its_goodbye_is_ended() {
+    let deaf = SupervisorCommand {
+        program: "sh".into(),
+        arguments: vec!["-c".to_owned(), "echo ready; exec sleep 3600".to_owned()],
+    };
+    let mut supervisor = Supervisor::start(
+        &deaf,
+        "scripted".as_ref(),
+        Some(77),
+        Duration::from_secs(30),
+    )
+    .unwrap();
+    supervisor.check().unwrap();
+    // A wait without an end would be the hang of this test.
+    supervisor.dismiss();
 }
 
 #[test]
