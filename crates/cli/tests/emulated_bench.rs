@@ -58,6 +58,8 @@ fn run_in_real_time(bench: &EmulatedBench, sessions: &Path) -> (PathBuf, String)
         let starved = [
             "expected a pose sample no older than",
             "the session is INVALID",
+            "no answer to",
+            "nobody looked at the live arm",
         ]
         .iter()
         .any(|sign| said.contains(sign));

@@ -140,7 +140,7 @@ fn train(mark: Mark, t_us: u64) -> impl Iterator<Item = TriggerEdge> {
 }
 
 #[test]
-fn drifts_up_to_1000_ppm_come_out_with_a_third_of_the_edges_spoiled() {
+fn drifts_up_to_1000_ppm_come_out_with_a_third_of_the_trains_spoiled() {
     let (slope, place) = (Watch::new(&bounds::DRIFT), Watch::new(&bounds::OFFSET));
     for base_us in [
         4_200_000u64,
@@ -157,9 +157,10 @@ fn drifts_up_to_1000_ppm_come_out_with_a_third_of_the_edges_spoiled() {
                 let jitter = 2.0 * random.unit() - 1.0;
                 let after = (host_us * (1.0 + drift * 1e-6) + jitter).round() as u64;
                 let mut these: Vec<TriggerEdge> = train(mark.mark, base_us + after).collect();
-                let k = (random.unit() * 44.0) as usize;
+                let k = (random.unit() * 48.0) as usize;
                 match i % 6 {
-                    1 => drop(these.remove(k)),
+                    // Eight pulses in a row: more than the code can do without.
+                    1 => drop(these.drain(k..k + 16)),
                     3 => these.insert(k, these[k]),
                     _ => {}
                 }
@@ -167,12 +168,12 @@ fn drifts_up_to_1000_ppm_come_out_with_a_third_of_the_edges_spoiled() {
             }
             let found = fit_marks(&edges, 0, &sent).unwrap();
             let at = format!("from {base_us} µs, {drift} ppm: {:?}", found.fit);
-            assert!((260..=267).contains(&found.fit.n), "{at}");
+            assert_eq!(found.fit.n, 333, "{at}");
             assert!(
                 found.warnings.iter().any(|w| w.contains("were not seen")),
                 "{at}"
             );
-            // 267 marks of 0.6 µs rms jitter over 700 s.
+            // 333 marks of 0.6 µs rms jitter over 700 s.
             slope.see((found.fit.drift_ppm - drift).abs(), &at);
             for host_us in [5e6, 2e8, 7e8] {
                 let exact = exact_camera(0.0, drift, host_us) + real(base_us as f64);

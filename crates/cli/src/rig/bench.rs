@@ -1,6 +1,7 @@
 //! A bench from its rig file: the drivers opened, identified, and put together as a rig.
 
 use std::path::Path;
+use std::time::Duration;
 
 use skinrig_controller::ControllerSettings;
 use skinrig_device::{
@@ -65,7 +66,7 @@ pub fn open(rig: &RigFile, protocol: &Protocol) -> Result<Rig, Failure> {
         open_camera(&rig.cameras[1], CameraId::Two, clock)?,
     ];
     let trigger_box = match &rig.trigger_box {
-        Some(setup) => Some(open_trigger_box(setup, clock)?),
+        Some(setup) => Some(open_trigger_box(setup, rig.kind, clock)?),
         None => None,
     };
     Ok(Rig {
@@ -245,10 +246,21 @@ fn camera_settings(
     Ok(settings)
 }
 
-fn open_trigger_box(setup: &BoxSetup, clock: RealClock) -> Result<Box<dyn TriggerBox>, Failure> {
+fn open_trigger_box(
+    setup: &BoxSetup,
+    kind: RigKind,
+    clock: RealClock,
+) -> Result<Box<dyn TriggerBox>, Failure> {
     let mut config = TriggerBoxConfig::new(&setup.port);
     config.serial.clone_from(&setup.serial);
     config.max_drift_ppm = setup.max_drift_ppm;
+    if kind == RigKind::Emulated {
+        // A simulated processor that has to wait for a real one answers late.
+        config.reply_timeout = Duration::from_millis(500);
+        config.command_timeout = Duration::from_secs(10);
+        config.hello_timeout = Duration::from_secs(20);
+        config.silence_ms = 30_000;
+    }
     let open = || {
         let mut device = SerialTriggerBox::open(config, clock)?;
         device.set_sync(Some(setup.sync_period_ms))?;
