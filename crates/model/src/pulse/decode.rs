@@ -47,7 +47,7 @@ pub struct ReadTrain {
 ///
 /// The error that remains needs at least three bits, each with its own falling edge lost and a spurious one within
 /// the tolerance of the other width, in the places that another word demands. On a line that loses 20 % of its edges and
-/// invents 5 %, about one train in ten is read, and no wrong one was seen in 10^7 (see the tests). More can be read by
+/// invents 5 %, 7 % of the trains are read, and no wrong one was seen in 10^7 (see the tests). More can be read by
 /// who knows what was sent: see [`read_trains`].
 #[must_use]
 pub fn decode_marks(edges: &[TriggerEdge]) -> DecodedMarks {
