@@ -128,7 +128,7 @@ impl ProgressTracker {
                 self.reached(*t);
                 self.progress.eta = None;
             }
-            Record::Preflight(_) => {}
+            Record::Preflight(_) | Record::Resumed(_) => {}
             Record::Command { t, .. } | Record::Note { t, .. } => self.reached(*t),
             Record::Device { .. } => {}
         }

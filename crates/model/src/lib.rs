@@ -28,10 +28,11 @@ pub use id::{AttemptId, CameraId, PressId};
 pub use lens::{LensAngle, LensModel};
 pub use pose::PoseSample;
 pub use preflight::{CheckVerdict, PreflightCheck};
-pub use press::{PlannedPress, PressOutcome, PressRole, PressTiming, PressVerdict};
+pub use press::{PlannedPress, PressHistory, PressOutcome, PressRole, PressTiming, PressVerdict};
 pub use pulse::{Label, Mark, MarkKind, PulseTrain, SeenMark, SeenSync, SentMark};
 pub use record::{
-    DeviceIdentity, DeviceRole, InterruptionKind, MotionCommand, Record, RunEnd, RunHeader, Setting,
+    DeviceIdentity, DeviceRole, InterruptionKind, MotionCommand, Record, ResumeHeader, RunEnd,
+    RunHeader, Setting,
 };
 pub use scene::{SceneNeed, SimLevel};
 pub use settings::{

@@ -88,6 +88,15 @@ impl PressVerdict {
     }
 }
 
+/// What a session knows of one planned press: where a resumed run goes on.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct PressHistory {
+    /// Attempts so far; 0: nothing is known of it.
+    pub attempts: u32,
+    /// The verdict of the last one; absent when there was none, or when it was cut off.
+    pub verdict: Option<PressVerdict>,
+}
+
 /// The measured result of one attempt.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PressOutcome {

@@ -134,6 +134,22 @@ pub struct RunHeader {
     pub presses: Vec<PlannedPress>,
 }
 
+/// What is known before anything moves when a session goes on that was cut off or not finished. Protocol, plan, seed and frame are
+/// the session's own; everything here may differ from its first leg.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ResumeHeader {
+    /// Who runs it now.
+    pub operator: String,
+    /// Civil time of this leg's start, RFC 3339; for people.
+    pub started_at: String,
+    /// Host name.
+    pub host: String,
+    /// Version of skinrig.
+    pub software: String,
+    /// The command line.
+    pub command_line: String,
+}
+
 /// A motion command as the controller gave it to the indenter.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct MotionCommand {
@@ -202,6 +218,9 @@ impl RunEnd {
 pub enum Record {
     /// The first record of every run.
     Started(Box<RunHeader>),
+    /// The first record of every further *leg*: another process goes on with the session. Its host clock, its cameras' clocks
+    /// and its chunk numbers begin anew; the recorder joins them to those before.
+    Resumed(Box<ResumeHeader>),
     /// A device answered and was configured.
     Device {
         /// Its role.

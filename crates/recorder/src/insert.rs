@@ -115,6 +115,7 @@ impl Journal {
                 Ok(())
             }
             Record::Preflight(checks) => self.preflight(&checks).await,
+            Record::Resumed(_) => Err(Fault::bad("record", "a new session", "a resumed one")),
             Record::Intent { attempt, t } => {
                 sqlx::query(
                     "INSERT INTO attempt (press, number, previous, intent_ns) VALUES (?, ?, ?, ?)",
