@@ -55,7 +55,7 @@ pub(crate) struct Core<'a> {
     pub(crate) checks: Vec<PreflightCheck>,
     /// While the cameras are checked: what they deliver.
     pub(crate) watch: Option<Watch>,
-    /// While ending: cameras and limits no longer stop anything.
+    /// While ending: cameras and the trigger box no longer stop anything.
     pub(crate) ending: bool,
     marks: VecDeque<Mark>,
     marks_since: HostTime,
@@ -89,12 +89,7 @@ impl<'a> Core<'a> {
             settings,
             header: Some(Box::new(header)),
             robot_from_skin,
-            indenter: GuardedIndenter::new(
-                indenter,
-                robot_from_skin,
-                plan.limits,
-                settings.stale_after,
-            ),
+            indenter: GuardedIndenter::new(indenter, robot_from_skin, plan.limits, &settings),
             cameras,
             camera_settings,
             trigger_box,
@@ -201,13 +196,7 @@ impl<'a> Core<'a> {
     fn observe_poses(&mut self) -> Result<(), ControllerError> {
         let mut fresh = std::mem::take(&mut self.fresh);
         fresh.clear();
-        let mut answer = self.indenter.poll(&mut fresh);
-        if answer.is_ok() && self.indenter.is_armed() && self.indenter.position().is_some() {
-            answer = self
-                .indenter
-                .check_fresh(self.clock.now())
-                .map_err(Into::into);
-        }
+        let answer = self.indenter.poll(self.clock.as_ref(), &mut fresh);
         for sample in &fresh {
             if let Some(tracker) = self.open.as_mut().and_then(|o| o.tracker.as_mut()) {
                 tracker.feed(sample);
@@ -218,9 +207,6 @@ impl<'a> Core<'a> {
             if let Some(settling) = &mut self.settling {
                 settling.feed(sample);
             }
-            if answer.is_ok() && !self.ending {
-                answer = self.check_limits(sample);
-            }
         }
         self.poses.extend_from_slice(&fresh);
         self.fresh = fresh;
@@ -228,27 +214,6 @@ impl<'a> Core<'a> {
             self.emit_poses()?;
         }
         answer
-    }
-
-    fn check_limits(&self, sample: &PoseSample) -> Result<(), ControllerError> {
-        let limits = &self.plan.limits;
-        if sample.force_n > limits.max_force_n {
-            return Err(ControllerError::Force {
-                limit_n: limits.max_force_n,
-                found_n: sample.force_n,
-                t: sample.t,
-            });
-        }
-        let deepest = limits.max_depth_mm + limits.position_tolerance_mm;
-        // Before the robot is armed it may lie anywhere; so may one that starts too deep: it rises first.
-        if self.open.is_some() && -sample.measured.z_mm > deepest {
-            return Err(ControllerError::Depth {
-                limit_mm: deepest,
-                found_mm: -sample.measured.z_mm,
-                t: sample.t,
-            });
-        }
-        Ok(())
     }
 
     /// Emits the samples that are still kept back.

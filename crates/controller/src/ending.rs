@@ -134,7 +134,8 @@ impl Core<'_> {
     /// Off the skin if the robot still answers; hold; disarm; cameras flushed and stopped; notes. Gives whether
     /// the tip was seen at clearance height and whether the robot confirmed that it is disarmed.
     fn make_safe(&mut self) -> (bool, bool) {
-        let mut retracted = true;
+        let tripped = self.indenter.trip().is_some();
+        let mut retracted = !tripped || self.indenter.is_clear();
         if self.indenter.is_armed() {
             retracted = (0..TRIES).any(|_| self.attempt("retract", Self::lift));
             self.attempt("hold", |core| core.indenter.hold());

@@ -1,9 +1,10 @@
 //! What can end a run before its plan does.
 
 use skinrig_device::DeviceError;
-use skinrig_model::{HostDuration, HostTime, Point3, Skin};
+use skinrig_model::{HostDuration, Point3, Skin};
 
 use crate::sink::SinkFault;
+use crate::watchdog::Trip;
 
 /// A motion that never reached the robot. Nothing was done; the present motion goes on unchanged.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -62,6 +63,12 @@ pub enum GuardError {
         /// Age of the newest sample, or `none`.
         found: String,
     },
+    /// The watchdog tripped: only straight up.
+    #[error("expected a motion straight up after the watchdog tripped ({why}), found another one")]
+    Tripped {
+        /// Why it did.
+        why: String,
+    },
     /// The robot is not armed.
     #[error("expected an armed robot, found it disarmed")]
     NotArmed,
@@ -105,7 +112,7 @@ pub enum ControllerError {
         /// Each failed check: name, expected, found, next step. Not empty.
         failed: Vec<String>,
     },
-    /// The pose stream stopped, runs backwards or holds values that are no numbers.
+    /// The pose stream did not begin, or says too little.
     #[error("pose stream: expected {expected}, found {found}")]
     PoseStream {
         /// What a stream delivers.
@@ -127,26 +134,9 @@ pub enum ControllerError {
         /// Where the tip was then.
         found: Option<Point3<Skin>>,
     },
-    /// A measured force above the limit.
-    #[error("force: expected at most {limit_n} N, found {found_n:.3} N at {t}")]
-    Force {
-        /// N.
-        limit_n: f64,
-        /// N.
-        found_n: f64,
-        /// When.
-        t: HostTime,
-    },
-    /// A measured tip deeper than allowed.
-    #[error("depth: expected at most {limit_mm} mm, found {found_mm:.3} mm at {t}")]
-    Depth {
-        /// mm, positive, tolerance included.
-        limit_mm: f64,
-        /// mm, positive.
-        found_mm: f64,
-        /// When.
-        t: HostTime,
-    },
+    /// A measured limit was broken.
+    #[error(transparent)]
+    Watchdog(#[from] Trip),
     /// A camera's chunks do not follow each other.
     #[error("{camera}: expected chunk {expected}, found chunk {found}")]
     ChunkOrder {

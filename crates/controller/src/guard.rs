@@ -1,16 +1,20 @@
 //! The only hand on the robot: every motion is checked here, against what the robot last measured.
 
-use skinrig_device::{Indenter, IndenterCapabilities, MotionLimits, RobotSample};
+use skinrig_device::{
+    Clock, DeviceError, Indenter, IndenterCapabilities, MotionLimits, RobotSample,
+};
 use skinrig_model::{
     DeviceIdentity, HostDuration, HostTime, Point3, PoseSample, RigidTransform, Robot, Setting,
     Skin,
 };
-use skinrig_protocol::plan::RunLimits;
+use skinrig_protocol::plan::{OnTrip, RunLimits};
 
 use crate::error::{ControllerError, GuardError};
+use crate::settings::ControllerSettings;
+use crate::watchdog::{Trip, WatchLimits, Watchdog};
 
-/// Owns the indenter. Takes targets in the skin frame, refuses what the limits of the run forbid, and gives
-/// poses in the skin frame.
+/// Owns the indenter. Takes targets in the skin frame, refuses what the limits of the run forbid, gives poses in the
+/// skin frame, and feeds them to its watchdog: when that trips, the robot holds or brakes before anybody is asked.
 pub struct GuardedIndenter {
     inner: Box<dyn Indenter>,
     robot_from_skin: RigidTransform<Robot, Skin>,
@@ -18,20 +22,22 @@ pub struct GuardedIndenter {
     limits: RunLimits,
     stale_after: HostDuration,
     armed: bool,
-    last: Option<PoseSample>,
+    watchdog: Watchdog,
+    trip: Option<Trip>,
     target: Option<Point3<Skin>>,
     samples: Vec<RobotSample>,
 }
 
 impl GuardedIndenter {
-    /// Takes `inner` over. A newest sample older than `stale_after` forbids motion.
+    /// Takes `inner` over. A newest sample older than the settings allow forbids motion.
     #[must_use]
     pub fn new(
         inner: Box<dyn Indenter>,
         robot_from_skin: RigidTransform<Robot, Skin>,
         limits: RunLimits,
-        stale_after: HostDuration,
+        settings: &ControllerSettings,
     ) -> Self {
+        let (stale_after, late_after) = (settings.stale_after, settings.late_after);
         Self {
             inner,
             robot_from_skin,
@@ -39,7 +45,8 @@ impl GuardedIndenter {
             limits,
             stale_after,
             armed: false,
-            last: None,
+            watchdog: Watchdog::new(WatchLimits::of(&limits, stale_after, late_after)),
+            trip: None,
             target: None,
             samples: Vec::new(),
         }
@@ -70,6 +77,8 @@ impl GuardedIndenter {
     pub fn arm(&mut self) -> Result<(), ControllerError> {
         self.inner.arm()?;
         self.armed = true;
+        self.trip = None;
+        self.watchdog.start();
         Ok(())
     }
 
@@ -82,13 +91,19 @@ impl GuardedIndenter {
     /// The newest sample.
     #[must_use]
     pub const fn position(&self) -> Option<PoseSample> {
-        self.last
+        self.watchdog.last()
+    }
+
+    /// Why the watchdog tripped since the robot was armed; the first reason.
+    #[must_use]
+    pub const fn trip(&self) -> Option<&Trip> {
+        self.trip.as_ref()
     }
 
     /// True when the tip was last seen at clearance height or above, within the tolerance.
     #[must_use]
     pub fn is_clear(&self) -> bool {
-        self.last
+        self.position()
             .is_some_and(|p| p.measured.z_mm >= self.clear_height_mm())
     }
 
@@ -100,7 +115,7 @@ impl GuardedIndenter {
     /// depend on when one looks) unless the tip is away from it sideways, then above the tip as measured.
     #[must_use]
     pub fn point_above(&self) -> Option<Point3<Skin>> {
-        let last = self.last?;
+        let last = self.position()?;
         let held = self.target.unwrap_or(last.commanded);
         let near =
             held.plane().distance_mm(last.measured.plane()) <= self.limits.position_tolerance_mm;
@@ -108,18 +123,13 @@ impl GuardedIndenter {
         Some(foot.plane().at_height(self.limits.clearance_mm))
     }
 
-    /// Age of the newest sample.
-    fn age(&self, now: HostTime) -> Option<HostDuration> {
-        self.last.map(|p| now - p.t)
-    }
-
     /// Checks that the pose stream is alive.
     ///
     /// # Errors
     /// [`GuardError::StalePose`].
     pub fn check_fresh(&self, now: HostTime) -> Result<(), GuardError> {
-        match self.age(now) {
-            Some(age) if age <= self.stale_after => Ok(()),
+        match self.watchdog.age(now) {
+            Some(age) if (HostDuration::ZERO..=self.stale_after).contains(&age) => Ok(()),
             age => Err(GuardError::StalePose {
                 limit: self.stale_after,
                 found: age.map_or_else(|| "none".to_owned(), |a| a.to_string()),
@@ -139,7 +149,8 @@ impl GuardedIndenter {
     ) -> Result<(), ControllerError> {
         self.check(target, speed_mm_s, now)?;
         self.inner
-            .command(self.robot_from_skin.apply(target), speed_mm_s)?;
+            .command(self.robot_from_skin.apply(target), speed_mm_s)
+            .map_err(|e| self.failed(e))?;
         self.target = Some(target);
         Ok(())
     }
@@ -167,10 +178,16 @@ impl GuardedIndenter {
             return Err(GuardError::NotArmed);
         }
         self.check_fresh(now)?;
-        let Some(last) = self.last else {
+        let Some(last) = self.position() else {
             return Err(GuardError::NotArmed); // a fresh pose exists, see above
         };
         let lateral_mm = target.plane().distance_mm(last.measured.plane());
+        let rises = target.z_mm >= last.measured.z_mm && lateral_mm <= limits.position_tolerance_mm;
+        if let Some(trip) = self.trip.as_ref().filter(|_| !rises) {
+            return Err(GuardError::Tripped {
+                why: trip.to_string(),
+            });
+        }
         let height_mm = target.z_mm.min(last.measured.z_mm);
         if lateral_mm > limits.position_tolerance_mm && height_mm < self.clear_height_mm() {
             return Err(GuardError::Lateral {
@@ -182,37 +199,67 @@ impl GuardedIndenter {
         Ok(())
     }
 
-    /// Appends all new samples, in the skin frame.
+    /// Appends all new samples, in the skin frame, and lets the watchdog look at them and at the present of `clock`.
     ///
     /// # Errors
-    /// [`ControllerError::PoseStream`] for samples out of order or without numbers (good ones before are
-    /// appended); what the robot answers, after appending what it delivered.
-    pub fn poll(&mut self, poses: &mut Vec<PoseSample>) -> Result<(), ControllerError> {
+    /// [`ControllerError::Watchdog`] when a limit is broken: the robot was told to hold or to brake, and until it is
+    /// armed again only a rise is allowed. A sample whose form is wrong and what came after it is not appended. What the
+    /// robot answers, after appending what it delivered.
+    pub fn poll(
+        &mut self,
+        clock: &dyn Clock,
+        poses: &mut Vec<PoseSample>,
+    ) -> Result<(), ControllerError> {
         self.samples.clear();
         let answer = self.inner.poll(&mut self.samples);
+        let mut seen = Ok(());
         for s in &self.samples {
-            if !s.measured.is_finite() || !s.commanded.is_finite() {
-                return Err(ControllerError::PoseStream {
-                    expected: "finite coordinates".to_owned(),
-                    found: format!("{:?} at {}", s.measured.to_array(), s.t),
-                });
-            }
-            if let Some(last) = self.last.filter(|last| s.t <= last.t) {
-                return Err(ControllerError::PoseStream {
-                    expected: format!("a sample after {}", last.t),
-                    found: format!("one at {}", s.t),
-                });
-            }
             let pose = PoseSample {
                 t: s.t,
                 commanded: to_nanometre(self.skin_from_robot.apply(s.commanded)),
                 measured: to_nanometre(self.skin_from_robot.apply(s.measured)),
                 force_n: s.force_n,
             };
-            self.last = Some(pose);
+            let one = self.watchdog.see(&pose);
+            let form_is_wrong = matches!(one, Err(Trip::Feedback { .. }));
+            if seen.is_ok() || form_is_wrong {
+                seen = one;
+            }
+            if form_is_wrong {
+                break;
+            }
             poses.push(pose);
         }
-        Ok(answer?)
+        let looked = self.watchdog.look(clock.now());
+        // Both are answered: the second one may say that the robot is to brake.
+        for trip in [&seen, &looked]
+            .into_iter()
+            .filter_map(|r| r.as_ref().err())
+        {
+            self.react(trip);
+        }
+        seen.and(looked)?;
+        answer.map_err(|e| self.failed(e))
+    }
+
+    /// Holds or brakes. What the robot answers is told again by the end of the run.
+    fn react(&mut self, trip: &Trip) {
+        if !self.armed {
+            return;
+        }
+        self.trip.get_or_insert_with(|| trip.clone());
+        let brake = trip.is_blind() || self.limits.on_trip == OnTrip::Brake;
+        if brake || self.hold().is_err() {
+            let _ = self.disarm();
+        }
+    }
+
+    /// A device that fails while armed is told to hold, if it still hears; a refusal is no failure.
+    fn failed(&mut self, e: DeviceError) -> ControllerError {
+        if self.armed && !matches!(e, DeviceError::Refused { .. }) {
+            let _ = self.inner.hold();
+        }
+        e.into()
     }
 
     /// Stops where it is and holds.
@@ -229,6 +276,7 @@ impl GuardedIndenter {
     /// What the robot answers; no motion is allowed after that either.
     pub fn disarm(&mut self) -> Result<(), ControllerError> {
         self.armed = false;
+        self.watchdog.stop();
         Ok(self.inner.disarm()?)
     }
 }

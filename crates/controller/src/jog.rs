@@ -73,8 +73,7 @@ impl Jog {
         robot_limits: &MotionLimits,
         settings: ControllerSettings,
     ) -> Result<(Self, Vec<Setting>), ControllerError> {
-        let indenter =
-            GuardedIndenter::new(indenter, robot_from_frame, limits, settings.stale_after);
+        let indenter = GuardedIndenter::new(indenter, robot_from_frame, limits, &settings);
         let mut jog = Self {
             indenter,
             clock,
@@ -116,7 +115,7 @@ impl Jog {
     /// Where the tip is, after a look at the robot. To be called often: it also watches force and stream.
     ///
     /// # Errors
-    /// [`ControllerError::Force`] above the limit, a stale or broken pose stream, what the robot answers.
+    /// [`ControllerError::Watchdog`] above the force limit, with a stale or broken pose stream; what the robot answers.
     pub fn look(&mut self) -> Result<PoseSample, ControllerError> {
         self.tick()?;
         self.position()
@@ -310,26 +309,14 @@ impl Jog {
     fn tick(&mut self) -> Result<(), ControllerError> {
         self.clock.wait_until(self.clock.now() + self.settings.tick);
         self.fresh.clear();
-        let polled = self.indenter.poll(&mut self.fresh);
+        let polled = self.indenter.poll(self.clock.as_ref(), &mut self.fresh);
         for s in &self.fresh {
             if self.traced.is_none_or(|t| s.t - t >= TRACE_EVERY) {
                 self.traced = Some(s.t);
                 self.trace.push(*s);
             }
         }
-        polled?;
-        if self.indenter.is_armed() && self.indenter.position().is_some() {
-            self.indenter.check_fresh(self.clock.now())?;
-        }
-        let limit_n = self.limits.max_force_n;
-        match self.fresh.iter().find(|s| s.force_n > limit_n) {
-            Some(s) if !self.finished => Err(ControllerError::Force {
-                limit_n,
-                found_n: s.force_n,
-                t: s.t,
-            }),
-            _ => Ok(()),
-        }
+        polled
     }
 }
 

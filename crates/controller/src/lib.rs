@@ -46,6 +46,7 @@ pub mod sink;
 pub mod states;
 mod steps;
 mod touch;
+pub mod watchdog;
 
 pub use checks::{ExpectedDevice, Loopback, Preflight};
 pub use control::ControlHandle;
@@ -56,3 +57,4 @@ pub use progress::{Progress, ProgressTracker};
 pub use run::{Armed, Finished, Planned, Run, RunReport, Running, execute, execute_checked};
 pub use settings::ControllerSettings;
 pub use sink::{RecordSink, SinkFault};
+pub use watchdog::{Trip, WatchLimits, Watchdog};

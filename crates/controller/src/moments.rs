@@ -368,6 +368,8 @@ mod tests {
         max_force_n: 8.0,
         position_tolerance_mm: 0.1,
         settle_time: HostDuration::from_millis(2),
+        max_acceleration_mm_s2: None,
+        on_trip: skinrig_protocol::OnTrip::Retract,
     };
 
     /// Heights, one per millisecond from 1 ms on; the set point is the tip.

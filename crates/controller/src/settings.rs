@@ -11,6 +11,8 @@ pub struct ControllerSettings {
     pub tick: HostDuration,
     /// A newest pose sample older than this is stale: no motion is commanded and the run ends.
     pub stale_after: HostDuration,
+    /// The tip is low and nobody looked for longer than this: the run ends.
+    pub late_after: HostDuration,
     /// Longest time from arming the robot to the first sample of its pose stream.
     pub first_pose_within: HostDuration,
     /// Speed of motions that are not in the plan (rising from an unknown start, retracting after a
@@ -29,6 +31,7 @@ impl Default for ControllerSettings {
         Self {
             tick: HostDuration::from_millis(5),
             stale_after: HostDuration::from_millis(100),
+            late_after: HostDuration::from_millis(1_000),
             first_pose_within: HostDuration::from_millis(2_000),
             rise_speed_mm_s: 20.0,
             rise_allowance: HostDuration::from_millis(3_000),

@@ -37,7 +37,7 @@ mod yaml;
 pub use area::{Area, KeepOut, Surroundings};
 pub use check::{Segment, Violation, check};
 pub use diagnostic::{Diagnostic, Diagnostics};
-pub use plan::{Plan, PressStep, RunLimits, Step};
+pub use plan::{OnTrip, Plan, PressStep, RunLimits, Step};
 pub use protocol::{CameraRequest, Loader, Motion, Pace, Protocol, Prototype, Scene, Sync};
 pub use reference_code::REFERENCE_CODE;
 pub use rig::{RigFile, RigKind};

@@ -44,6 +44,31 @@ pub struct RunLimits {
     pub position_tolerance_mm: f64,
     /// How long the pose must stay within the tolerance to count as settled.
     pub settle_time: HostDuration,
+    /// Largest acceleration of the set point, mm/s²; the robot's own when absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub max_acceleration_mm_s2: Option<f64>,
+    /// What the robot does when a limit is broken.
+    #[serde(default, skip_serializing_if = "OnTrip::is_retract")]
+    pub on_trip: OnTrip,
+}
+
+/// What the robot does when a measured limit is broken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum OnTrip {
+    /// Holds, and rises straight up off the skin; brakes where it is when its feedback is not to be believed.
+    #[default]
+    Retract,
+    /// Brakes where it is.
+    Brake,
+}
+
+impl OnTrip {
+    /// True for the default.
+    #[must_use]
+    pub const fn is_retract(&self) -> bool {
+        matches!(self, Self::Retract)
+    }
 }
 
 /// One step.

@@ -15,7 +15,7 @@ use chrono::Utc;
 use skinrig_controller::{ControllerError, ControllerSettings, GuardError, Jog, Moved, Touched};
 use skinrig_device::{Clock, Indenter, MotionLimits, RealClock};
 use skinrig_model::{HostDuration, Point3, PoseSample, RigidTransform, Robot, SimLevel, Skin};
-use skinrig_protocol::plan::RunLimits;
+use skinrig_protocol::plan::{OnTrip, RunLimits};
 use skinrig_protocol::{Surface, TouchSearch};
 use skinrig_sim::{SimConfig, in_real_time, simulated_rig};
 
@@ -111,6 +111,8 @@ fn limits(bench: &Bench) -> (RunLimits, MotionLimits) {
         max_force_n: bench.max_force_n,
         position_tolerance_mm: TOLERANCE_MM,
         settle_time: HostDuration::from_millis(50),
+        max_acceleration_mm_s2: None,
+        on_trip: OnTrip::Retract,
     };
     let robot = MotionLimits {
         min_mm: bench.min_mm,
@@ -353,9 +355,9 @@ impl From<ControllerError> for Refusal {
     fn from(e: ControllerError) -> Self {
         match e {
             // The robot is silent: no matter of what was typed.
-            ControllerError::Guard(GuardError::StalePose { .. } | GuardError::NotArmed) => {
-                Self::Rig(e)
-            }
+            ControllerError::Guard(
+                GuardError::StalePose { .. } | GuardError::NotArmed | GuardError::Tripped { .. },
+            ) => Self::Rig(e),
             ControllerError::Guard(e) => Self::Input(e.to_string()),
             ControllerError::Device(e @ skinrig_device::DeviceError::Refused { .. }) => {
                 Self::Input(e.to_string())

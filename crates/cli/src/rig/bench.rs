@@ -86,12 +86,16 @@ pub fn open(rig: &RigFile, protocol: &Protocol) -> Result<Rig, Failure> {
 /// A pose this old still tells where a robot is that is moved by hand, or that shares a processor with everything else.
 pub const SLOW_STALE: HostDuration = HostDuration::from_millis(1_000);
 
+/// So long may a run on stand-ins not look while the tip is low.
+const SLOW_LATE: HostDuration = HostDuration::from_millis(5_000);
+
 /// How patient a run is with a rig of this kind: stand-ins share the processors of this computer.
 #[must_use]
 pub fn settings(kind: &str) -> ControllerSettings {
     let mut settings = ControllerSettings::default();
     if kind == RigKind::Emulated.name() {
         settings.stale_after = SLOW_STALE;
+        settings.late_after = SLOW_LATE;
     }
     settings
 }

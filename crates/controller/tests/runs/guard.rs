@@ -1,8 +1,8 @@
 //! Arbitrary commands: nothing forbidden reaches the robot, and everything allowed does.
 
 use proptest::prelude::*;
-use skinrig_controller::{ControllerError, GuardError, GuardedIndenter};
-use skinrig_model::{HostDuration, HostTime, Point3};
+use skinrig_controller::{ControllerError, ControllerSettings, GuardError, GuardedIndenter};
+use skinrig_model::{HostTime, Point3};
 
 use crate::mock::*;
 
@@ -46,9 +46,8 @@ proptest! {
     #[test]
     fn nothing_forbidden_reaches_the_robot(acts in prop::collection::vec(act(), 1..80)) {
         let world = World::shared(Faults::default(), [0.0, 0.0, 10.0]);
-        let stale_after = HostDuration::from_millis(100);
         let mut guard = GuardedIndenter::new(
-            Box::new(MockIndenter(world.clone())), robot_from_skin(), LIMITS, stale_after,
+            Box::new(MockIndenter(world.clone())), robot_from_skin(), LIMITS, &ControllerSettings::default(),
         );
         let mut poses = Vec::new();
         guard.arm().map_err(|e| TestCaseError::fail(e.to_string()))?;
@@ -82,7 +81,7 @@ proptest! {
                 }
                 Act::Look(ms) => {
                     lock(&world).t += ms * MS;
-                    prop_assert!(guard.poll(&mut poses).is_ok());
+                    prop_assert!(guard.poll(&MockClock(world.clone()), &mut poses).is_ok());
                 }
                 Act::Blind(ms) => lock(&world).t += ms * MS,
                 Act::Hold => prop_assert!(guard.hold().is_ok()),
@@ -97,17 +96,16 @@ proptest! {
 #[test]
 fn refusals_say_what_was_expected() {
     let world = World::shared(Faults::default(), [0.0, 0.0, 10.0]);
-    let stale_after = HostDuration::from_millis(100);
     let mut guard = GuardedIndenter::new(
         Box::new(MockIndenter(world.clone())),
         robot_from_skin(),
         LIMITS,
-        stale_after,
+        &ControllerSettings::default(),
     );
     let mut poses = Vec::new();
     assert!(guard.arm().is_ok());
     lock(&world).t = 50 * MS;
-    assert!(guard.poll(&mut poses).is_ok() && poses.len() == 50);
+    assert!(guard.poll(&MockClock(world.clone()), &mut poses).is_ok() && poses.len() == 50);
     let mut ask = |x, y, z, speed, ms: i64| {
         let answer = guard.command(Point3::new(x, y, z), speed, HostTime(ms * MS));
         match answer {

@@ -2,6 +2,7 @@
 
 mod course;
 mod edges;
+mod escape;
 mod guard;
 mod mock;
 mod preflight;
@@ -9,3 +10,4 @@ mod progress;
 mod rig_faults;
 mod simulated;
 mod touch;
+mod watchdog;

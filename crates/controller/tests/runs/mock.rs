@@ -9,7 +9,7 @@ use skinrig_device::{
 };
 use skinrig_model::*;
 use skinrig_protocol::Surface;
-use skinrig_protocol::plan::{Plan, PressStep, RunLimits, Step};
+use skinrig_protocol::plan::{OnTrip, Plan, PressStep, RunLimits, Step};
 
 pub const MS: i64 = 1_000_000;
 
@@ -31,6 +31,25 @@ pub enum Press {
     Abort,
 }
 
+/// What goes wrong with the feedback.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Strike {
+    /// A force of 9 N.
+    Force,
+    /// The tip sinks 0.05 mm every millisecond.
+    Sink,
+    /// The tip slides 0.3 mm every millisecond.
+    Slide,
+    /// A coordinate is no number.
+    Nan,
+    /// The same sample twice.
+    Twice,
+    /// No samples any more.
+    Silence,
+    /// The clock jumps by 1.5 s, and the samples come after it.
+    Late,
+}
+
 /// What is wrong with the world.
 #[derive(Debug, Clone, Default)]
 pub struct Faults {
@@ -47,6 +66,8 @@ pub struct Faults {
     pub box_remark: Option<String>,
     /// The tip stays where it is sideways from this time on, ms.
     pub stuck_sideways_ms: Option<i64>,
+    /// What goes wrong once the tip is 1 mm deep.
+    pub strike: Option<Strike>,
     /// The operator's hand at this tick.
     pub operator: Option<(u64, Press)>,
     /// N per mm of indentation.
@@ -79,6 +100,11 @@ pub struct World {
     pub seq: [u64; 2],
     pub line_until: i64,
     pub clearance_mm: f64,
+    /// When the strike began to break a limit.
+    pub broken_at: Option<i64>,
+    struck_for: i64,
+    /// What the robot was told besides motions: when, `hold` or `disarm`.
+    pub told: Vec<(i64, &'static str)>,
     samples: Vec<RobotSample>,
 }
 
@@ -121,6 +147,9 @@ impl World {
             seq: [0; 2],
             line_until: 0,
             clearance_mm: 5.0,
+            broken_at: None,
+            struck_for: 0,
+            told: vec![],
             samples: vec![],
         }))
     }
@@ -160,13 +189,45 @@ impl World {
             self.tip = tip;
             if self.faults.poses_end_ms.is_none_or(|end| ms < end) {
                 let to_robot = |p: [f64; 3]| robot_from_skin().apply(Point3::new(p[0], p[1], p[2]));
-                self.samples.push(RobotSample {
+                let sample = RobotSample {
                     t: HostTime(self.sampled_to),
                     commanded: to_robot(self.set_point),
                     measured: to_robot(tip),
                     force_n: (-tip[2]).max(0.0) * self.faults.stiffness_n_mm,
-                });
+                };
+                self.deliver(sample, tip);
             }
+        }
+    }
+
+    /// Keeps a sample, changed by the strike while the arm is low.
+    fn deliver(&mut self, mut sample: RobotSample, mut tip: [f64; 3]) {
+        let begins = self.armed && tip[2] < -1.0;
+        let Some(strike) = self.faults.strike.filter(|_| self.struck_for > 0 || begins) else {
+            self.samples.push(sample);
+            return;
+        };
+        self.struck_for += 1;
+        let n = self.struck_for as f64;
+        let mut broken = true;
+        match strike {
+            Strike::Force => sample.force_n = 9.0,
+            Strike::Sink => {
+                tip[2] -= 0.05 * n;
+                broken = tip[2] < -3.05;
+            }
+            Strike::Slide => tip[0] += 0.3 * n,
+            Strike::Nan => tip[1] = f64::NAN,
+            Strike::Twice => self.samples.push(sample),
+            Strike::Silence => {}
+            Strike::Late => broken = false, // the clock tells
+        }
+        sample.measured = robot_from_skin().apply(Point3::new(tip[0], tip[1], tip[2]));
+        if broken {
+            self.broken_at.get_or_insert(self.sampled_to);
+        }
+        if strike != Strike::Silence {
+            self.samples.push(sample);
         }
     }
 
@@ -210,7 +271,7 @@ fn identity(model: &str) -> DeviceIdentity {
     }
 }
 
-struct MockClock(Shared);
+pub struct MockClock(pub Shared);
 
 impl Clock for MockClock {
     fn now(&self) -> HostTime {
@@ -220,6 +281,10 @@ impl Clock for MockClock {
         let mut w = lock(&self.0);
         w.t = w.t.max(t.0);
         w.ticks += 1;
+        if w.faults.strike == Some(Strike::Late) && w.tip[2] < -1.0 && w.broken_at.is_none() {
+            w.t += 1500 * MS;
+            w.broken_at = Some(w.t);
+        }
         if let Some((tick, press)) = w.faults.operator {
             if tick == w.ticks {
                 match press {
@@ -234,6 +299,18 @@ impl Clock for MockClock {
     }
 }
 
+/// What a scripted robot can do.
+pub fn can() -> IndenterCapabilities {
+    IndenterCapabilities {
+        workspace_min_mm: [-100.0; 3],
+        workspace_max_mm: [100.0; 3],
+        max_speed_mm_s: 200.0,
+        max_force_n: 12.0,
+        pose_rate_hz: 1000.0,
+        reports_force: true,
+    }
+}
+
 pub struct MockIndenter(pub Shared);
 
 impl Indenter for MockIndenter {
@@ -241,14 +318,7 @@ impl Indenter for MockIndenter {
         identity("mock indenter")
     }
     fn capabilities(&self) -> IndenterCapabilities {
-        IndenterCapabilities {
-            workspace_min_mm: [-100.0; 3],
-            workspace_max_mm: [100.0; 3],
-            max_speed_mm_s: 200.0,
-            max_force_n: 12.0,
-            pose_rate_hz: 1000.0,
-            reports_force: true,
-        }
+        can()
     }
     fn configure(&mut self, limits: &MotionLimits) -> Result<Vec<Setting>, DeviceError> {
         call(&self.0, DeviceRole::Indenter)?;
@@ -296,6 +366,8 @@ impl Indenter for MockIndenter {
         let mut w = lock(&self.0);
         w.advance();
         w.target = w.set_point;
+        let t = w.t;
+        w.told.push((t, "hold"));
         Ok(())
     }
     fn disarm(&mut self) -> Result<(), DeviceError> {
@@ -303,6 +375,8 @@ impl Indenter for MockIndenter {
         let mut w = lock(&self.0);
         w.advance();
         (w.armed, w.confirmed) = (false, true);
+        let t = w.t;
+        w.told.push((t, "disarm"));
         Ok(())
     }
 }
@@ -458,6 +532,8 @@ pub const LIMITS: RunLimits = RunLimits {
     max_force_n: 8.0,
     position_tolerance_mm: 0.05,
     settle_time: HostDuration::from_millis(20),
+    max_acceleration_mm_s2: None,
+    on_trip: OnTrip::Retract,
 };
 
 /// Three presses at two places.

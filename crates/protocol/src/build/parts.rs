@@ -10,7 +10,7 @@ use skinrig_model::{
 use super::seconds;
 use crate::area::{Area, KeepOut, Surroundings};
 use crate::diagnostic::Collector;
-use crate::plan::RunLimits;
+use crate::plan::{OnTrip, RunLimits};
 use crate::protocol::{CameraRequest, Motion, Pace, Scene, Sync};
 use crate::quantity::Dimension;
 use crate::shape::{Field, Value};
@@ -294,6 +294,11 @@ pub(super) fn read_limits(
         max_force_n: l.quantity("max_force")?,
         position_tolerance_mm: settle.quantity("tolerance")?,
         settle_time: seconds(settle.quantity("time")?),
+        max_acceleration_mm_s2: l.quantity("max_acceleration"),
+        on_trip: match l.word("on_trip")? {
+            "brake" => OnTrip::Brake,
+            _ => OnTrip::Retract,
+        },
     })
 }
 

@@ -4,7 +4,7 @@ use super::{
     DEPTH, PACE, POSITION, POSITIVE_LENGTH, POSITIVE_SPAN, SPAN, SPEED, count, default, optional,
     required,
 };
-use crate::quantity::Dimension::{Force, Length};
+use crate::quantity::Dimension::{Acceleration, Force, Length};
 use crate::shape::{Range, Shape, Table, Word};
 
 pub(crate) static MOTION: Table = Table {
@@ -98,9 +98,28 @@ pub(crate) static LIMITS: Table = Table {
             Shape::Quantity(&[Force], Range::above_zero(12.0)),
             "A measured force above this ends the run. At most 12 N, what the Omega.3 can exert.",
         ),
+        optional(
+            "max_acceleration",
+            Shape::Quantity(&[Acceleration], Range::above_zero(10_000.0)),
+            "Largest acceleration of the robot's set point; what the robot is set up for when absent.",
+        ),
+        default(
+            "on_trip",
+            Shape::Choice(ON_TRIP),
+            "retract",
+            "What the robot does when a measured limit is broken.",
+        ),
     ],
     exactly_one: &[],
 };
+
+const ON_TRIP: &[Word] = &[
+    (
+        "retract",
+        "hold, rise straight up, disarm; brake at once when the feedback is not to be believed",
+    ),
+    ("brake", "brake at once, wherever the tip is"),
+];
 
 pub(crate) static WORKSPACE: Table = Table {
     name: "workspace",
