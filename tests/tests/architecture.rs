@@ -49,6 +49,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "skinrig-device",
             "skinrig-omega3",
             "skinrig-evk1",
+            "skinrig-evk4",
             "skinrig-trigger-box",
             "skinrig-sim",
             "skinrig-controller",

@@ -172,36 +172,40 @@ fn cameras(rig: Option<&RigFile>) -> Vec<Line> {
         let at = cameras.iter().position(|c| c.serial == serial)?;
         Some(roles[at].to_owned())
     };
-    let mut lines: Vec<Line> = match skinrig_evk1::enumerate() {
-        Err(e) => vec![line("USB", "faulty", e.to_string())],
-        Ok(found) => found
-            .iter()
-            .map(|f| {
-                let next_step = f.next_step();
-                let place = |model: &str| format!("{model}, {}", f.place);
-                let found = match &f.state {
-                    FoundState::Ready(identity) => Line {
-                        serial: Some(identity.serial.clone()),
-                        role: wanted(&identity.serial),
-                        ..line(&place("EVK1 Gen3.1"), "ready", identity.firmware())
-                    },
-                    FoundState::Busy => line(
-                        &place("camera"),
-                        "busy",
-                        "another program holds it".to_owned(),
-                    ),
-                    FoundState::NoPermission => {
-                        line(&place("camera"), "not permitted", String::new())
-                    }
-                    FoundState::NotEvk1(what) => {
-                        line(&place("not an EVK1"), "other device", what.clone())
-                    }
-                    FoundState::Faulty(what) => line(&place("camera"), "faulty", what.clone()),
-                };
-                Line { next_step, ..found }
-            })
-            .collect(),
-    };
+    let mut lines = Vec::new();
+    let others = other_cameras(&mut lines, &wanted);
+    match skinrig_evk1::enumerate() {
+        Err(e) => lines.push(line("USB", "faulty", e.to_string())),
+        Ok(found) => lines.extend(
+            found
+                .iter()
+                .filter(|f| !others.contains(&f.address))
+                .map(|f| {
+                    let next_step = f.next_step();
+                    let place = |model: &str| format!("{model}, {}", f.place);
+                    let found = match &f.state {
+                        FoundState::Ready(identity) => Line {
+                            serial: Some(identity.serial.clone()),
+                            role: wanted(&identity.serial),
+                            ..line(&place("EVK1 Gen3.1"), "ready", identity.firmware())
+                        },
+                        FoundState::Busy => line(
+                            &place("camera"),
+                            "busy",
+                            "another program holds it".to_owned(),
+                        ),
+                        FoundState::NoPermission => {
+                            line(&place("camera"), "not permitted", String::new())
+                        }
+                        FoundState::NotEvk1(what) => {
+                            line(&place("not an EVK1"), "other device", what.clone())
+                        }
+                        FoundState::Faulty(what) => line(&place("camera"), "faulty", what.clone()),
+                    };
+                    Line { next_step, ..found }
+                }),
+        ),
+    }
     for (role, camera) in ["camera1", "camera2"]
         .into_iter()
         .zip(rig.iter().flat_map(|r| &r.cameras))
@@ -209,7 +213,7 @@ fn cameras(rig: Option<&RigFile>) -> Vec<Line> {
         missing(
             &mut lines,
             "camera",
-            "EVK1",
+            &format!("camera, model {}", camera.model),
             Some((role, camera.serial.clone())),
         );
     }
@@ -226,7 +230,41 @@ fn cameras(rig: Option<&RigFile>) -> Vec<Line> {
     lines
 }
 
-/// Adds a line for a device that the rig file wants and that is not among `lines`.
+/// Adds a line for each camera that is not an EVK1 and that this build drives; their places.
+#[cfg(feature = "evk4")]
+fn other_cameras(lines: &mut Vec<Line>, wanted: &dyn Fn(&str) -> Option<String>) -> Vec<(u8, u8)> {
+    use skinrig_evk4::FoundState;
+
+    let known = crate::rig::evt3_camera::evk1_places();
+    let mut places = Vec::new();
+    // Without USB the EVK1's own list says so.
+    for found in skinrig_evk4::enumerate(&known).unwrap_or_default() {
+        let (bus, device) = found.place;
+        // What else shares their USB numbers is an EVK1's business.
+        if let FoundState::Ready(model, serial) = found.state {
+            places.push(found.place);
+            lines.push(Line {
+                device: "camera",
+                what: format!("{}, USB bus {bus} device {device}", model.name()),
+                role: wanted(&serial),
+                serial: Some(serial),
+                state: "ready",
+                detail: format!("model {}", model.word()),
+                next_step: None,
+            });
+        }
+    }
+    places
+}
+
+/// This build drives none.
+#[cfg(not(feature = "evk4"))]
+fn other_cameras(_: &mut Vec<Line>, _: &dyn Fn(&str) -> Option<String>) -> Vec<(u8, u8)> {
+    Vec::new()
+}
+
+/// Adds a line for a device that the rig file wants and that is not among `lines`. One that was found but did not tell its
+/// serial number, because it is busy for example, may be it.
 fn missing(
     lines: &mut Vec<Line>,
     device: &'static str,
@@ -241,19 +279,39 @@ fn missing(
         Some(role) => lines.iter().any(|l| l.role.as_ref() == Some(role)),
         None => !lines.is_empty(),
     };
-    if !there {
-        lines.push(Line {
-            device,
-            what: model.to_owned(),
-            serial,
-            state: "absent",
-            detail: String::new(),
-            role,
-            next_step: Some(
-                "plug it in, switch it on; or correct its serial number in the rig file".to_owned(),
-            ),
-        });
+    if there {
+        return;
     }
+    let may_be_it = |l: &&Line| {
+        l.device == device
+            && l.serial.is_none()
+            && matches!(l.state, "busy" | "not permitted" | "faulty")
+    };
+    let unasked: Vec<&'static str> = lines.iter().filter(may_be_it).map(|l| l.state).collect();
+    let (state, detail, next_step) = match unasked.first() {
+        None => (
+            "absent",
+            String::new(),
+            "plug it in, switch it on; or correct its serial number in the rig file",
+        ),
+        Some(first) => (
+            "not asked",
+            format!(
+                "may be one that is {first}: {} of that kind did not tell a serial number",
+                unasked.len()
+            ),
+            "see to that one first, then look again",
+        ),
+    };
+    lines.push(Line {
+        device,
+        what: model.to_owned(),
+        serial,
+        state,
+        detail,
+        role,
+        next_step: Some(next_step.to_owned()),
+    });
 }
 
 /// The box of the rig file is asked; other serial ports are only listed, for bytes sent to a stranger may move something.
@@ -310,4 +368,44 @@ fn serial_ports(folder: &Path) -> Vec<String> {
     let mut ports: Vec<String> = entries.map(|e| e.path().display().to_string()).collect();
     ports.sort();
     ports
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn camera(state: &'static str, serial: Option<&str>, role: Option<&str>) -> Line {
+        Line {
+            device: "camera",
+            what: "camera, USB bus 1 device 4".to_owned(),
+            serial: serial.map(str::to_owned),
+            state,
+            detail: String::new(),
+            role: role.map(str::to_owned),
+            next_step: None,
+        }
+    }
+
+    /// What is said of camera 1 beside `found`.
+    fn said_beside(found: Line) -> Option<&'static str> {
+        let mut lines = vec![found];
+        let wanted = Some(("camera1", "00001753".to_owned()));
+        missing(&mut lines, "camera", "EVK1", wanted);
+        lines.get(1).map(|l| l.state)
+    }
+
+    #[test]
+    fn a_device_that_may_be_the_busy_one_is_not_called_absent() {
+        for state in ["busy", "not permitted", "faulty"] {
+            assert_eq!(said_beside(camera(state, None, None)), Some("not asked"));
+        }
+        let other = camera("ready", Some("00001754"), Some("camera2"));
+        assert_eq!(said_beside(other), Some("absent"));
+        let it = camera("ready", Some("00001753"), Some("camera1"));
+        assert_eq!(said_beside(it), None);
+        assert_eq!(
+            said_beside(camera("other device", None, None)),
+            Some("absent")
+        );
+    }
 }

@@ -17,6 +17,7 @@ use skinrig_protocol::Protocol;
 use skinrig_protocol::rig::{BoxSetup, CameraSetup, RigFile, RigKind, SyncRole};
 use skinrig_trigger_box::{SerialTriggerBox, TriggerBoxConfig};
 
+use super::evt3_camera;
 use crate::exit::Failure;
 
 /// Reads the rig file at `path`.
@@ -201,10 +202,7 @@ fn open_camera(
     clock: RealClock,
 ) -> Result<Box<dyn EventCamera>, Failure> {
     if setup.model != "evk1" {
-        return Err(Failure::input(format!(
-            "{camera}: expected `model: evk1`, found `{}`, which this build does not drive",
-            setup.model
-        )));
+        return evt3_camera::open(setup, camera, clock);
     }
     let config = Evk1Config {
         read_back_exceptions: setup.read_back_exceptions.clone(),
@@ -231,7 +229,11 @@ fn camera_settings(
         noise_filter: setup
             .noise_filter_ev_s
             .map(|min_rate_ev_s| NoiseFilter { min_rate_ev_s }),
-        trigger_channels: vec![setup.trigger_channel],
+        trigger_channels: setup
+            .has_trigger()
+            .then_some(setup.trigger_channel)
+            .into_iter()
+            .collect(),
         ..CameraSettings::default()
     };
     if let Some(file) = &setup.bias_file {
@@ -273,4 +275,58 @@ fn open_trigger_box(
     };
     let device = open().map_err(|e: skinrig_device::DeviceError| Failure::rig(e))?;
     Ok(Box::new(device))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const EXAMPLE: &str = include_str!("../../../../hil/rigs/bench.example.yaml");
+
+    /// The robot's configuration with the line of `key` in the example replaced.
+    fn with(key: &str, value: &str) -> Option<OmegaConfig> {
+        let line = |l: &str| match l.split_once(&format!("{key}: ")) {
+            Some((indent, _)) if indent.trim().is_empty() => format!("{indent}{key}: {value}"),
+            _ => l.to_owned(),
+        };
+        let text: Vec<String> = EXAMPLE.lines().map(line).collect();
+        let changed = text.join("\n");
+        assert!(changed.trim() != EXAMPLE.trim(), "no line of {key}");
+        let rig = RigFile::parse("rig.yaml", changed.as_bytes(), &|_| None).ok()?;
+        omega_config(&rig).ok()
+    }
+
+    #[cfg(not(feature = "evk4"))]
+    #[test]
+    fn a_camera_that_this_build_does_not_drive_is_refused_with_the_build_that_does() {
+        let text = EXAMPLE.replacen("model: evk1", "model: evk4", 1);
+        let rig = RigFile::parse("rig.yaml", text.as_bytes(), &|_| None).ok();
+        let camera = rig.as_ref().map(|r| &r.cameras[0]);
+        let refused = camera.map(|c| open_camera(c, CameraId::One, RealClock::start()).err());
+        let said = refused.flatten().map(|e| e.message).unwrap_or_default();
+        assert!(said.contains("found `evk4`"), "{said}");
+        assert!(
+            said.contains("cargo build --release -p skinrig --features evk4"),
+            "{said}"
+        );
+    }
+
+    #[test]
+    fn what_the_robots_driver_would_refuse_is_refused_in_the_rig_file() {
+        for (key, largest, more) in [
+            ("max_speed", "100 mm/s", "100.1 mm/s"),
+            ("effector_mass", "1 kg", "1.01 kg"),
+            ("max_lead", "4 mm", "4.1 mm"),
+            ("watchdog", "31.875 ms", "32 ms"),
+            ("device_angle", "180 deg", "181 deg"),
+            ("acceleration", "10000 mm/s2", "10001 mm/s2"),
+            ("jerk", "1000000 mm/s3", "1000001 mm/s3"),
+            ("gravity_ratio", "0.3", "0.91"),
+            ("least_ratio", "0.06", "1.01"),
+        ] {
+            let config = with(key, largest).unwrap_or_else(|| panic!("{key}: {largest}"));
+            assert_eq!(config.check(), Ok(()), "{key}: {largest}");
+            assert!(with(key, more).is_none(), "{key}: {more}");
+        }
+    }
 }

@@ -1,6 +1,7 @@
 //! Which rig a run uses: simulated, a bench, or a recording served as one.
 
 pub mod bench;
+pub mod evt3_camera;
 pub mod gates;
 
 use std::path::Path;

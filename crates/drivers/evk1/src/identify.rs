@@ -55,6 +55,8 @@ fn dotted(version: u32) -> String {
 pub struct Found {
     /// Where it is plugged in, and how fast.
     pub place: String,
+    /// Its bus, and its address on it.
+    pub address: (u8, u8),
     /// What came of asking it.
     pub state: FoundState,
 }
@@ -111,8 +113,12 @@ fn ask_slot(slot: &Slot, clock: RealClock) -> (Found, Option<LibUsb>) {
         Ok(Access::Treuzell) => (FoundState::NotEvk1(TREUZELL.to_owned()), None),
         Err(e) => (FoundState::of(e.during("opening")), None),
     };
-    let place = slot.place();
-    (Found { place, state }, camera)
+    let found = Found {
+        place: slot.place(),
+        address: slot.address(),
+        state,
+    };
+    (found, camera)
 }
 
 const TREUZELL: &str = "a Treuzell camera (EVK3, EVK4 or alike: interface subclass 0x19), which shares its USB IDs with the EVK1";

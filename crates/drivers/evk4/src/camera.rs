@@ -1,27 +1,23 @@
-//! An EVK4 as an event camera.
+//! A camera of one of the models as an event camera.
 
 use std::mem;
 
 use skinrig_device::{CameraCapabilities, CameraSettings, Clock, DeviceError, EventCamera};
-use skinrig_formats::{Geometry, Scanner};
+use skinrig_formats::Scanner;
 use skinrig_model::{
     CameraId, DeviceIdentity, DeviceRole, HostDuration, HostTime, RawChunk, Setting, StreamFormat,
 };
 
 use crate::link::{Link, LinkError, Packets};
-use crate::wanted::{BIASES, TRIGGER_CHANNEL, Wanted};
-
-/// Columns and rows of an EVK4's sensor (IMX636).
-const GEOMETRY: Geometry = Geometry {
-    width: 1280,
-    height: 720,
-};
+use crate::model::Model;
+use crate::wanted::Wanted;
 
 /// A full chunk, bytes.
 const CHUNK_BYTES: usize = 1 << 20;
 
-/// A Prophesee EVK4.
-pub struct Evk4 {
+/// A camera that sends EVT3 words.
+pub struct Evt3Camera {
+    model: Model,
     camera: CameraId,
     serial: String,
     link: Box<dyn Link>,
@@ -43,18 +39,25 @@ struct Filling {
     dropped: u64,
 }
 
-impl Evk4 {
-    /// The camera with this serial number behind `link`; it is opened at every start. What it sends is stamped on `clock`.
+impl Evt3Camera {
+    /// The camera of this model and serial number behind `link`; it is opened at every start. What it sends is stamped on `clock`.
     #[must_use]
-    pub fn new(link: Box<dyn Link>, serial: &str, camera: CameraId, clock: Box<dyn Clock>) -> Self {
+    pub fn new(
+        model: Model,
+        link: Box<dyn Link>,
+        serial: &str,
+        camera: CameraId,
+        clock: Box<dyn Clock>,
+    ) -> Self {
         Self {
+            model,
             camera,
             serial: serial.to_owned(),
             link,
             clock,
             wanted: Wanted::default(),
             stream: None,
-            scanner: Scanner::with_geometry(StreamFormat::Evt3, GEOMETRY),
+            scanner: Scanner::with_geometry(StreamFormat::Evt3, model.geometry()),
             filling: Filling::default(),
         }
     }
@@ -164,32 +167,35 @@ impl Evk4 {
     }
 }
 
-impl EventCamera for Evk4 {
+impl EventCamera for Evt3Camera {
     fn camera(&self) -> CameraId {
         self.camera
     }
 
     fn identity(&self) -> DeviceIdentity {
         DeviceIdentity {
-            model: "Prophesee EVK4".into(),
+            model: self.model.name().into(),
             serial: self.serial.clone(),
             firmware: "unknown: the driver crate does not tell".into(),
         }
     }
 
     fn capabilities(&self) -> CameraCapabilities {
+        let sensor = self.model.geometry();
+        let owned = |name: &&str| (*name).to_owned();
         CameraCapabilities {
-            width: GEOMETRY.width,
-            height: GEOMETRY.height,
+            width: sensor.width,
+            height: sensor.height,
             format: StreamFormat::Evt3,
-            trigger_channels: vec![TRIGGER_CHANNEL],
-            biases: BIASES.map(str::to_owned).to_vec(),
+            trigger_channels: self.model.trigger_channels().to_vec(),
+            biases: self.model.biases().iter().map(owned).collect(),
         }
     }
 
     fn configure(&mut self, settings: &CameraSettings) -> Result<Vec<Setting>, DeviceError> {
         self.expect_stopped()?;
-        self.wanted = Wanted::new(settings).map_err(|(expected, found)| DeviceError::Refused {
+        let wanted = Wanted::new(self.model, settings);
+        self.wanted = wanted.map_err(|(expected, found)| DeviceError::Refused {
             role: self.role(),
             serial: self.serial.clone(),
             expected,
@@ -203,7 +209,7 @@ impl EventCamera for Evk4 {
         let opened = self.link.stream(&self.wanted);
         self.stream = Some(opened.map_err(|e| self.lost(&e))?);
         // A new stream: its words do not continue those of the last one, and its time begins anew.
-        self.scanner = Scanner::with_geometry(StreamFormat::Evt3, GEOMETRY);
+        self.scanner = Scanner::with_geometry(StreamFormat::Evt3, self.model.geometry());
         self.filling.dropped = 0;
         Ok(())
     }

@@ -1,27 +1,31 @@
-//! The real camera, by neuromorphic-drivers.
+//! The real cameras, by neuromorphic-drivers.
 
 use std::sync::Arc;
 use std::time::Duration;
 
-use neuromorphic_drivers::prophesee_evk4::{self, Clock, Configuration, Device, PROPERTIES};
+use neuromorphic_drivers::rusb::{self, UsbContext as _};
 use neuromorphic_drivers::{
-    Error, Flag, GenericDevice as _, Identifier, UsbEventLoop, UsbOverflow, flag_and_event_loop,
+    Error, Flag, Identifier, UsbDevice, UsbEventLoop, UsbOverflow, centuryarks_vga,
+    flag_and_event_loop, prophesee_evk3_hd, prophesee_evk4,
 };
 
 use crate::link::{Link, LinkError, Packet, Packets};
+use crate::model::Model;
 use crate::wanted::{TimeBase, Wanted};
 
-/// The EVK4 with one serial number.
+/// The camera of one model and serial number.
 #[derive(Debug, Clone)]
 pub struct Neuromorphic {
+    model: Model,
     serial: String,
 }
 
 impl Neuromorphic {
-    /// The camera with this serial number, as it prints it: eight upper-case hexadecimal digits.
+    /// The camera with this serial number, as [`enumerate`] tells it: eight upper-case hexadecimal digits.
     #[must_use]
-    pub fn new(serial: &str) -> Self {
+    pub fn new(model: Model, serial: &str) -> Self {
         Self {
+            model,
             serial: serial.to_owned(),
         }
     }
@@ -29,35 +33,56 @@ impl Neuromorphic {
 
 impl Link for Neuromorphic {
     fn packet_bytes(&self) -> usize {
-        prophesee_evk4::RING_CONFIGURATION.buffer_length
+        let ring = match self.model {
+            Model::Evk4 => prophesee_evk4::RING_CONFIGURATION,
+            Model::Evk3Hd => prophesee_evk3_hd::RING_CONFIGURATION,
+            Model::SilkyVga => centuryarks_vga::RING_CONFIGURATION,
+        };
+        ring.buffer_length
     }
 
     fn stream(&mut self, wanted: &Wanted) -> Result<Box<dyn Packets>, LinkError> {
-        let (flag, event_loop) = flag_and_event_loop().map_err(told)?;
-        let device = prophesee_evk4::open(
-            Identifier::Serial(&self.serial),
-            configuration(wanted),
-            &prophesee_evk4::RING_CONFIGURATION,
-            Arc::clone(&event_loop),
-            flag.clone(),
-        )
-        .map_err(told)?;
-        Ok(Box::new(Stream {
-            device,
-            flag,
-            _event_loop: event_loop,
-        }))
+        let serial = &self.serial;
+        match self.model {
+            Model::Evk4 => open::<prophesee_evk4::Device>(serial, evk4(wanted)),
+            Model::Evk3Hd => open::<prophesee_evk3_hd::Device>(serial, evk3_hd(wanted)),
+            Model::SilkyVga => {
+                open::<centuryarks_vga::Device>(serial, centuryarks_vga::DEFAULT_CONFIGURATION)
+            }
+        }
     }
 }
 
-struct Stream {
-    device: Device,
+fn open<D>(serial: &str, configuration: D::Configuration) -> Result<Box<dyn Packets>, LinkError>
+where
+    D: UsbDevice + Send + 'static,
+    D::Error: std::fmt::Display,
+    Error: From<D::Error>,
+{
+    let (flag, event_loop) = flag_and_event_loop().map_err(told)?;
+    let device = D::open(
+        Identifier::Serial(serial),
+        configuration,
+        &D::RING_CONFIGURATION,
+        Arc::clone(&event_loop),
+        flag.clone(),
+    )
+    .map_err(told)?;
+    Ok(Box::new(Stream {
+        device,
+        flag,
+        _event_loop: event_loop,
+    }))
+}
+
+struct Stream<D> {
+    device: D,
     flag: Flag<Error, UsbOverflow>,
     /// Moves the transfers; ends after the device.
     _event_loop: Arc<UsbEventLoop>,
 }
 
-impl Packets for Stream {
+impl<D: UsbDevice + Send> Packets for Stream<D> {
     fn next(&mut self, take: &mut dyn FnMut(Packet<'_>)) -> Result<bool, LinkError> {
         if let Some(view) = self.device.next_with_timeout(&Duration::ZERO) {
             take(Packet {
@@ -79,8 +104,9 @@ fn told(error: impl std::fmt::Display) -> LinkError {
     LinkError(error.to_string())
 }
 
-fn configuration(wanted: &Wanted) -> Configuration {
-    let mut all = PROPERTIES.default_configuration;
+fn evk4(wanted: &Wanted) -> prophesee_evk4::Configuration {
+    use prophesee_evk4::Clock;
+    let mut all = prophesee_evk4::DEFAULT_CONFIGURATION;
     let biases = &mut all.biases;
     for (name, to) in [
         ("diff", &mut biases.diff),
@@ -108,36 +134,172 @@ fn configuration(wanted: &Wanted) -> Configuration {
     all
 }
 
+fn evk3_hd(wanted: &Wanted) -> prophesee_evk3_hd::Configuration {
+    let mut all = prophesee_evk3_hd::DEFAULT_CONFIGURATION;
+    let biases = &mut all.biases;
+    for (name, to) in [
+        ("blk", &mut biases.blk),
+        ("diff", &mut biases.diff),
+        ("diff_off", &mut biases.diff_off),
+        ("diff_on", &mut biases.diff_on),
+        ("fo_n", &mut biases.fo_n),
+        ("fo_p", &mut biases.fo_p),
+        ("hpf", &mut biases.hpf),
+        ("pr", &mut biases.pr),
+        ("refr", &mut biases.refr),
+        ("reqpuy", &mut biases.reqpuy),
+    ] {
+        // In range: `Wanted` was checked.
+        if let Some(value) = wanted.biases.get(name).and_then(|v| u8::try_from(*v).ok()) {
+            *to = value;
+        }
+    }
+    all
+}
+
+/// A device with the USB numbers of one of the models.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Found {
+    /// Bus and address, as `lsusb` shows them.
+    pub place: (u8, u8),
+    /// What came of asking it.
+    pub state: FoundState,
+}
+
+/// What came of asking a device.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum FoundState {
+    /// A camera that can be opened, with its serial number.
+    Ready(Model, String),
+    /// Held by another program; not asked.
+    Busy,
+    /// May not be opened by this user; not asked.
+    NoPermission,
+    /// None of the models.
+    Other,
+    /// It did not answer as it should.
+    Faulty(String),
+}
+
+/// Every device on the bus with the USB numbers of one of the models, but for those at the places `known` (bus, address),
+/// which are not touched.
+///
+/// # Errors
+/// On a machine without USB.
+pub fn enumerate(known: &[(u8, u8)]) -> Result<Vec<Found>, LinkError> {
+    let context = rusb::Context::new().map_err(told)?;
+    let mut found = Vec::new();
+    for device in context.devices().map_err(told)?.iter() {
+        let place = (device.bus_number(), device.address());
+        let Ok(descriptor) = device.device_descriptor() else {
+            continue;
+        };
+        let ids = (descriptor.vendor_id(), descriptor.product_id());
+        if !known.contains(&place) && Model::ALL.iter().any(|m| usb_ids(*m).contains(&ids)) {
+            let state = ask(&device, ids).unwrap_or_else(|e| match e {
+                rusb::Error::Busy => FoundState::Busy,
+                rusb::Error::Access => FoundState::NoPermission,
+                other => FoundState::Faulty(other.to_string()),
+            });
+            found.push(Found { place, state });
+        }
+    }
+    Ok(found)
+}
+
+const fn usb_ids(model: Model) -> &'static [(u16, u16)] {
+    match model {
+        Model::Evk4 => prophesee_evk4::Device::VENDOR_AND_PRODUCT_IDS,
+        Model::Evk3Hd => prophesee_evk3_hd::Device::VENDOR_AND_PRODUCT_IDS,
+        Model::SilkyVga => centuryarks_vga::Device::VENDOR_AND_PRODUCT_IDS,
+    }
+}
+
+fn ask(device: &rusb::Device<rusb::Context>, ids: (u16, u16)) -> rusb::Result<FoundState> {
+    let mut handle = device.open()?;
+    for model in Model::ALL {
+        if !usb_ids(model).contains(&ids) {
+            continue;
+        }
+        let serial = match model {
+            Model::Evk4 => prophesee_evk4::Device::read_serial(&mut handle)?,
+            Model::Evk3Hd => prophesee_evk3_hd::Device::read_serial(&mut handle)?,
+            Model::SilkyVga => centuryarks_vga::Device::read_serial(&mut handle)?,
+        };
+        if let Some(serial) = serial {
+            return Ok(FoundState::Ready(model, serial));
+        }
+    }
+    Ok(FoundState::Other)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::wanted::BIASES;
 
     #[test]
     fn every_bias_and_mode_has_its_place_in_the_configuration() {
-        let defaults = configuration(&Wanted::default());
-        for name in BIASES {
-            let mut wanted = Wanted::default();
-            wanted.biases.insert(name.into(), -7);
-            let biases = configuration(&wanted).biases;
-            assert_ne!(biases, defaults.biases, "{name}");
-            let said = format!("{biases:?}");
-            assert!(said.contains(&format!(" {name}: -7")), "{name} in {said}");
+        let defaults = Wanted::default();
+        for model in Model::ALL {
+            for name in model.biases() {
+                let mut wanted = Wanted::default();
+                wanted.biases.insert((*name).to_owned(), 7);
+                let (before, said) = match model {
+                    Model::Evk4 => (evk4(&defaults).biases, evk4(&wanted).biases).said(),
+                    _ => (evk3_hd(&defaults).biases, evk3_hd(&wanted).biases).said(),
+                };
+                assert_ne!(before, said, "{name}");
+                assert!(said.contains(&format!(" {name}: 7")), "{name} in {said}");
+            }
         }
-        assert!(!defaults.enable_external_trigger);
+        assert!(!evk4(&defaults).enable_external_trigger);
         let slave = Wanted {
             trigger: true,
             time_base: TimeBase::Taken,
             ..Wanted::default()
         };
-        let slave = configuration(&slave);
+        let slave = evk4(&slave);
         assert!(slave.enable_external_trigger);
-        assert_eq!(slave.clock, Clock::External);
+        assert_eq!(slave.clock, prophesee_evk4::Clock::External);
+    }
+
+    trait Said {
+        fn said(&self) -> (String, String);
+    }
+
+    impl<T: std::fmt::Debug> Said for (T, T) {
+        fn said(&self) -> (String, String) {
+            (format!("{:?}", self.0), format!("{:?}", self.1))
+        }
     }
 
     #[test]
-    fn a_machine_without_this_camera_says_so() {
-        let mut link = Neuromorphic::new("FFFFFFFF");
-        assert!(link.stream(&Wanted::default()).is_err());
+    fn a_machine_without_these_cameras_says_so() {
+        for model in Model::ALL {
+            assert_eq!(stated(model), sensor(model), "{}", model.word());
+            let mut link = Neuromorphic::new(model, "FFFFFFFF");
+            assert!(link.stream(&Wanted::default()).is_err());
+        }
+    }
+
+    fn sensor(model: Model) -> (u16, u16) {
+        (model.geometry().width, model.geometry().height)
+    }
+
+    fn stated(model: Model) -> (u16, u16) {
+        match model {
+            Model::Evk4 => (
+                prophesee_evk4::PROPERTIES.width,
+                prophesee_evk4::PROPERTIES.height,
+            ),
+            Model::Evk3Hd => (
+                prophesee_evk3_hd::PROPERTIES.width,
+                prophesee_evk3_hd::PROPERTIES.height,
+            ),
+            Model::SilkyVga => (
+                centuryarks_vga::PROPERTIES.width,
+                centuryarks_vga::PROPERTIES.height,
+            ),
+        }
     }
 }

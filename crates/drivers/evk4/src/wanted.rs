@@ -1,28 +1,11 @@
-//! The settings that an EVK4 is opened with.
+//! The settings that a camera is opened with.
 
 use std::collections::BTreeMap;
 
 use skinrig_device::{CameraSettings, SyncMode};
 use skinrig_model::Setting;
 
-/// Biases by name, as offsets from the value in the sensor's memory (neuromorphic-drivers 0.18, `prophesee_evk4::Biases`; two
-/// more have no name).
-pub const BIASES: [&str; 11] = [
-    "diff",
-    "diff_off",
-    "diff_on",
-    "fo",
-    "hpf",
-    "inv",
-    "pr",
-    "refr",
-    "reqpux",
-    "reqpuy",
-    "sendreqpdy",
-];
-
-/// The one trigger input (metavision_driver, `config/trigger_pins.yaml`, gives the main input of every model as channel 0).
-pub const TRIGGER_CHANNEL: u8 = 0;
+use crate::model::Model;
 
 /// Whose pulses the camera counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -36,10 +19,10 @@ pub enum TimeBase {
     Taken,
 }
 
-/// Settings that an EVK4 can take.
+/// Settings that a camera can take.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Wanted {
-    /// Offsets by name; others stay 0.
+    /// Values by name, in the unit of [`Model::bias_range`]; others keep their default.
     pub biases: BTreeMap<String, i16>,
     /// Trigger edges are part of the stream.
     pub trigger: bool,
@@ -48,40 +31,51 @@ pub struct Wanted {
 }
 
 impl Wanted {
-    /// Checks all of `settings`.
+    /// Checks all of `settings` against what `model` offers.
     ///
     /// # Errors
     /// What would be accepted, and what was found instead.
-    pub fn new(settings: &CameraSettings) -> Result<Self, (String, String)> {
+    pub fn new(model: Model, settings: &CameraSettings) -> Result<Self, (String, String)> {
+        let name = model.name();
         let mut biases = BTreeMap::new();
-        for (name, &value) in &settings.biases {
-            if !BIASES.contains(&name.as_str()) {
-                return Err((format!("a bias out of {}", BIASES.join(", ")), name.clone()));
+        for (bias, &value) in &settings.biases {
+            let names = model.biases();
+            if !names.contains(&bias.as_str()) {
+                let expected = match names {
+                    [] => format!("no bias of the {name}: they keep their defaults"),
+                    _ => format!("a bias out of {}", names.join(", ")),
+                };
+                return Err((expected, bias.clone()));
             }
-            // Registers of eight bits hold value and offset together.
-            let offset = i16::try_from(value)
-                .ok()
-                .filter(|v| (-255..=255).contains(v));
-            let Some(offset) = offset else {
-                let expected = format!("an offset of {name} in -255..=255");
+            let range = model.bias_range();
+            let fits = i16::try_from(value).ok().filter(|v| range.contains(v));
+            let Some(fits) = fits else {
+                let expected = format!("{bias} in {}..={}", range.start(), range.end());
                 return Err((expected, value.to_string()));
             };
-            biases.insert(name.clone(), offset);
+            biases.insert(bias.clone(), fits);
         }
-        let mut trigger = false;
-        for &channel in &settings.trigger_channels {
-            if channel != TRIGGER_CHANNEL {
-                let expected = format!("trigger channel {TRIGGER_CHANNEL}");
+        let channels = model.trigger_channels();
+        for channel in &settings.trigger_channels {
+            if !channels.contains(channel) {
+                let expected = match channels {
+                    [] => format!("no trigger input of the {name}: its driver offers none"),
+                    [only, ..] => format!("trigger channel {only}"),
+                };
                 return Err((expected, channel.to_string()));
             }
-            trigger = true;
         }
+        let trigger = !settings.trigger_channels.is_empty();
         if settings.noise_filter.is_some() {
-            return Err(("no noise filter on an EVK4".into(), "one".into()));
+            return Err((format!("no noise filter on the {name}"), "one".into()));
         }
         if let Some(r) = settings.roi {
             let found = format!("{} x {} at ({}, {})", r.width, r.height, r.x, r.y);
-            return Err(("no region on an EVK4".into(), found));
+            return Err((format!("no region on the {name}"), found));
+        }
+        if settings.sync != SyncMode::Standalone && !model.shares_time_base() {
+            let expected = format!("the {name} standalone: its driver shares no time base");
+            return Err((expected, format!("{:?}", settings.sync).to_lowercase()));
         }
         let time_base = match settings.sync {
             SyncMode::Standalone => TimeBase::Own,
@@ -101,7 +95,7 @@ impl Wanted {
         let mut all: Vec<(String, String)> = self
             .biases
             .iter()
-            .map(|(name, offset)| (name.clone(), offset.to_string()))
+            .map(|(name, value)| (name.clone(), value.to_string()))
             .collect();
         let channels = if self.trigger { "0" } else { "" };
         all.push(("trigger_channels".into(), channels.into()));

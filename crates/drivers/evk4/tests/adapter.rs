@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicI64, Ordering};
 use std::time::Duration;
 
 use skinrig_device::{CameraSettings, Clock, DeviceError, EventCamera, SyncMode};
-use skinrig_evk4::{Evk4, Link, LinkError, Packet, Packets, TimeBase, Wanted};
+use skinrig_evk4::{Evt3Camera, Link, LinkError, Model, Packet, Packets, TimeBase, Wanted};
 use skinrig_model::{CameraId, HostTime, RawChunk};
 
 const PACKET: usize = 128 << 10;
@@ -49,7 +49,7 @@ impl Link for Script {
     }
 
     fn stream(&mut self, wanted: &Wanted) -> Result<Box<dyn Packets>, LinkError> {
-        assert_eq!(wanted.time_base, TimeBase::Given);
+        assert_eq!(wanted.trigger, wanted.time_base == TimeBase::Given);
         Ok(Box::new(Running {
             next_ms: self.clock.now().0 / MS,
             script: self.clone(),
@@ -108,37 +108,75 @@ impl Packets for Running {
     }
 }
 
-fn settings() -> CameraSettings {
-    CameraSettings {
-        sync: SyncMode::Master,
-        biases: [("fo".to_owned(), -20)].into(),
-        trigger_channels: vec![0],
-        ..CameraSettings::default()
+fn settings(model: Model) -> CameraSettings {
+    let all = CameraSettings::default();
+    match model {
+        Model::Evk4 => CameraSettings {
+            sync: SyncMode::Master,
+            biases: [("fo".to_owned(), -20)].into(),
+            trigger_channels: vec![0],
+            ..all
+        },
+        Model::Evk3Hd => CameraSettings {
+            biases: [("fo_p".to_owned(), 80)].into(),
+            ..all
+        },
+        Model::SilkyVga => all,
     }
 }
 
-fn started(script: &Script) -> Evk4 {
+fn started(script: &Script) -> Evt3Camera {
     let clock = Box::new(script.clock.clone());
-    let mut camera = Evk4::new(Box::new(script.clone()), "00ABCDEF", CameraId::Two, clock);
-    camera.configure(&settings()).expect("settings");
+    let mut camera = Evt3Camera::new(
+        Model::Evk4,
+        Box::new(script.clone()),
+        "00ABCDEF",
+        CameraId::Two,
+        clock,
+    );
+    camera.configure(&settings(Model::Evk4)).expect("settings");
     camera.start().expect("start");
     camera
 }
 
 #[test]
 fn the_adapter_keeps_the_contract() {
-    let mut make = || -> (Box<dyn EventCamera>, Box<dyn Clock>) {
-        let script = Script::default();
-        let clock = Box::new(script.clock.clone());
-        let camera = Evk4::new(
-            Box::new(script.clone()),
-            "00ABCDEF",
-            CameraId::One,
-            clock.clone(),
-        );
-        (Box::new(camera), clock)
+    for model in Model::ALL {
+        let mut make = || -> (Box<dyn EventCamera>, Box<dyn Clock>) {
+            let script = Script::default();
+            let clock = Box::new(script.clock.clone());
+            let camera = Evt3Camera::new(
+                model,
+                Box::new(script.clone()),
+                "00ABCDEF",
+                CameraId::One,
+                clock.clone(),
+            );
+            (Box::new(camera), clock)
+        };
+        skinrig_device::contract::event_camera(&mut make, &settings(model));
+    }
+}
+
+#[test]
+fn what_a_model_lacks_is_refused_in_its_own_words() {
+    let refused = |model: Model, spoil: &dyn Fn(&mut CameraSettings)| {
+        let mut all = settings(model);
+        spoil(&mut all);
+        Wanted::new(model, &all).unwrap_err().0
     };
-    skinrig_device::contract::event_camera(&mut make, &settings());
+    let trigger = |s: &mut CameraSettings| s.trigger_channels = vec![0];
+    let slave = |s: &mut CameraSettings| s.sync = SyncMode::Slave;
+    let bias = |s: &mut CameraSettings| {
+        s.biases.insert("diff_on".to_owned(), -1);
+    };
+    for model in [Model::Evk3Hd, Model::SilkyVga] {
+        assert!(refused(model, &trigger).contains("no trigger input"));
+        assert!(refused(model, &slave).contains("shares no time base"));
+    }
+    assert_eq!(refused(Model::Evk3Hd, &bias), "diff_on in 0..=255");
+    assert!(refused(Model::SilkyVga, &bias).contains("keep their defaults"));
+    assert!(Wanted::new(Model::Evk4, &settings(Model::Evk4)).is_ok());
 }
 
 #[test]

@@ -99,6 +99,9 @@ fn assemble(root: &Field, places: &Places<'_>, out: &mut Collector) -> Option<Ri
         .get("trigger_box")
         .map(|f| camera::trigger_box(f, places, out));
     let preflight = root.get("preflight").and_then(preflight);
+    if let (Some(cameras), Some(device)) = (&cameras, root.get("trigger_box")) {
+        camera::wired(cameras, device, out);
+    }
     let press = root.get("press").map(surface);
     if let (Some(frame), Some(limits)) = (&frame, &limits) {
         inside(frame, limits, root, out);

@@ -58,6 +58,20 @@ pub(super) fn cameras(
     Some([one, two])
 }
 
+/// A trigger box needs a trigger input on both cameras.
+pub(super) fn wired(cameras: &[CameraSetup; 2], trigger_box: &Field, out: &mut Collector) {
+    if let Some(camera) = cameras.iter().find(|c| !c.has_trigger()) {
+        out.error(
+            trigger_box.span,
+            trigger_box.path.as_str(),
+            "a camera cannot see the trigger box",
+        )
+        .expected("two cameras whose driver offers a trigger input: `evk1` or `evk4`")
+        .found(format!("`model: {}`", camera.model))
+        .help("leave `trigger_box` out: the cameras' times are then tied to nothing, and sessions cannot be labelled by marks");
+    }
+}
+
 fn camera(f: &Field, places: &Places<'_>, out: &mut Collector) -> Option<CameraSetup> {
     let bias_file = f.get("bias_file").map(|b| places.path(b, out));
     let read_back_exceptions = f
@@ -91,6 +105,17 @@ fn camera(f: &Field, places: &Places<'_>, out: &mut Collector) -> Option<CameraS
         )
         .expected("0, the main trigger input")
         .found(trigger_channel.to_string());
+    }
+    let untriggered = matches!(model, "evk3_hd" | "silky_vga");
+    if untriggered && sync != SyncRole::Standalone {
+        let span = f.get("sync").map_or(f.span, |s| s.span);
+        out.error(
+            span,
+            format!("{}.sync", f.path),
+            "the camera's driver shares no time base",
+        )
+        .expected(format!("`standalone` for `model: {model}`"))
+        .found(format!("`{sync:?}`").to_lowercase());
     }
     let nominal = f.get("geometry")?;
     if nominal.get("aim").is_none() {

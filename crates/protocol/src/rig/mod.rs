@@ -193,7 +193,7 @@ pub struct RobotSetup {
 /// One camera of a bench.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct CameraSetup {
-    /// `evk1` or `evk4`.
+    /// `evk1`, `evk4`, `evk3_hd` or `silky_vga`.
     pub model: &'static str,
     /// Serial number.
     pub serial: String,
@@ -215,6 +215,14 @@ pub struct CameraSetup {
     pub trigger_channel: u8,
     /// Where it stands, as drawn or measured.
     pub geometry: CameraModel,
+}
+
+impl CameraSetup {
+    /// Whether the camera's driver offers a trigger input.
+    #[must_use]
+    pub fn has_trigger(&self) -> bool {
+        !matches!(self.model, "evk3_hd" | "silky_vga")
+    }
 }
 
 /// Whose time base a camera follows.

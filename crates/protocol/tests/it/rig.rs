@@ -128,6 +128,27 @@ fn finding(from: &str, to: &str, path: &str, message: &str, rest: &str) {
 }
 
 #[test]
+fn a_camera_without_trigger_input_stands_alone() {
+    let all = example();
+    let (before, rest) = all.split_once("\ntrigger_box:").unwrap();
+    let without_box = format!("{before}\n{}", &rest[rest.find("\npreflight:").unwrap()..]);
+    let second = "serial: \"00001754\"";
+    let other = without_box.replace(second, &format!("{second}\n    model: evk3_hd"));
+    let rig = parse(&other).unwrap_or_else(|e| panic!("{e}"));
+    let triggers = rig.cameras.each_ref().map(|c| c.has_trigger());
+    assert_eq!(triggers, [true, false]);
+    let shared = other
+        .replace("sync: standalone", "sync: slave")
+        .replace("model: evk3_hd", "model: evk3_hd\n    sync: master");
+    let error = parse(&shared).unwrap_err();
+    let [only] = error.list() else {
+        panic!("{error}")
+    };
+    assert_eq!(only.message, "the camera's driver shares no time base");
+    assert_eq!(only.path, "cameras.camera2.sync");
+}
+
+#[test]
 fn what_cannot_be_is_named() {
     let south_east = "skin: [50 mm, -35 mm, 0 mm], robot: [44.010 mm, -48.020 mm, -20.010 mm]";
     finding(
@@ -220,6 +241,13 @@ fn what_cannot_be_is_named() {
         "cameras.camera2.trigger_channel",
         "the trigger channels differ",
         "7 and 0",
+    );
+    finding(
+        "model: evk1",
+        "model: silky_vga",
+        "trigger_box",
+        "a camera cannot see the trigger box",
+        "`model: silky_vga`",
     );
     finding(
         "read_back_exceptions: []",

@@ -92,6 +92,12 @@ impl Slot {
         )
     }
 
+    /// Its bus, and its address on it.
+    #[must_use]
+    pub fn address(&self) -> (u8, u8) {
+        (self.device.bus_number(), self.device.address())
+    }
+
     /// True when the descriptors are those of a Treuzell camera.
     fn treuzell(&self) -> Result<bool, UsbError> {
         let descriptor = self

@@ -246,7 +246,15 @@ const MODELS: &[Word] = &[
     ("evk1", "Prophesee EVK1, VGA, Gen3.1"),
     (
         "evk4",
-        "Prophesee EVK4 and others, in builds that support them",
+        "Prophesee EVK4, in builds with `--features evk4`; recorded in full, analysed within 640 x 480 pixels",
+    ),
+    (
+        "evk3_hd",
+        "Prophesee EVK3 HD, as `evk4`; no trigger input, so only without a trigger box and standalone",
+    ),
+    (
+        "silky_vga",
+        "CenturyArks SilkyEvCam VGA, as `evk3_hd`; no biases either",
     ),
 ];
 
