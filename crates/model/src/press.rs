@@ -78,6 +78,15 @@ impl PressVerdict {
         }
     }
 
+    /// How the reason begins of an attempt that did not come to its end: the program was gone, or the run ended during it.
+    pub const CUT_OFF: &'static str = "cut off";
+
+    /// True for an attempt that did not come to its end; nothing can be said of its press.
+    #[must_use]
+    pub fn is_cut_off(&self) -> bool {
+        matches!(self, Self::Invalid(reason) if reason.starts_with(Self::CUT_OFF))
+    }
+
     /// Why, for everything but `Valid`.
     #[must_use]
     pub fn reason(&self) -> Option<&str> {

@@ -6,6 +6,7 @@
 use serde::{Deserialize, Serialize};
 use skinrig_model::{HostDuration, MarkKind, PlannedPress, Point2, Point3, PressId, Skin};
 
+use crate::retakes::Retakes;
 use crate::surface::Surface;
 
 /// Everything a run does, in order.
@@ -19,6 +20,9 @@ pub struct Plan {
     pub seed: u64,
     /// Limits that hold for the whole run.
     pub limits: RunLimits,
+    /// How often a press may be taken again. Not written when it is the default.
+    #[serde(default, skip_serializing_if = "Retakes::is_default")]
+    pub retakes: Retakes,
     /// Every planned press; `presses[i].id == PressId(i)`.
     pub presses: Vec<PlannedPress>,
     /// What to do, in order.

@@ -11,6 +11,7 @@ use skinrig_model::{
 use crate::area::Surroundings;
 use crate::diagnostic::Diagnostics;
 use crate::plan::{Plan, RunLimits};
+use crate::retakes::Retakes;
 use crate::surface::Surface;
 
 /// Reads a file that a protocol names. The path is the protocol's folder joined with the name in the protocol.
@@ -61,6 +62,8 @@ pub struct Protocol {
     pub motion: Motion,
     /// Limits of the run.
     pub limits: RunLimits,
+    /// How often a press may be taken again.
+    pub retakes: Retakes,
     /// Moments that emit a mark on the trigger line.
     pub marks: Vec<MarkKind>,
     /// How presses find the surface; `None`: as the rig says, at z = 0 when it says nothing.

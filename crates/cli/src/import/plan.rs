@@ -1,7 +1,7 @@
 //! A schedule as a plan: the same presses at the same times, executed by the same controller.
 
 use skinrig_model::{HostDuration, HostTime, PlannedPress, Point3, Robot};
-use skinrig_protocol::{OnTrip, Plan, PressStep, RunLimits, Schedule, Step, Surface};
+use skinrig_protocol::{OnTrip, Plan, PressStep, Retakes, RunLimits, Schedule, Step, Surface};
 
 /// Height of the scheduled tip before the first press, mm. Nothing moves.
 const START_MM: f64 = 5.0;
@@ -62,6 +62,7 @@ pub fn compile(schedule: &Schedule, presses: Vec<PlannedPress>, times: &[HostTim
             max_acceleration_mm_s2: None,
             on_trip: OnTrip::Retract,
         },
+        retakes: Retakes::NONE,
         presses,
         steps,
     }

@@ -8,8 +8,8 @@ use skinrig_device::{
     IndenterCapabilities, MotionLimits, Rig, RobotSample, TriggerBox, TriggerCapabilities,
 };
 use skinrig_model::*;
-use skinrig_protocol::Surface;
 use skinrig_protocol::plan::{OnTrip, Plan, PressStep, RunLimits, Step};
+use skinrig_protocol::{Retakes, Surface};
 
 pub const MS: i64 = 1_000_000;
 
@@ -582,6 +582,7 @@ pub fn plan() -> Plan {
         name: "mock".into(),
         seed: 1,
         limits: LIMITS,
+        retakes: Retakes::NONE,
         presses,
         steps,
     }

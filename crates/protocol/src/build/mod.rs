@@ -268,6 +268,7 @@ fn assemble(
         depths_mm: depths,
         motion: motion_read?,
         limits: limits_read?,
+        retakes: root.get("retakes").and_then(crate::retakes::retakes)?,
         marks: marks?,
         surface: surface.map_or(Some(None), |s| s.map(Some))?,
         analysis: analysis?,

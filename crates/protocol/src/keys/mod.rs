@@ -12,6 +12,7 @@ pub(crate) use path::UNITS;
 pub(crate) use run::{EVALUATION, ROI};
 
 use crate::quantity::Dimension::{Length, Speed, Time};
+use crate::retakes::RETAKES;
 use crate::shape::{Key, Need, Range, Shape, Table, Word};
 use crate::surface::PRESS;
 use frame::{FRAME, SYNC};
@@ -163,6 +164,12 @@ pub(crate) static PROTOCOL: Table = Table {
             "press",
             Shape::Map(&PRESS),
             "How presses find the surface; absent: as the rig file says, at z = 0 of the frame when it says nothing.",
+        ),
+        default(
+            "retakes",
+            Shape::Map(&RETAKES),
+            "{}",
+            "How often a press is taken again because its data were lost or it came too late.",
         ),
         default(
             "triggers",

@@ -1,0 +1,136 @@
+//! What of a plan is still to be done: the steps that lead to the presses that are wanted, and nothing else.
+
+use skinrig_model::{HostDuration, Point3, PressHistory, PressId, PressRole, Skin};
+
+use crate::plan::{Plan, Step};
+use crate::timing;
+
+/// How the tip gets from a press to the next one that is wanted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Route {
+    /// Straight, at clearance height: a new way, to be held against keep-outs by [`crate::check()`].
+    Straight,
+    /// Along every travel of the plan: longer, and allowed because the plan is.
+    AsPlanned,
+}
+
+impl Plan {
+    /// Which presses a resumed run takes, given what is known of each: those that [`Retakes::wants`](crate::Retakes::wants), and
+    /// before them all sync presses again. Nothing when no press but sync presses is wanted.
+    #[must_use]
+    pub fn wanted(&self, histories: &[PressHistory]) -> Vec<bool> {
+        let unknown = PressHistory::default();
+        let wants = |i: usize| {
+            let history = histories.get(i).unwrap_or(&unknown);
+            self.retakes.wants(history)
+        };
+        let is_sync = |i: usize| {
+            self.presses
+                .get(i)
+                .is_some_and(|p| p.role == PressRole::Sync)
+        };
+        let n = self.presses.len();
+        let any = (0..n).any(|i| !is_sync(i) && wants(i));
+        (0..n).map(|i| any && (is_sync(i) || wants(i))).collect()
+    }
+
+    /// The same plan with only the steps that `wanted` presses need, in their order. The first press of a repetition starts at
+    /// once, and presses that are left out leave no time between the others. All presses stay listed.
+    #[must_use]
+    pub fn remaining(&self, wanted: impl Fn(PressId) -> bool, route: Route) -> Self {
+        let is_wanted = |step: &Step| matches!(step, Step::Press(p) if wanted(p.press));
+        let first = self.steps.iter().position(is_wanted);
+        let last = self.steps.iter().rposition(is_wanted);
+        let mut steps = Vec::new();
+        if let (Some(first), Some(last)) = (first, last) {
+            for (n, step) in self.steps.iter().enumerate().take(last + 1) {
+                // Whether a wanted press comes before a step of the same kind does.
+                let leads = |same: fn(&Step) -> bool| {
+                    let rest = self.steps.iter().skip(n + 1);
+                    rest.take_while(|s| !same(s)).any(is_wanted)
+                };
+                let kept = match step {
+                    Step::Begin { .. } => leads(|s| matches!(s, Step::Begin { .. })),
+                    Step::Pause { .. } => n > first && leads(|s| matches!(s, Step::Pause { .. })),
+                    Step::Travel { .. } => {
+                        route == Route::AsPlanned || leads(|s| matches!(s, Step::Travel { .. }))
+                    }
+                    Step::Press(p) => wanted(p.press),
+                };
+                if kept {
+                    steps.push(step.clone());
+                }
+            }
+        }
+        let mut rest = Self {
+            steps,
+            ..self.clone()
+        };
+        self.close_gaps(&mut rest, wanted);
+        rest.allow_time();
+        rest
+    }
+
+    /// Takes the slots of presses that are left out away from those after them.
+    fn close_gaps(&self, rest: &mut Self, wanted: impl Fn(PressId) -> bool) {
+        let mut earlier = vec![HostDuration::ZERO; self.presses.len()];
+        // The slot that was left out last, and what all of the block left out amount to.
+        let mut open: Option<HostDuration> = None;
+        let mut gone = HostDuration::ZERO;
+        for step in &self.steps {
+            match step {
+                Step::Begin { .. } => (open, gone) = (None, HostDuration::ZERO),
+                Step::Press(p) => {
+                    let Some(start) = p.start_after_begin else {
+                        continue;
+                    };
+                    if let Some(from) = open.take() {
+                        gone = gone + HostDuration(start.0 - from.0);
+                    }
+                    if !wanted(p.press) {
+                        open = Some(start);
+                    }
+                    if let Some(earlier) = earlier.get_mut(p.press.0 as usize) {
+                        *earlier = gone;
+                    }
+                }
+                Step::Travel { .. } | Step::Pause { .. } => {}
+            }
+        }
+        for step in &mut rest.steps {
+            if let Step::Press(p) = step
+                && let (Some(start), Some(gone)) = (
+                    &mut p.start_after_begin,
+                    earlier.get(p.press.0 as usize).copied(),
+                )
+            {
+                start.0 -= gone.0;
+            }
+        }
+    }
+
+    /// Travels that became longer get a later deadline; the first one begins anywhere in the workspace.
+    fn allow_time(&mut self) {
+        let limits = self.limits;
+        let corner = |[x, y, z]: [f64; 3]| Point3::<Skin>::new(x, y, z);
+        let widest_mm =
+            corner(limits.workspace_min_mm).distance_mm(corner(limits.workspace_max_mm));
+        let mut position: Option<Point3<Skin>> = None;
+        for step in &mut self.steps {
+            match step {
+                Step::Travel {
+                    to,
+                    speed_mm_s,
+                    deadline,
+                } => {
+                    let distance_mm = position.map_or(widest_mm, |p| p.distance_mm(*to));
+                    let estimate = timing::travel_s(&limits, distance_mm, *speed_mm_s);
+                    *deadline = (*deadline).max(timing::deadline(estimate));
+                    position = Some(*to);
+                }
+                Step::Press(p) => position = Some(p.at.at_height(limits.clearance_mm)),
+                Step::Begin { .. } | Step::Pause { .. } => {}
+            }
+        }
+    }
+}

@@ -1,0 +1,135 @@
+//! Laws of what is left of a plan when some of its presses are done.
+
+use proptest::prelude::*;
+use skinrig_model::{HostDuration, PressHistory, PressId, PressRole, PressVerdict};
+use skinrig_protocol::{Plan, PressStep, Protocol, Retakes, Route, Step, check};
+
+use crate::common::{parse, shipped};
+
+fn presses(plan: &Plan) -> Vec<&PressStep> {
+    let steps = plan.steps.iter();
+    steps
+        .filter_map(|s| match s {
+            Step::Press(p) => Some(p),
+            _ => None,
+        })
+        .collect()
+}
+
+/// Presses of each block, in order.
+fn blocks(plan: &Plan) -> Vec<Vec<&PressStep>> {
+    let mut blocks = Vec::new();
+    for step in &plan.steps {
+        match step {
+            Step::Begin { .. } => blocks.push(Vec::new()),
+            Step::Press(p) => blocks.last_mut().unwrap().push(p),
+            _ => {}
+        }
+    }
+    blocks
+}
+
+fn shipped_protocol(name: &str) -> Protocol {
+    parse(&shipped(&format!("{name}.yaml")), &[]).unwrap()
+}
+
+#[test]
+fn all_of_a_plan_is_the_plan() {
+    for name in [
+        "demo",
+        "paper-meander",
+        "circles",
+        "depth-sweep",
+        "quick-check",
+    ] {
+        let plan = shipped_protocol(name).compile();
+        for route in [Route::Straight, Route::AsPlanned] {
+            assert_eq!(plan.remaining(|_| true, route), plan, "{name}");
+        }
+        assert_eq!(plan.remaining(|_| false, Route::AsPlanned).steps, []);
+    }
+}
+
+#[test]
+fn what_was_not_done_is_wanted_after_the_sync_presses() {
+    let plan = shipped_protocol("quick-check").compile();
+    let sync = plan.presses.iter().filter(|p| p.role == PressRole::Sync);
+    let sync = sync.count();
+    assert!(sync > 0);
+    let done = PressHistory {
+        attempts: 1,
+        verdict: Some(PressVerdict::Valid),
+    };
+    let mut histories = vec![done; plan.presses.len()];
+    let none = plan.wanted(&histories);
+    assert!(none.iter().all(|w| !w), "nothing is left to be done");
+    // A sync press alone is no reason to press at all.
+    histories[0].verdict = None;
+    assert_eq!(plan.wanted(&histories), none);
+    histories[sync].verdict = Some(PressVerdict::Invalid("cut off: no power".into()));
+    let mut expected = vec![false; plan.presses.len()];
+    expected[..=sync].fill(true);
+    assert_eq!(plan.wanted(&histories), expected);
+}
+
+#[test]
+fn a_press_is_final_when_it_is_good_or_has_no_attempt_left() {
+    let wants = |attempts, verdict| {
+        let retakes = Retakes {
+            per_press: 2,
+            per_session: 0,
+        };
+        retakes.wants(&PressHistory { attempts, verdict })
+    };
+    let invalid = |reason: &str| Some(PressVerdict::Invalid(reason.into()));
+    assert!(wants(0, None));
+    assert!(wants(7, None));
+    assert!(wants(7, Some(PressVerdict::Missed("stop".into()))));
+    assert!(wants(7, invalid("cut off: the process was gone")));
+    assert!(wants(2, invalid("camera 1 lost 4 bytes")));
+    assert!(!wants(3, invalid("camera 1 lost 4 bytes")));
+    assert!(!wants(1, Some(PressVerdict::Valid)));
+    assert!(!wants(1, Some(PressVerdict::Excluded("rule".into()))));
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    #[test]
+    fn the_rest_of_a_plan_is_a_safe_plan_without_gaps(seed in any::<u64>(), name in 0..4_usize, eighths in 0..=8_u64) {
+        let name = ["demo", "circles", "depth-sweep", "quick-check"][name];
+        let protocol = shipped_protocol(name);
+        let plan = protocol.compile();
+        let wanted = |id: PressId| {
+            let mixed = (seed ^ u64::from(id.0)).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+            (mixed >> 32) % 8 < eighths
+        };
+        for route in [Route::Straight, Route::AsPlanned] {
+            let rest = plan.remaining(wanted, route);
+            let found = check(&rest, &protocol.surroundings, Some(protocol.motion.home));
+            prop_assert_eq!(found, vec![]);
+            let expected: Vec<PressId> =
+                presses(&plan).iter().map(|p| p.press).filter(|id| wanted(*id)).collect();
+            let found: Vec<PressId> = presses(&rest).iter().map(|p| p.press).collect();
+            prop_assert_eq!(found, expected);
+            prop_assert_eq!(&rest.presses, &plan.presses);
+            for block in blocks(&rest) {
+                prop_assert!(!block.is_empty());
+                let start = |p: &PressStep| p.start_after_begin.unwrap_or_default();
+                let planned = |p: &PressStep| {
+                    let all = presses(&plan);
+                    let at = all.iter().position(|q| q.press == p.press).unwrap();
+                    // What the plan leaves between this press and the one after it, wanted or not.
+                    all.get(at + 1).map(|next| HostDuration(start(next).0 - start(all[at]).0))
+                };
+                if plan.presses[block[0].press.0 as usize].role != PressRole::Sync {
+                    prop_assert_eq!(start(block[0]), HostDuration::ZERO);
+                }
+                for pair in block.windows(2) {
+                    let gap = HostDuration(start(pair[1]).0 - start(pair[0]).0);
+                    prop_assert_eq!(Some(gap), planned(pair[0]));
+                }
+            }
+        }
+    }
+}
