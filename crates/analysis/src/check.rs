@@ -258,12 +258,12 @@ fn studies(
         "1 to 1000 bins",
         f64::from(l.consecutive),
     )?;
-    let (first, last) = l.threshold_range;
+    let in_order = |(first, last)| positive(first, 1e6) && positive(last, 1e6) && first <= last;
     number(
         "latency.threshold_range",
-        positive(first, 1e6) && positive(last, 1e6) && first <= last,
+        in_order(l.threshold_range),
         "two thresholds above 0 in order",
-        first,
+        l.threshold_range.0,
     )?;
     number(
         "latency.thresholds",
@@ -276,6 +276,31 @@ fn studies(
         (0.0..=1.0).contains(&l.target_rate),
         "a share from 0 to 1",
         l.target_rate,
+    )?;
+    let few = &l.reduced;
+    number(
+        "latency.reduced.factor",
+        (1..=1 << 20).contains(&few.factor),
+        "a factor from 1 to 2^20",
+        f64::from(few.factor),
+    )?;
+    number(
+        "latency.reduced.threshold_range",
+        in_order(few.threshold_range),
+        "two thresholds above 0 in order",
+        few.threshold_range.0,
+    )?;
+    number(
+        "latency.reduced.thresholds",
+        (1..=1000).contains(&few.thresholds),
+        "1 to 1000 thresholds",
+        f64::from(few.thresholds),
+    )?;
+    number(
+        "latency.reduced.target_rate",
+        (0.0..=1.0).contains(&few.target_rate),
+        "a share from 0 to 1",
+        few.target_rate,
     )?;
     number(
         "latency.window_ms",

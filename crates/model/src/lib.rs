@@ -37,8 +37,8 @@ pub use record::{
 pub use scene::{SceneNeed, SimLevel};
 pub use settings::{
     AlignmentSettings, AnalysisSettings, Background, CalibrationModel, CentroidRule, CmreSettings,
-    Estimator, LatencySettings, LensKind, Precision, ReductionSettings, RigGeometry, ThresholdRule,
-    WindowAnchor,
+    Estimator, LatencySettings, LensKind, Precision, ReducedLatencySettings, ReductionSettings,
+    RigGeometry, ThresholdRule, WindowAnchor,
 };
 pub use skin::SkinOutline;
 pub use stream::{ChunkFacts, RawChunk, StreamFormat};

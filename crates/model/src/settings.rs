@@ -156,6 +156,8 @@ pub struct LatencySettings {
     pub window_ms: f64,
     /// Where the background comes from.
     pub background: Background,
+    /// The same study on thinned events.
+    pub reduced: ReducedLatencySettings,
 }
 
 impl Default for LatencySettings {
@@ -170,6 +172,32 @@ impl Default for LatencySettings {
             target_rate: 0.95,
             window_ms: 100.0,
             background: Background::Before,
+            reduced: ReducedLatencySettings::default(),
+        }
+    }
+}
+
+/// The detection-latency study on thinned events: what differs from the study on all of them.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct ReducedLatencySettings {
+    /// Thinning factor k, at least 1 (paper, "Data Ablation and Latency Distribution Analysis": 1024).
+    pub factor: u32,
+    /// Thresholds h that are tried, first and last (public code: 3 to 8; the paper reports 3).
+    pub threshold_range: (f64, f64),
+    /// How many thresholds, evenly spaced, both ends included (public code: 6).
+    pub thresholds: u32,
+    /// The threshold chosen has the fewest false alarms among those that detect at least this share (public code: 0.85).
+    pub target_rate: f64,
+}
+
+impl Default for ReducedLatencySettings {
+    fn default() -> Self {
+        Self {
+            factor: 1024,
+            threshold_range: (3.0, 8.0),
+            thresholds: 6,
+            target_rate: 0.85,
         }
     }
 }

@@ -3,10 +3,10 @@
 /// Overrides that select what the public code chose where it departs from the paper or from the defaults here: all
 /// clusters make the centroid, a press window is one whole period about the middle of the press, nothing is left out by
 /// a threshold, a response or an angle, data reduction with a core threshold of one event, the background after the
-/// press, thresholds 17 to 19. Each has its source in `docs/paper.md`.
+/// press, thresholds 17 to 19, and 3 to 8 at 1/1024 of the events. Each has its source in `docs/paper.md`.
 ///
 /// The calibration stays the protocol's: the block that judges as published fits the paper's eight parameters itself.
-pub const REFERENCE_CODE: [&str; 27] = [
+pub const REFERENCE_CODE: [&str; 32] = [
     "analysis.crop.camera1=[185 px, 360 px]",
     "analysis.crop.camera2=[200 px, 355 px]",
     "analysis.window_anchor=middle",
@@ -34,4 +34,9 @@ pub const REFERENCE_CODE: [&str; 27] = [
     "analysis.latency.thresholds.to=19",
     "analysis.latency.thresholds.count=3",
     "analysis.latency.background=after",
+    "analysis.latency.reduced.factor=1024",
+    "analysis.latency.reduced.thresholds.from=3",
+    "analysis.latency.reduced.thresholds.to=8",
+    "analysis.latency.reduced.thresholds.count=6",
+    "analysis.latency.reduced.target_rate=0.85",
 ];

@@ -63,6 +63,14 @@ pub(crate) fn words<T: serde::Serialize>(variant: &T) -> String {
     }
 }
 
+/// A remark as a sentence: its first letter large, a full stop at its end.
+pub(crate) fn sentence(remark: &str) -> String {
+    let mut letters = remark.chars();
+    let first = letters.next().map(char::to_uppercase);
+    let first = first.into_iter().flatten();
+    first.chain(letters).chain(['.']).collect()
+}
+
 /// The text, or "not recorded" when it is empty.
 pub(crate) fn or_missing(text: &str) -> &str {
     if text.trim().is_empty() {

@@ -20,6 +20,7 @@ pub mod published;
 pub mod svg;
 pub mod tradeoff;
 
+mod detector;
 mod document;
 mod format;
 mod tables;

@@ -35,12 +35,6 @@ use crate::result::{
 use crate::seeded;
 use crate::verdict;
 
-/// Thinning factor of the reduced study (paper).
-const REDUCED_FACTOR: u32 = 1024;
-/// Thresholds of the reduced study: first, last, how many (public code).
-const REDUCED_THRESHOLDS: (f64, f64, u32) = (3.0, 8.0, 6);
-/// Share that the reduced study's threshold should detect (public code).
-const REDUCED_TARGET: f64 = 0.85;
 /// Streams of random numbers from here on thin events; the bootstrap counts from 0.
 const THINNING: u64 = 1 << 40;
 
@@ -72,11 +66,13 @@ pub fn study(analysis: &Analysis, kept: &Kept) -> Option<Latency> {
     let trials = look(&usable, &detector, None);
     let found = Found::new(analysis, &detector, settings.target_rate, &trials);
 
-    let (first, last, count) = REDUCED_THRESHOLDS;
-    let few = Detector::new(settings, edges, sweep::thresholds((first, last), count));
-    let thinning = Some((REDUCED_FACTOR, analysis.settings.seed));
+    let asked = settings.reduced;
+    let (first, last) = asked.threshold_range;
+    let few = sweep::thresholds(asked.threshold_range, asked.thresholds);
+    let few = Detector::new(settings, edges, few);
+    let thinning = Some((asked.factor, analysis.settings.seed));
     let thinned = look(&usable, &few, thinning);
-    let reduced = Found::new(analysis, &few, REDUCED_TARGET, &thinned);
+    let reduced = Found::new(analysis, &few, asked.target_rate, &thinned);
 
     let onset = |t: &Trial| found.chosen.and_then(|i| t.onsets_ms[i]);
     let mut rates: Vec<f64> = trials.iter().map(|t| t.background_per_s).collect();
@@ -107,9 +103,9 @@ pub fn study(analysis: &Analysis, kept: &Kept) -> Option<Latency> {
         false_alarms_per_s: found.estimates.false_alarms_per_s,
         from_contact: from_contact(analysis, &clocks, &detector, &trials, &found),
         reduced: Some(ReducedLatency {
-            factor: REDUCED_FACTOR,
-            thresholds: REDUCED_THRESHOLDS,
-            target_rate: REDUCED_TARGET,
+            factor: asked.factor,
+            thresholds: (first, last, asked.thresholds),
+            target_rate: asked.target_rate,
             threshold: reduced.chosen.map(|i| few.thresholds[i]),
             detected_rate: reduced.estimates.detected_rate,
             width_ms: reduced.estimates.width_ms,

@@ -120,14 +120,14 @@ pub struct ContactLatency {
     pub from_contact_ms: f64,
 }
 
-/// Detection on thinned events, with the public code's thresholds and target for reduced data.
+/// Detection on thinned events, with thresholds and a target of its own.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ReducedLatency {
     /// k: of the n events of a trial, and of a background, round(n / k) are kept (public code).
     pub factor: u32,
-    /// Thresholds tried: first, last and how many (public code: 3 to 8, 6).
+    /// Thresholds tried: first, last and how many.
     pub thresholds: (f64, f64, u32),
-    /// Share of trials that the threshold chosen should detect (public code: 0.85).
+    /// Share of trials that the threshold chosen should detect.
     pub target_rate: f64,
     /// The threshold chosen; `None` when nothing was detected at any.
     pub threshold: Option<f64>,

@@ -2,8 +2,8 @@
 
 use skinrig_model::{
     AlignmentSettings, AnalysisSettings, Background, CalibrationModel, CentroidRule, CmreSettings,
-    Estimator, LatencySettings, LensKind, Precision, ReductionSettings, ThresholdRule,
-    WindowAnchor,
+    Estimator, LatencySettings, LensKind, Precision, ReducedLatencySettings, ReductionSettings,
+    ThresholdRule, WindowAnchor,
 };
 
 use crate::diagnostic::Collector;
@@ -131,19 +131,18 @@ fn reduction(f: &Field) -> Option<ReductionSettings> {
 
 fn latency(f: &Field, out: &mut Collector) -> Option<LatencySettings> {
     let grid = f.get("thresholds")?;
-    let (from, to) = (grid.number("from")?, grid.number("to")?);
-    if from > to {
-        out.error(grid.span, grid.path.as_str(), "no thresholds are left")
-            .expected("the first threshold at or below the last")
-            .found(format!("{from} to {to}"));
+    let reduced = f.get("reduced")?;
+    let few = reduced.get("thresholds")?;
+    let ranges = [threshold_range(grid, out), threshold_range(few, out)];
+    let [Some(threshold_range), Some(few_range)] = ranges else {
         return None;
-    }
+    };
     Some(LatencySettings {
         bin_ms: milliseconds(f.quantity("bin")?),
         sigma_ms: milliseconds(f.quantity("sigma")?),
         alpha: f.number("alpha")?,
         consecutive: f.count("consecutive")?,
-        threshold_range: (from, to),
+        threshold_range,
         thresholds: grid.count("count")?,
         target_rate: f.number("target_rate")?,
         window_ms: milliseconds(f.quantity("window")?),
@@ -151,7 +150,25 @@ fn latency(f: &Field, out: &mut Collector) -> Option<LatencySettings> {
             "after" => Background::After,
             _ => Background::Before,
         },
+        reduced: ReducedLatencySettings {
+            factor: reduced.count("factor")?,
+            threshold_range: few_range,
+            thresholds: few.count("count")?,
+            target_rate: reduced.number("target_rate")?,
+        },
     })
+}
+
+/// The ends of a grid of thresholds.
+fn threshold_range(grid: &Field, out: &mut Collector) -> Option<(f64, f64)> {
+    let (from, to) = (grid.number("from")?, grid.number("to")?);
+    if from > to {
+        out.error(grid.span, grid.path.as_str(), "no thresholds are left")
+            .expected("the first threshold at or below the last")
+            .found(format!("{from} to {to}"));
+        return None;
+    }
+    Some((from, to))
 }
 
 fn cmre(f: &Field) -> Option<CmreSettings> {

@@ -377,6 +377,59 @@ pub(crate) static LATENCY: Table = Table {
             "before",
             "Where the background rate is taken from.",
         ),
+        default(
+            "reduced",
+            Shape::Map(&REDUCED),
+            "{}",
+            "The same study on thinned events.",
+        ),
+    ],
+    exactly_one: &[],
+};
+
+pub(crate) static REDUCED: Table = Table {
+    name: "reduced",
+    doc: "What differs from the study on all events.",
+    keys: &[
+        default(
+            "factor",
+            count(1, 1 << 20),
+            "1024",
+            "Of the events of a trial and of its background one in this many is used, chosen at random; the paper's 1024.",
+        ),
+        default(
+            "thresholds",
+            Shape::Map(&REDUCED_GRID),
+            "{}",
+            "The thresholds h that are tried.",
+        ),
+        default(
+            "target_rate",
+            Shape::Number(Range::from_zero(1.0)),
+            "0.85",
+            "The threshold with the fewest false alarms is chosen among those that detect at least this share; the public code's 0.85.",
+        ),
+    ],
+    exactly_one: &[],
+};
+
+pub(crate) static REDUCED_GRID: Table = Table {
+    name: "reduced_thresholds",
+    doc: "Evenly spaced thresholds for thinned events, both ends included; the public code's 3 to 8.",
+    keys: &[
+        default(
+            "from",
+            Shape::Number(Range::above_zero(1e6)),
+            "3",
+            "The first.",
+        ),
+        default(
+            "to",
+            Shape::Number(Range::above_zero(1e6)),
+            "8",
+            "The last.",
+        ),
+        default("count", count(1, 1000), "6", "How many."),
     ],
     exactly_one: &[],
 };

@@ -50,6 +50,11 @@ fn absent_settings_are_the_documented_defaults() {
         "analysis.latency.target_rate=0.85",
         "analysis.latency.window=20 ms",
         "analysis.latency.background=after",
+        "analysis.latency.reduced.factor=64",
+        "analysis.latency.reduced.thresholds.from=4",
+        "analysis.latency.reduced.thresholds.to=9",
+        "analysis.latency.reduced.thresholds.count=11",
+        "analysis.latency.reduced.target_rate=0.7",
         "analysis.cmre.cell=4 mm",
         "analysis.cmre.sigma=2 mm",
         "analysis.cmre.sr=80 mm",
@@ -85,6 +90,9 @@ fn thresholds_run_upwards() {
         "{error}"
     );
     assert!(error.to_string().contains("30 to 20"), "{error}");
+    let reduced = "analysis.latency.reduced.thresholds.to=2";
+    let error = parse(&shipped("demo.yaml"), &[reduced]).unwrap_err();
+    assert!(error.to_string().contains("3 to 2"), "{error}");
 }
 
 #[test]

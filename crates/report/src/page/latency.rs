@@ -112,6 +112,9 @@ fn notes(grid: &mut Grid, l: &Latency) {
             number(Some(l.background_s), 1),
         ));
     }
+    for remark in crate::detector::remarks(l) {
+        grid.note(crate::format::sentence(&remark));
+    }
     grid.note(format!(
         "A detector that runs live would know an onset {} ms after its reported time.",
         number(Some(l.decision_delay_ms), 1)

@@ -156,6 +156,9 @@ fn latency(l: &Latency) -> String {
             &format!("1/{} of the events: {text}", r.factor),
         );
     }
+    for remark in crate::detector::remarks(l) {
+        out += &wrap("          ", &remark);
+    }
     out
 }
 

@@ -1,0 +1,109 @@
+//! Owns what a reader must know about the choice of the latency detector's threshold.
+
+use skinrig_analysis::result::Latency;
+
+/// One choice of a threshold h.
+struct Choice {
+    /// What the trials were looked at with, as in "at all events".
+    data: String,
+    /// The protocol's keys are below this one.
+    key: &'static str,
+    /// First and last threshold tried.
+    range: (f64, f64),
+    chosen: Option<f64>,
+    detected_rate: Option<f64>,
+    target_rate: f64,
+}
+
+impl Choice {
+    /// The target that no threshold reaches, and a choice at an end of what was tried.
+    fn remarks(&self) -> Vec<String> {
+        let Self { data, key, .. } = self;
+        let (first, last) = self.range;
+        let Some(chosen) = self.chosen else {
+            return vec![format!(
+                "with {data} no threshold h from {first} to {last} detects anything"
+            )];
+        };
+        let mut out = Vec::new();
+        let detected = self.detected_rate.unwrap_or(0.0);
+        if detected < self.target_rate {
+            out.push(format!(
+                "with {data} no threshold h from {first} to {last} detects the wanted {:.0} % of the trials: h {chosen} \
+                 detects most, {:.1} % ({key}.target_rate)",
+                100.0 * self.target_rate,
+                100.0 * detected
+            ));
+        }
+        let edge = match chosen {
+            _ if first >= last => None,
+            h if h <= first => Some(("lowest", "a lower one may detect more")),
+            h if h >= last => Some(("highest", "a higher one may have fewer false alarms")),
+            _ => None,
+        };
+        out.extend(edge.map(|(end, better)| {
+            format!(
+                "with {data} the threshold chosen, h {chosen}, is the {end} of those tried: {better} ({key}.thresholds)"
+            )
+        }));
+        out
+    }
+}
+
+/// Remarks on the thresholds chosen for all events and for thinned ones; none when both lie within what was tried and
+/// detect as much as wanted.
+pub(crate) fn remarks(l: &Latency) -> Vec<String> {
+    let chosen = l.chosen.and_then(|i| l.sweep.get(i as usize));
+    let all = Choice {
+        data: "all events".to_owned(),
+        key: "analysis.latency",
+        range: l.settings.threshold_range,
+        chosen: chosen.map(|r| r.threshold),
+        detected_rate: chosen.map(|r| r.detected_rate),
+        target_rate: l.settings.target_rate,
+    };
+    let few = l.reduced.as_ref().map(|r| Choice {
+        data: format!("1/{} of the events", r.factor),
+        key: "analysis.latency.reduced",
+        range: (r.thresholds.0, r.thresholds.1),
+        chosen: r.threshold,
+        detected_rate: r.detected_rate.value,
+        target_rate: r.target_rate,
+    });
+    // Without trials nothing was tried.
+    let tried = (l.trials > 0).then_some(all).into_iter();
+    let few = few.filter(|_| l.trials > 0);
+    tried.chain(few).flat_map(|c| c.remarks()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn choice(chosen: Option<f64>, detected_rate: f64) -> Choice {
+        Choice {
+            data: "1/1024 of the events".to_owned(),
+            key: "analysis.latency.reduced",
+            range: (3.0, 8.0),
+            chosen,
+            detected_rate: Some(detected_rate),
+            target_rate: 0.85,
+        }
+    }
+
+    #[test]
+    fn a_missed_target_and_both_ends_of_the_grid_are_said() {
+        let said = |chosen, rate| choice(chosen, rate).remarks().join("; ");
+        assert_eq!(said(Some(5.0), 0.85), "");
+        let low = said(Some(3.0), 0.712);
+        assert!(low.contains("85 %") && low.contains("71.2 %"), "{low}");
+        assert!(low.contains("the lowest of those tried"), "{low}");
+        let high = said(Some(8.0), 0.9);
+        assert!(high.contains("the highest of those tried"), "{high}");
+        assert!(!high.contains("no threshold"), "{high}");
+        assert!(said(None, 0.0).contains("detects anything"));
+        let mut one = choice(Some(3.0), 0.9);
+        one.range = (3.0, 3.0);
+        assert!(one.remarks().is_empty());
+    }
+}
