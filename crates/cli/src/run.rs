@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use chrono::{DateTime, SecondsFormat, Utc};
-use skinrig_controller::{ControlHandle, Preflight, RunReport, execute, execute_checked};
+use skinrig_controller::{Preflight, RunReport, execute, execute_checked};
 use skinrig_device::Rig;
 use skinrig_model::{
     AnalysisSettings, CameraId, HostDuration, InterruptionKind, PressVerdict, RunEnd, RunHeader,
@@ -15,11 +15,12 @@ use skinrig_recorder::{RecorderError, SessionReader, SessionWriter};
 use crate::args::RunArgs;
 use crate::check;
 use crate::exit::{Exit, Failure, Outcome};
+use crate::paths;
 use crate::progress::ProgressView;
 use crate::results::{self, RigDocument};
 use crate::rig::{self, RepeatedOperator, bench, gates};
+use crate::signals::Operator;
 use crate::sink::{Foreknowledge, SessionSink};
-use crate::{paths, signals};
 
 /// What is to be recorded, before the rig adds what it knows.
 pub struct Intent<'a> {
@@ -60,6 +61,7 @@ pub fn record(
     mut rig: Rig,
     folder: &Path,
     preflight: Option<Preflight>,
+    operator: &Operator,
 ) -> Result<(PathBuf, RunReport), Failure> {
     let started = Utc::now();
     let started_at = started.to_rfc3339_opts(SecondsFormat::Secs, true);
@@ -68,7 +70,7 @@ pub fn record(
     let view = ProgressView::new(plan.presses.len(), intent.expected);
     let mut sink = SessionSink::new(writer, view, intent.known.clone());
 
-    let control = ControlHandle::new();
+    let control = operator.control();
     if let Some((at, kind)) = intent.known.interruption {
         rig.clock = Box::new(RepeatedOperator {
             clock: rig.clock,
@@ -77,27 +79,14 @@ pub fn record(
             control: control.clone(),
         });
     }
-    let operator = control.clone();
-    signals::on_ctrl_c(move |times| match times {
-        1 => {
-            errln!("\nstopping after this press; ctrl-C again retracts and stops now");
-            operator.stop();
-        }
-        2 => {
-            errln!("\nretracting and stopping now");
-            operator.abort();
-        }
-        _ => std::process::exit(i32::from(Exit::Stopped as u8)),
-    })
-    .map_err(Failure::internal)?;
 
     let mut report = match preflight {
         Some(mut preflight) => {
             preflight.made.insert(0, gates::recorder(&path));
             let settings = bench::settings(&rig.kind);
-            execute_checked(plan, header, rig, &control, &mut sink, preflight, settings)
+            execute_checked(plan, header, rig, control, &mut sink, preflight, settings)
         }
-        None => execute(plan, header, rig, &control, &mut sink),
+        None => execute(plan, header, rig, control, &mut sink),
     };
     if let Err(error) = sink.seal() {
         let error = error.to_string();
@@ -107,6 +96,7 @@ pub fn record(
             _ => report.problems.push(error),
         }
     }
+    operator.run_is_over();
     for problem in &report.problems {
         if !matches!(&report.end, RunEnd::Faulted(reason) if reason == problem) {
             errln!("warning: {problem}");
@@ -196,9 +186,11 @@ fn host_name() -> String {
 /// # Errors
 /// [`Failure`] with the code that says what kind.
 pub fn run(args: &RunArgs, command_line: &str, json: bool) -> Outcome {
+    // Before any device is opened: from then on a robot may be live.
+    let operator = Operator::listen().map_err(Failure::internal)?;
     let (session, report) = match (&args.replay, &args.protocol) {
-        (Some(recording), _) => replay(recording, &args.sessions, command_line)?,
-        (None, Some(protocol)) => fresh(args, protocol, command_line, json)?,
+        (Some(recording), _) => replay(recording, &args.sessions, command_line, &operator)?,
+        (None, Some(protocol)) => fresh(args, protocol, command_line, json, &operator)?,
         (None, None) => {
             return Err(Failure::input(
                 "expected a protocol file or --replay SESSION",
@@ -264,10 +256,11 @@ fn fresh(
     protocol: &Path,
     command_line: &str,
     json: bool,
+    operator: &Operator,
 ) -> Result<(PathBuf, RunReport), Failure> {
     let checked = check::load(protocol, &args.overrides)?;
     if let Some(file) = &args.rig {
-        return on_bench(args, checked.protocol, file, command_line, json);
+        return on_bench(args, checked.protocol, file, command_line, json, operator);
     }
     let (protocol, mut plan) = (checked.protocol, checked.plan);
     let level = match &args.level {
@@ -297,7 +290,14 @@ fn fresh(
     }
     let preflight = gates::of_simulated(&rig, &args.sessions, summary.expected_bytes);
     let intent = intent_of(&protocol, seed, summary.duration_s, command_line);
-    record(&intent, &plan, rig, &args.sessions, Some(preflight))
+    record(
+        &intent,
+        &plan,
+        rig,
+        &args.sessions,
+        Some(preflight),
+        operator,
+    )
 }
 
 /// Runs a protocol on the bench of a rig file, within what the bench bears.
@@ -307,6 +307,7 @@ fn on_bench(
     file: &Path,
     command_line: &str,
     json: bool,
+    operator: &Operator,
 ) -> Result<(PathBuf, RunReport), Failure> {
     let file = bench::load(file)?;
     bench::tighten(&mut protocol, &file);
@@ -330,7 +331,14 @@ fn on_bench(
     let rig = bench::open(&file, &protocol)?;
     let preflight = gates::of_bench(&file, &rig, &args.sessions, summary.duration_s);
     let intent = intent_of(&protocol, seed, summary.duration_s, command_line);
-    record(&intent, &plan, rig, &args.sessions, Some(preflight))
+    record(
+        &intent,
+        &plan,
+        rig,
+        &args.sessions,
+        Some(preflight),
+        operator,
+    )
 }
 
 fn intent_of<'a>(
@@ -359,6 +367,7 @@ fn replay(
     recording: &Path,
     folder: &Path,
     command_line: &str,
+    operator: &Operator,
 ) -> Result<(PathBuf, RunReport), Failure> {
     let reader = SessionReader::open(recording).map_err(Failure::input)?;
     let header = reader.header().map_err(Failure::input)?;
@@ -395,7 +404,7 @@ fn replay(
         known: foreknowledge(&reader).map_err(Failure::input)?,
     };
     let rig = rig::replayed(recording, &header, &document)?;
-    record(&intent, &plan, rig, folder, None)
+    record(&intent, &plan, rig, folder, None, operator)
 }
 
 /// What the recording says that no device can: schedule, exclusions, and what the operator did.
@@ -407,9 +416,10 @@ fn foreknowledge(reader: &SessionReader) -> Result<Foreknowledge, RecorderError>
         _ => None,
     });
     let interruptions = reader.interruptions()?;
-    let ending = interruptions
-        .last()
-        .filter(|i| matches!(i.kind, InterruptionKind::Stop | InterruptionKind::Abort));
+    let ending = interruptions.last().filter(|i| {
+        use InterruptionKind as K;
+        matches!(i.kind, K::Stop | K::Abort | K::Halt)
+    });
     Ok(Foreknowledge {
         scheduled: outcomes().any(|o| o.scheduled),
         excluded: excluded.collect(),

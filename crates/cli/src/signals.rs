@@ -1,9 +1,67 @@
-//! ctrl-C: once stops after the current press, twice aborts, three times leaves at once. A polite end by the
-//! system (SIGTERM) and a terminal that goes away (SIGHUP) count as a ctrl-C: the robot must not stay in the skin.
+//! ctrl-C: once stops after the current press, twice aborts, three times halts. A polite end by the system (SIGTERM)
+//! and a terminal that goes away (SIGHUP) count as a ctrl-C: the robot must not stay in the skin. Who started the
+//! program with `nohup` said that it outlives its terminal: then SIGHUP stays ignored.
 
-use std::sync::atomic::{AtomicU8, Ordering};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
+
+use skinrig_controller::ControlHandle;
+
+use crate::exit::Exit;
 
 static PRESSED: AtomicU8 = AtomicU8::new(0);
+
+/// The operator at this terminal, with a hand on the run from before the first device is opened.
+pub struct Operator {
+    control: ControlHandle,
+    over: Arc<AtomicBool>,
+}
+
+impl Operator {
+    /// Listens from now on. What is asked for before the run begins is heard when it does.
+    ///
+    /// # Errors
+    /// As [`on_ctrl_c`].
+    pub fn listen() -> Result<Self, String> {
+        let (control, over) = (ControlHandle::new(), Arc::new(AtomicBool::new(false)));
+        let (hand, is_over) = (control.clone(), Arc::clone(&over));
+        on_ctrl_c(move |times| {
+            if is_over.load(Ordering::SeqCst) {
+                // Nothing moves any more and the session is closed.
+                std::process::exit(i32::from(Exit::Stopped as u8));
+            }
+            match times {
+                1 => {
+                    errln!("\nstopping after this press; ctrl-C again retracts and stops now");
+                    hand.stop();
+                }
+                2 => {
+                    errln!(
+                        "\nretracting and stopping now; ctrl-C again switches the motors off where the tip is"
+                    );
+                    hand.abort();
+                }
+                3 => {
+                    errln!("\nmotors off; closing the session");
+                    hand.halt();
+                }
+                _ => errln!("\nclosing the session"),
+            }
+        })?;
+        Ok(Self { control, over })
+    }
+
+    /// The hand on the run.
+    #[must_use]
+    pub const fn control(&self) -> &ControlHandle {
+        &self.control
+    }
+
+    /// The run is over and its session closed: from now on ctrl-C leaves the program.
+    pub fn run_is_over(&self) {
+        self.over.store(true, Ordering::SeqCst);
+    }
+}
 
 /// Calls `react` with 1, 2, 3, ... each time ctrl-C is pressed, from a thread of its own, until the program ends.
 ///
@@ -35,27 +93,56 @@ pub fn on_ctrl_c(react: impl Fn(u8) + Send + 'static) -> Result<(), String> {
 
 /// What asks for an end.
 #[cfg(unix)]
-struct Signals([tokio::signal::unix::Signal; 3]);
+struct Signals {
+    interrupt: tokio::signal::unix::Signal,
+    terminate: tokio::signal::unix::Signal,
+    /// None: ignored when the program was started, and left so.
+    hangup: Option<tokio::signal::unix::Signal>,
+}
 
 #[cfg(unix)]
 impl Signals {
     fn new() -> std::io::Result<Self> {
         use tokio::signal::unix::{SignalKind, signal};
-        Ok(Self([
-            signal(SignalKind::interrupt())?,
-            signal(SignalKind::terminate())?,
-            signal(SignalKind::hangup())?,
-        ]))
+        let hangup = match hangup_is_ignored() {
+            true => None,
+            false => Some(signal(SignalKind::hangup())?),
+        };
+        Ok(Self {
+            interrupt: signal(SignalKind::interrupt())?,
+            terminate: signal(SignalKind::terminate())?,
+            hangup,
+        })
     }
 
     async fn next(&mut self) -> Option<()> {
-        let [interrupt, terminate, hangup] = &mut self.0;
+        let hangup = async {
+            match &mut self.hangup {
+                Some(hangup) => hangup.recv().await,
+                None => std::future::pending().await,
+            }
+        };
         tokio::select! {
-            seen = interrupt.recv() => seen,
-            seen = terminate.recv() => seen,
-            seen = hangup.recv() => seen,
+            seen = self.interrupt.recv() => seen,
+            seen = self.terminate.recv() => seen,
+            seen = hangup => seen,
         }
     }
+}
+
+/// True when the parent left SIGHUP ignored, as `nohup` does. Linux tells it without a system call that Rust calls
+/// unsafe: bit n - 1 of `SigIgn` in proc_pid_status(5). Elsewhere it is not known, and SIGHUP stops the run.
+#[cfg(unix)]
+fn hangup_is_ignored() -> bool {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    ignored_signals(&status).is_some_and(|mask| mask & 1 != 0) // SIGHUP is 1
+}
+
+/// The mask of ignored signals in the text of `/proc/PID/status`.
+#[cfg(unix)]
+fn ignored_signals(status: &str) -> Option<u64> {
+    let mask = status.lines().find_map(|l| l.strip_prefix("SigIgn:"))?;
+    u64::from_str_radix(mask.trim(), 16).ok()
 }
 
 /// What asks for an end.

@@ -1,4 +1,4 @@
-//! The operator's hand on a run: pause, resume, stop, abort.
+//! The operator's hand on a run: pause, resume, stop, abort, halt.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
@@ -7,11 +7,13 @@ const PAUSE: u8 = 1;
 const RESUME: u8 = 2;
 const STOP: u8 = 4;
 const ABORT: u8 = 8;
+const PAUSE_NOW: u8 = 16;
+const HALT: u8 = 32;
 
 /// Sends requests to a running controller, which looks for them at every tick. Clones share one run.
 ///
 /// Lock-free, so that it may be used from any thread. Counting ctrl-C (once: [`stop`](Self::stop), twice:
-/// [`abort`](Self::abort)) is the caller's business.
+/// [`abort`](Self::abort), three times: [`halt`](Self::halt)) is the caller's business.
 #[derive(Debug, Clone, Default)]
 pub struct ControlHandle {
     bits: Arc<AtomicU8>,
@@ -20,8 +22,10 @@ pub struct ControlHandle {
 /// What was asked for since the controller last looked, the gravest first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Request {
+    Halt,
     Abort,
     Stop,
+    PauseNow,
     Pause,
     Resume,
 }
@@ -38,9 +42,15 @@ impl ControlHandle {
         self.replace(PAUSE, RESUME);
     }
 
-    /// Go on after a pause. Replaces a pending [`pause`](Self::pause).
+    /// Break the press under way off, leave the skin and wait at clearance height. Replaces a pending
+    /// [`resume`](Self::resume).
+    pub fn pause_now(&self) {
+        self.replace(PAUSE_NOW, RESUME);
+    }
+
+    /// Go on after a pause. Replaces a pending [`pause`](Self::pause) or [`pause_now`](Self::pause_now).
     pub fn resume(&self) {
-        self.replace(RESUME, PAUSE);
+        self.replace(RESUME, PAUSE | PAUSE_NOW);
     }
 
     /// End the run once the press under way is done.
@@ -53,6 +63,16 @@ impl ControlHandle {
         self.replace(ABORT, 0);
     }
 
+    /// Motors off now, wherever the tip is: no retraction, not even one under way goes on. Cannot be taken back.
+    pub fn halt(&self) {
+        self.replace(HALT, 0);
+    }
+
+    /// True once [`halt`](Self::halt) was asked for.
+    pub(crate) fn is_halted(&self) -> bool {
+        self.bits.load(Ordering::Acquire) & HALT != 0
+    }
+
     fn replace(&self, set: u8, clear: u8) {
         // The closure always gives a value, so the update always succeeds.
         let _ = self
@@ -62,12 +82,14 @@ impl ControlHandle {
             });
     }
 
-    /// Takes all pending requests, the gravest first.
+    /// Takes all pending requests, the gravest first. A halt stays: whoever looks next must see it, too.
     pub(crate) fn take(&self) -> impl Iterator<Item = Request> + use<> {
-        let bits = self.bits.swap(0, Ordering::AcqRel);
+        let bits = self.bits.fetch_and(HALT, Ordering::AcqRel);
         [
+            (HALT, Request::Halt),
             (ABORT, Request::Abort),
             (STOP, Request::Stop),
+            (PAUSE_NOW, Request::PauseNow),
             (PAUSE, Request::Pause),
             (RESUME, Request::Resume),
         ]
@@ -96,5 +118,25 @@ mod tests {
             hand.take().collect::<Vec<_>>(),
             [Request::Abort, Request::Stop, Request::Pause]
         );
+        hand.pause_now();
+        hand.resume();
+        assert_eq!(hand.take().collect::<Vec<_>>(), [Request::Resume]);
+    }
+
+    #[test]
+    fn a_halt_is_not_taken_back() {
+        let hand = ControlHandle::new();
+        hand.pause_now();
+        hand.halt();
+        assert_eq!(
+            hand.take().collect::<Vec<_>>(),
+            [Request::Halt, Request::PauseNow]
+        );
+        hand.resume();
+        assert_eq!(
+            hand.take().collect::<Vec<_>>(),
+            [Request::Halt, Request::Resume]
+        );
+        assert!(hand.is_halted());
     }
 }

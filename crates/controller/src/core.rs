@@ -18,7 +18,7 @@ use crate::moments::{PressTracker, Settling};
 use crate::run::RunReport;
 use crate::settings::ControllerSettings;
 use crate::sink::RecordSink;
-use crate::states::{Event, Machine};
+use crate::states::{Event, Machine, State};
 use crate::touch::TouchDetector;
 
 /// A press under way.
@@ -57,6 +57,10 @@ pub(crate) struct Core<'a> {
     pub(crate) watch: Option<Watch>,
     /// While ending: cameras and the trigger box no longer stop anything.
     pub(crate) ending: bool,
+    /// A motion is under way that the operator's `pause_now` breaks off.
+    pub(crate) breakable: bool,
+    /// When the operator's halt was heard.
+    pub(crate) halted_at: Option<HostTime>,
     marks: VecDeque<Mark>,
     marks_since: HostTime,
     line_free_at: HostTime,
@@ -105,6 +109,8 @@ impl<'a> Core<'a> {
             checks: Vec::new(),
             watch: None,
             ending: false,
+            breakable: false,
+            halted_at: None,
             marks: VecDeque::new(),
             marks_since: HostTime::ZERO,
             line_free_at: HostTime::ZERO,
@@ -361,14 +367,20 @@ impl<'a> Core<'a> {
         for request in self.control.take() {
             let before = self.machine.state();
             let (event, kind, words) = match request {
+                Request::Halt => return Err(Halt::Halted),
                 Request::Abort => return Err(Halt::Aborted),
                 Request::Stop => (Event::Stop, InterruptionKind::Stop, "operator: stop"),
+                Request::PauseNow => (
+                    Event::PauseNow,
+                    InterruptionKind::PauseNow,
+                    "operator: pause now",
+                ),
                 Request::Pause => (Event::Pause, InterruptionKind::Pause, "operator: pause"),
                 Request::Resume => (Event::Resume, InterruptionKind::Resume, "operator: resume"),
             };
             self.machine.fire(event);
-            // The end of the run tells of a stop; a request without effect is not told.
-            if event != Event::Stop && self.machine.state() != before {
+            // A request without effect is not told.
+            if self.machine.state() != before {
                 let t = self.now();
                 self.journal.emit(Record::Interruption {
                     kind,
@@ -377,7 +389,20 @@ impl<'a> Core<'a> {
                 })?;
             }
         }
+        if self.breakable && self.machine.state() == State::PausingNow {
+            self.breakable = false;
+            return Err(Halt::PausedNow);
+        }
         Ok(())
+    }
+
+    /// While ending: true once the operator wants the motors off.
+    pub(crate) fn hear_halt(&mut self) -> bool {
+        if self.control.is_halted() && self.halted_at.is_none() {
+            self.halted_at = Some(self.now());
+            self.machine.fire(Event::Halt);
+        }
+        self.halted_at.is_some()
     }
 
     /// The longest time that a motion outside the plan over `distance_mm` may take, and its speed.

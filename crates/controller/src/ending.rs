@@ -12,6 +12,10 @@ use crate::states::{Event, State};
 /// How often a device that does not answer is told to rise, to disarm, to stop.
 const TRIES: u32 = 3;
 
+/// How a run ends whose motors the operator switched off.
+const HALTED: &str =
+    "operator: halt; the tip was left where it was, look before the robot is powered again";
+
 impl Core<'_> {
     /// Runs a part of the experiment; a panic in it becomes a fault.
     pub(crate) fn shielded(
@@ -36,7 +40,8 @@ impl Core<'_> {
                 self.journal.problem(format!("{what}: {e}"));
                 false
             }
-            Err(Halt::Stopped | Halt::Aborted) => false, // `part` cannot ask for these
+            // `part` cannot ask for these.
+            Err(Halt::Stopped | Halt::Aborted | Halt::Halted | Halt::PausedNow) => false,
         }
     }
 
@@ -50,15 +55,23 @@ impl Core<'_> {
         self.journal.ending();
         let (mut end, interruption) = match result {
             Ok(()) => (RunEnd::Completed, None),
-            Err(Halt::Stopped) => (
-                RunEnd::Stopped("operator: stop".to_owned()),
-                Some(InterruptionKind::Stop),
-            ),
+            // The row was written when the operator asked.
+            Err(Halt::Stopped) => (RunEnd::Stopped("operator: stop".to_owned()), None),
             Err(Halt::Aborted) => {
                 self.machine.fire(Event::Abort);
                 (
                     RunEnd::Stopped("operator: abort".to_owned()),
                     Some(InterruptionKind::Abort),
+                )
+            }
+            // Heard below, where the motors go off.
+            Err(Halt::Halted) => (RunEnd::Stopped("operator: halt".to_owned()), None),
+            Err(Halt::PausedNow) => {
+                let lost = "a pause was caught by no motion";
+                self.machine.fire(Event::Fault);
+                (
+                    RunEnd::Faulted(ControllerError::Internal(lost.to_owned()).to_string()),
+                    Some(InterruptionKind::Fault),
                 )
             }
             Err(Halt::Fault(e)) => {
@@ -71,7 +84,17 @@ impl Core<'_> {
         };
 
         let (retracted, disarmed) = self.make_safe();
-        let warning = match (retracted, disarmed) {
+        let first_reason = match &end {
+            RunEnd::Completed => String::new(),
+            RunEnd::Stopped(r) | RunEnd::Faulted(r) => r.clone(),
+        };
+        if self.halted_at.is_some() {
+            end = match end {
+                RunEnd::Faulted(r) => RunEnd::Faulted(format!("{r}; {HALTED}")),
+                _ => RunEnd::Stopped(HALTED.to_owned()),
+            };
+        }
+        let warning = match (retracted || self.halted_at.is_some(), disarmed) {
             (true, true) => None,
             (false, true) => Some("the tip was not seen at clearance height: look where it is"),
             (_, false) => {
@@ -84,10 +107,6 @@ impl Core<'_> {
                 RunEnd::Stopped(r) | RunEnd::Faulted(r) => format!("{r}; {warning}"),
             });
         }
-        let interruption = match end {
-            RunEnd::Faulted(_) => Some(InterruptionKind::Fault),
-            _ => interruption,
-        };
 
         let reason = match &end {
             RunEnd::Completed => String::new(),
@@ -109,7 +128,18 @@ impl Core<'_> {
                 text: format!("while ending: {text}"),
             });
         }
-        if let Some(kind) = interruption {
+        // What ended the run, then what the end itself met with.
+        let mut rows = Vec::new();
+        rows.extend(interruption.map(|kind| (kind, t, first_reason)));
+        rows.extend(
+            self.halted_at
+                .map(|t| (InterruptionKind::Halt, t, HALTED.to_owned())),
+        );
+        if warning.is_some() {
+            rows.retain(|(kind, ..)| *kind != InterruptionKind::Fault);
+            rows.push((InterruptionKind::Fault, t, reason));
+        }
+        for (kind, t, reason) in rows {
             let _ = self.journal.emit(Record::Interruption { kind, t, reason });
         }
         let _ = self.journal.emit(Record::Ended {
@@ -137,10 +167,15 @@ impl Core<'_> {
         let tripped = self.indenter.trip().is_some();
         let mut retracted = !tripped || self.indenter.is_clear();
         if self.indenter.is_armed() {
-            retracted = (0..TRIES).any(|_| self.attempt("retract", Self::lift));
-            self.attempt("hold", |core| core.indenter.hold());
+            retracted =
+                (0..TRIES).any(|_| !self.hear_halt() && self.attempt("retract", Self::lift));
+            if !self.hear_halt() {
+                self.attempt("hold", |core| core.indenter.hold());
+            }
         }
-        self.machine.fire(Event::Cleared);
+        if !self.hear_halt() {
+            self.machine.fire(Event::Cleared);
+        }
         let disarmed = (0..TRIES).any(|_| self.attempt("disarm", |core| core.indenter.disarm()));
         // What the robot and the cameras delivered until now belongs to the session.
         self.attempt("last samples", Self::observe);
@@ -177,6 +212,9 @@ impl Core<'_> {
             }
             self.clock.wait_until(now + self.settings.tick);
             self.observe()?;
+            if self.hear_halt() {
+                return Err(self.not_arrived("straight up", target, now - t));
+            }
         }
         Ok(())
     }

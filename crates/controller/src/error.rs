@@ -172,6 +172,10 @@ pub(crate) enum Halt {
     Stopped,
     /// The operator wants it to end now.
     Aborted,
+    /// The operator wants the motors off, wherever the tip is.
+    Halted,
+    /// The operator wants to wait, off the skin. Ends no run: whoever commanded the motion catches it.
+    PausedNow,
     /// Something failed.
     Fault(ControllerError),
 }

@@ -38,10 +38,12 @@ impl Core<'_> {
     /// The motion. `Some` says why the press is invalid although the tip is back at clearance height.
     fn press_motion(&mut self, step: &PressStep) -> Result<Option<String>, Halt> {
         let began = self.now();
-        if let Surface::Touch(search) = step.surface
-            && let Err(trouble) = self.tare(step, search)?
-        {
-            return Ok(Some(trouble)); // the tip never left clearance height
+        if let Surface::Touch(search) = step.surface {
+            self.breakable = true;
+            let tared = self.tare(step, search);
+            if let Some(trouble) = self.unless_paused(tared.map(Result::err))? {
+                return Ok(Some(trouble)); // the tip never left clearance height
+            }
         }
         let start = self.indenter.position();
         let first_stop_mm = match step.surface {
@@ -59,7 +61,10 @@ impl Core<'_> {
             tracker.search_surface();
         }
         self.with_open(|open| open.tracker = Some(tracker));
-        let trouble = self.go_down(step, down, deadline)?;
+        self.breakable = true;
+        let went = self.go_down(step, down, deadline);
+        let trouble = self.unless_paused(went)?;
+        self.settling = None; // a search that was broken off leaves it
 
         let target = step.at.at_height(self.plan.limits.clearance_mm);
         let up = self.command(target, step.retract_speed_mm_s)?;
@@ -84,6 +89,18 @@ impl Core<'_> {
                 clear - down
             ))
         }))
+    }
+
+    /// What became of a part of the press that `pause_now` may break off.
+    fn unless_paused(
+        &mut self,
+        part: Result<Option<String>, Halt>,
+    ) -> Result<Option<String>, Halt> {
+        self.breakable = false;
+        match part {
+            Err(Halt::PausedNow) => Ok(Some("paused by the operator".to_owned())),
+            other => other,
+        }
     }
 
     /// Down, settle, hold. `Some` says what did not happen in time.

@@ -120,7 +120,8 @@ impl ProgressTracker {
                 p.missed += 1;
             }
             Record::Interruption { kind, t, .. } => {
-                p.paused = *kind == skinrig_model::InterruptionKind::Pause;
+                use skinrig_model::InterruptionKind as K;
+                p.paused = matches!(kind, K::Pause | K::PauseNow);
                 self.reached(*t);
             }
             Record::Ended { t, end } => {

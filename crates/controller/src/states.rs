@@ -13,6 +13,8 @@ pub enum State {
     Running,
     /// As running; waits at the next safe point.
     Pausing,
+    /// The press or motion under way is broken off, the tip leaves the skin; waits at the next safe point.
+    PausingNow,
     /// Waits at clearance height, everything streaming.
     Paused,
     /// As running; ends at the next safe point.
@@ -23,6 +25,8 @@ pub enum State {
     Retracting,
     /// Something failed: the robot leaves the skin if it still answers.
     Faulted,
+    /// The operator's halt: motors off, wherever the tip is.
+    Halting,
     /// Disarmed; all is told.
     Finished,
 }
@@ -36,12 +40,16 @@ pub enum Event {
     Begin,
     /// The operator asks to wait.
     Pause,
+    /// The operator asks to leave the skin now and to wait.
+    PauseNow,
     /// The operator asks to go on.
     Resume,
     /// The operator asks to end after the press under way.
     Stop,
     /// The operator asks to end now.
     Abort,
+    /// The operator asks for motors off, now.
+    Halt,
     /// A device, a limit, the recorder or the code failed.
     Fault,
     /// No press is under way and the tip is at clearance height.
@@ -77,16 +85,18 @@ pub enum Action {
 
 impl State {
     /// All states.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 12] = [
         Self::Planned,
         Self::Armed,
         Self::Running,
         Self::Pausing,
+        Self::PausingNow,
         Self::Paused,
         Self::Stopping,
         Self::Aborting,
         Self::Retracting,
         Self::Faulted,
+        Self::Halting,
         Self::Finished,
     ];
 
@@ -100,13 +110,15 @@ impl State {
 
 impl Event {
     /// All events.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 13] = [
         Self::ArmingDone,
         Self::Begin,
         Self::Pause,
+        Self::PauseNow,
         Self::Resume,
         Self::Stop,
         Self::Abort,
+        Self::Halt,
         Self::Fault,
         Self::SafePoint,
         Self::PlanDone,
@@ -126,53 +138,85 @@ pub const fn transition(state: State, event: Event) -> (State, Action) {
         (S::Planned, E::ArmingDone) => (S::Armed, A::None),
         (S::Armed, E::Begin) => (S::Running, A::GoOn),
         (S::Running, E::SafePoint) => (S::Running, A::GoOn),
-        (S::Pausing, E::SafePoint) => (S::Paused, A::Wait),
+        (S::Pausing | S::PausingNow, E::SafePoint) => (S::Paused, A::Wait),
         (S::Stopping, E::SafePoint) => (S::Retracting, A::Retract),
-        (S::Running | S::Pausing | S::Stopping, E::PlanDone) => (S::Retracting, A::Retract),
+        (S::Running | S::Pausing | S::PausingNow | S::Stopping, E::PlanDone) => {
+            (S::Retracting, A::Retract)
+        }
 
         // The operator.
         (S::Running, E::Pause) => (S::Pausing, A::None),
-        (S::Pausing, E::Resume) => (S::Running, A::None),
+        (S::Running | S::Pausing, E::PauseNow) => (S::PausingNow, A::Retract),
+        (S::Pausing | S::PausingNow, E::Resume) => (S::Running, A::None),
         (S::Paused, E::Resume) => (S::Running, A::GoOn),
-        (S::Running | S::Pausing, E::Stop) => (S::Stopping, A::None),
+        (S::Running | S::Pausing | S::PausingNow, E::Stop) => (S::Stopping, A::None),
         (S::Planned | S::Armed | S::Paused, E::Stop) => (S::Retracting, A::Retract),
-        (S::Planned | S::Armed | S::Running | S::Pausing | S::Paused | S::Stopping, E::Abort) => {
-            (S::Aborting, A::Retract)
-        }
-
-        // The way out. Only a disarmed robot gets to `Finished`.
-        (S::Retracting | S::Aborting | S::Faulted, E::Cleared) => (state, A::Disarm),
-        (S::Retracting | S::Aborting | S::Faulted, E::Disarmed) => (S::Finished, A::Close),
         (
             S::Planned
             | S::Armed
             | S::Running
             | S::Pausing
+            | S::PausingNow
+            | S::Paused
+            | S::Stopping,
+            E::Abort,
+        ) => (S::Aborting, A::Retract),
+
+        // Motors off goes before every other way out, also before one under way.
+        (
+            S::Planned
+            | S::Armed
+            | S::Running
+            | S::Pausing
+            | S::PausingNow
+            | S::Paused
+            | S::Stopping
+            | S::Aborting
+            | S::Retracting
+            | S::Faulted,
+            E::Halt,
+        ) => (S::Halting, A::Disarm),
+
+        // The way out. Only a disarmed robot gets to `Finished`.
+        (S::Retracting | S::Aborting | S::Faulted, E::Cleared) => (state, A::Disarm),
+        (S::Retracting | S::Aborting | S::Faulted | S::Halting, E::Disarmed) => {
+            (S::Finished, A::Close)
+        }
+        (
+            S::Planned
+            | S::Armed
+            | S::Running
+            | S::Pausing
+            | S::PausingNow
             | S::Paused
             | S::Stopping
             | S::Aborting
             | S::Retracting,
             E::Fault,
         ) => (S::Faulted, A::Retract),
-        (S::Faulted | S::Finished, E::Fault) => (state, A::Ignore),
+        (S::Faulted | S::Halting | S::Finished, E::Fault) => (state, A::Ignore),
 
         // Requests without effect.
-        (S::Retracting | S::Aborting | S::Faulted | S::Finished, E::Stop | E::Abort) => {
-            (state, A::Ignore)
-        }
-        (S::Stopping, E::Stop) => (state, A::Ignore),
+        (
+            S::Retracting | S::Aborting | S::Faulted | S::Halting | S::Finished,
+            E::Stop | E::Abort,
+        )
+        | (S::Halting | S::Finished, E::Halt)
+        | (S::Stopping, E::Stop) => (state, A::Ignore),
         (
             S::Planned
             | S::Armed
-            | S::Pausing
+            | S::PausingNow
             | S::Paused
             | S::Stopping
             | S::Aborting
             | S::Retracting
             | S::Faulted
+            | S::Halting
             | S::Finished,
-            E::Pause,
-        ) => (state, A::Ignore),
+            E::Pause | E::PauseNow,
+        )
+        | (S::Pausing, E::Pause) => (state, A::Ignore),
         (
             S::Planned
             | S::Armed
@@ -181,6 +225,7 @@ pub const fn transition(state: State, event: Event) -> (State, Action) {
             | S::Aborting
             | S::Retracting
             | S::Faulted
+            | S::Halting
             | S::Finished,
             E::Resume,
         ) => (state, A::Ignore),
@@ -190,11 +235,13 @@ pub const fn transition(state: State, event: Event) -> (State, Action) {
             S::Armed
             | S::Running
             | S::Pausing
+            | S::PausingNow
             | S::Paused
             | S::Stopping
             | S::Aborting
             | S::Retracting
             | S::Faulted
+            | S::Halting
             | S::Finished,
             E::ArmingDone,
         )
@@ -202,11 +249,13 @@ pub const fn transition(state: State, event: Event) -> (State, Action) {
             S::Planned
             | S::Running
             | S::Pausing
+            | S::PausingNow
             | S::Paused
             | S::Stopping
             | S::Aborting
             | S::Retracting
             | S::Faulted
+            | S::Halting
             | S::Finished,
             E::Begin,
         )
@@ -217,13 +266,22 @@ pub const fn transition(state: State, event: Event) -> (State, Action) {
             | S::Aborting
             | S::Retracting
             | S::Faulted
+            | S::Halting
             | S::Finished,
             E::SafePoint | E::PlanDone,
         )
         | (
-            S::Planned | S::Armed | S::Running | S::Pausing | S::Paused | S::Stopping | S::Finished,
+            S::Planned
+            | S::Armed
+            | S::Running
+            | S::Pausing
+            | S::PausingNow
+            | S::Paused
+            | S::Stopping
+            | S::Finished,
             E::Cleared | E::Disarmed,
-        ) => (state, A::Refuse),
+        )
+        | (S::Halting, E::Cleared) => (state, A::Refuse),
     }
 }
 
@@ -314,11 +372,54 @@ mod tests {
                     assert_eq!(machine.state(), State::Finished);
                     continue;
                 }
+                if machine.state() == State::Halting {
+                    assert_eq!(action, Action::Ignore, "a halt is not softened");
+                    assert_eq!(machine.fire(Event::Disarmed), Action::Close);
+                    continue;
+                }
                 assert!(matches!(action, Action::Retract | Action::Ignore));
                 assert_eq!(machine.fire(Event::Cleared), Action::Disarm, "{state:?}");
                 assert_eq!(machine.fire(Event::Disarmed), Action::Close, "{state:?}");
                 assert!(!machine.state().may_be_armed());
             }
+        }
+    }
+
+    #[test]
+    fn a_halt_disarms_at_once_from_everywhere() {
+        for state in State::ALL {
+            let mut machine = Machine(state);
+            let action = machine.fire(Event::Halt);
+            if matches!(state, State::Halting | State::Finished) {
+                assert_eq!((machine.state(), action), (state, Action::Ignore));
+                continue;
+            }
+            assert_eq!(action, Action::Disarm, "{state:?}");
+            assert_eq!(machine.fire(Event::Disarmed), Action::Close, "{state:?}");
+        }
+    }
+
+    /// From every state that can be reached, every course of four events: nothing leaves the way out, a pause always
+    /// ends in a resume, a stop or worse, and the run executes a step only when it is running.
+    #[test]
+    fn a_paused_run_goes_on_only_when_it_is_told_to() {
+        fn explore(state: State, left: u32) {
+            for event in Event::ALL.into_iter().take(if left == 0 { 0 } else { 13 }) {
+                let (next, action) = transition(state, event);
+                if action == Action::GoOn {
+                    assert_eq!(next, State::Running, "{state:?} {event:?}");
+                }
+                if state == State::Paused && next == State::Running {
+                    assert_eq!(event, Event::Resume);
+                }
+                if next == State::Paused && state != State::Paused {
+                    assert_eq!(event, Event::SafePoint, "from {state:?}");
+                }
+                explore(next, left - 1);
+            }
+        }
+        for state in reachable().into_keys() {
+            explore(state, 4);
         }
     }
 
@@ -340,7 +441,11 @@ mod tests {
                 let out = |s| {
                     matches!(
                         s,
-                        State::Aborting | State::Retracting | State::Faulted | State::Finished
+                        State::Aborting
+                            | State::Retracting
+                            | State::Faulted
+                            | State::Halting
+                            | State::Finished
                     )
                 };
                 assert!(!out(state) || out(next), "{state:?} {event:?}");

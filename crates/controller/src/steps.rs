@@ -52,8 +52,30 @@ impl Core<'_> {
         self.go("rise from the start position", target, speed, allowed)
     }
 
-    /// Moves and waits until settled. For motions at clearance height and straight up only.
+    /// Moves and waits until settled. For motions at clearance height and straight up only. `pause_now` holds the robot
+    /// where it is; it moves on when the operator says so.
     pub(crate) fn go(
+        &mut self,
+        what: &str,
+        target: Point3<Skin>,
+        speed_mm_s: f64,
+        allowed: HostDuration,
+    ) -> Result<(), Halt> {
+        loop {
+            self.breakable = self.indenter.is_clear();
+            let went = self.go_once(what, target, speed_mm_s, allowed);
+            self.breakable = false;
+            if went != Err(Halt::PausedNow) {
+                return went;
+            }
+            self.settling = None;
+            self.indenter.hold()?;
+            let paused = self.safe_point()?;
+            self.begin += paused;
+        }
+    }
+
+    fn go_once(
         &mut self,
         what: &str,
         target: Point3<Skin>,

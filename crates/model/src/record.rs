@@ -165,25 +165,42 @@ pub struct MotionCommand {
 pub enum InterruptionKind {
     /// Wait after the current press.
     Pause,
+    /// Break the current press off, retract, and wait.
+    PauseNow,
     /// Go on after a pause.
     Resume,
     /// Finish cleanly after the current press.
     Stop,
     /// Retract now, disarm, keep the data.
     Abort,
+    /// Motors off at once, without retraction; keep the data.
+    Halt,
     /// A device or the recorder failed.
     Fault,
 }
 
 impl InterruptionKind {
+    /// All kinds.
+    pub const ALL: [Self; 7] = [
+        Self::Pause,
+        Self::PauseNow,
+        Self::Resume,
+        Self::Stop,
+        Self::Abort,
+        Self::Halt,
+        Self::Fault,
+    ];
+
     /// The name used in sessions.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::Pause => "pause",
+            Self::PauseNow => "pause_now",
             Self::Resume => "resume",
             Self::Stop => "stop",
             Self::Abort => "abort",
+            Self::Halt => "halt",
             Self::Fault => "fault",
         }
     }

@@ -24,6 +24,7 @@ use skinrig_sim::SimClock;
 use crate::args::ImportArgs;
 use crate::exit::{Failure, Outcome};
 use crate::run::{Intent, conclude, record};
+use crate::signals::Operator;
 use crate::sink::Foreknowledge;
 use camera::{ChunkFeed, FileCamera};
 use indenter::ScheduledIndenter;
@@ -99,7 +100,8 @@ pub fn import(args: &ImportArgs, command_line: &str, json: bool) -> Outcome {
         expected: HostDuration(last),
         known,
     };
-    let (session, report) = record(&intent, &plan, rig, &args.sessions, None)?;
+    let operator = Operator::listen().map_err(Failure::internal)?;
+    let (session, report) = record(&intent, &plan, rig, &args.sessions, None, &operator)?;
     conclude(&session, &report, args.no_analysis, None, json)
 }
 

@@ -82,7 +82,11 @@ impl Clock for RepeatedOperator {
             match self.kind {
                 InterruptionKind::Stop => self.control.stop(),
                 InterruptionKind::Abort => self.control.abort(),
-                InterruptionKind::Pause | InterruptionKind::Resume | InterruptionKind::Fault => {}
+                InterruptionKind::Halt => self.control.halt(),
+                InterruptionKind::Pause
+                | InterruptionKind::PauseNow
+                | InterruptionKind::Resume
+                | InterruptionKind::Fault => {}
             }
             self.at = HostTime(i64::MAX);
         }

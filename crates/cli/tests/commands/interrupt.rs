@@ -19,7 +19,16 @@ struct Underway {
 impl Underway {
     fn new(folder: &Path) -> Self {
         let folder = text(folder);
-        let mut command = program(&["run", SMALL, "--real-time", "--sessions", &folder]);
+        Self::of(program(&[
+            "run",
+            SMALL,
+            "--real-time",
+            "--sessions",
+            &folder,
+        ]))
+    }
+
+    fn of(mut command: Command) -> Self {
         let mut child = command
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
@@ -124,6 +133,56 @@ fn ctrl_c_twice_retracts_and_stops_at_once() {
     assert_eq!(code, Some(5), "{messages}");
     let session = assert_ended_early(&lab.path("s"), "");
     assert_replays(&lab, &session, "r");
+}
+
+#[test]
+fn ctrl_c_three_times_switches_the_motors_off_and_seals() {
+    let lab = Lab::new();
+    let mut run = Underway::new(&lab.path("s"));
+    for word in ["stopping after this press", "retracting", "motors off"] {
+        run.signal("INT");
+        run.wait_for(word);
+    }
+    let (code, messages) = run.end();
+    assert_eq!(code, Some(5), "{messages}");
+    let session = assert_ended_early(&lab.path("s"), "operator: ");
+    let kinds: Vec<String> = show(&session)["interruptions"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|i| i["kind"].as_str().unwrap().to_owned())
+        .collect();
+    // A fast retraction may be over before the third signal.
+    assert!(
+        kinds == ["stop", "abort", "halt"] || kinds == ["stop", "abort"],
+        "{kinds:?}"
+    );
+}
+
+#[test]
+fn nohup_is_respected() {
+    let lab = Lab::new();
+    let mut command = Command::new("sh");
+    command.current_dir(ROOT).args([
+        "-c",
+        &format!(
+            "trap '' HUP; exec '{}' run {SMALL} --real-time --no-analysis --sessions '{}'",
+            env!("CARGO_BIN_EXE_skinrig"),
+            lab.text("s")
+        ),
+    ]);
+    let mut run = Underway::of(command);
+    run.signal("HUP");
+    run.wait_for("press ");
+    // Still there, and it listens to everything else.
+    run.signal("TERM");
+    let (code, messages) = run.end();
+    assert_eq!(code, Some(5), "{messages}");
+    assert_eq!(
+        messages.matches("stopping after this press").count(),
+        1,
+        "{messages}"
+    );
 }
 
 #[test]

@@ -96,11 +96,18 @@ impl Told {
             matches!(self.records.last(), Some(Record::Ended { end, .. }) if *end == self.report.end),
             "{case}: the end is the last record"
         );
-        let told = self.records.iter().any(|r| {
-            matches!(r, Record::Interruption { kind, .. }
-                if matches!(kind, InterruptionKind::Stop | InterruptionKind::Abort | InterruptionKind::Fault))
-        });
-        assert_eq!(told, self.report.end != RunEnd::Completed, "{case}");
+        let told = |any: &[InterruptionKind]| {
+            self.records
+                .iter()
+                .any(|r| matches!(r, Record::Interruption { kind, .. } if any.contains(kind)))
+        };
+        use InterruptionKind as K;
+        if self.report.end == RunEnd::Completed {
+            // A stop that came during the last press is told, too.
+            assert!(!told(&[K::Abort, K::Halt, K::Fault]), "{case}");
+        } else {
+            assert!(told(&[K::Stop, K::Abort, K::Halt, K::Fault]), "{case}");
+        }
         let mut last = HostTime(-1);
         for r in &self.records {
             let Record::Poses(block) = r else { continue };
@@ -121,9 +128,10 @@ impl Told {
         assert_eq!(r.disarmed, w.confirmed, "{case}: {r:?}");
         if r.disarmed {
             assert!(!w.armed, "{case}: disarmed");
-            assert!(r.retracted, "{case}: {r:?}");
+            let halted = matches!(&r.end, RunEnd::Stopped(why) if why.contains("halt"));
+            assert!(r.retracted || halted, "{case}: {r:?}");
             assert!(
-                !w.ever_armed || w.tip[2] >= 4.94,
+                halted || !w.ever_armed || w.tip[2] >= 4.94,
                 "{case}: off the skin, at {:?}",
                 w.tip
             );
@@ -320,8 +328,15 @@ fn every_record_may_be_refused() {
 fn the_operator_may_interrupt_at_every_tick() {
     let ticks = lock(&run(faults()).world).ticks;
     assert!(ticks > 200, "{ticks}");
+    let (mut broken_off, mut halted_in_skin) = (0, 0);
     for tick in 1..=ticks {
-        for press in [Press::Pause, Press::Stop, Press::Abort] {
+        for press in [
+            Press::Pause,
+            Press::PauseNow,
+            Press::Stop,
+            Press::Abort,
+            Press::Halt,
+        ] {
             let told = run(Faults {
                 operator: Some((tick, press)),
                 ..faults()
@@ -332,6 +347,38 @@ fn the_operator_may_interrupt_at_every_tick() {
                 Press::Pause => {
                     assert_eq!(told.report.end, RunEnd::Completed, "{case}");
                     assert_eq!(told.report.valid, 3, "{case}");
+                }
+                Press::PauseNow => {
+                    assert_eq!(told.report.end, RunEnd::Completed, "{case}");
+                    assert_eq!(told.report.missed, 0, "{case}");
+                    let broken = told
+                        .outcomes()
+                        .into_iter()
+                        .filter_map(|o| match &o.verdict {
+                            PressVerdict::Valid => None,
+                            other => Some(format!("{other:?}")),
+                        });
+                    let broken: Vec<String> = broken.collect();
+                    broken_off += broken.len();
+                    assert!(
+                        broken.len() <= 1
+                            && broken.iter().all(|b| b.contains("paused by the operator")),
+                        "{case}: {broken:?}"
+                    );
+                }
+                Press::Halt => {
+                    if told.report.end == RunEnd::Completed {
+                        assert!(tick >= ticks - 1, "{case}");
+                        continue;
+                    }
+                    let w = lock(&told.world);
+                    halted_in_skin += usize::from(w.tip[2] < -1.0);
+                    assert!(told.report.disarmed && told.report.invalid <= 1, "{case}");
+                    assert!(
+                        w.ticks <= tick + 1,
+                        "{case}: motors off within a tick, found {}",
+                        w.ticks
+                    );
                 }
                 Press::Stop => {
                     // The press under way is finished, none is broken off.
@@ -351,6 +398,8 @@ fn the_operator_may_interrupt_at_every_tick() {
             }
         }
     }
+    assert!(broken_off > 50, "{broken_off}");
+    assert!(halted_in_skin > 20, "{halted_in_skin}");
 }
 
 #[test]
@@ -380,6 +429,44 @@ fn a_pause_does_not_shorten_the_period_after_it() {
     let gaps = [intents[1] - intents[0], intents[2] - intents[1]];
     assert_eq!(gaps[1], 503, "{gaps:?}");
     assert!(gaps[0] > 1000, "{gaps:?}");
+}
+
+#[test]
+fn a_halt_breaks_off_the_retraction_of_an_abort() {
+    let kinds = |told: &Told| -> Vec<InterruptionKind> {
+        let kind = |r: &Record| match r {
+            Record::Interruption { kind, .. } => Some(*kind),
+            _ => None,
+        };
+        told.records.iter().filter_map(kind).collect()
+    };
+    // Before the plan's first press nothing retracts, so the first tick whose abort finds the tip in the skin is sought.
+    let ticks = lock(&run(faults()).world).ticks;
+    let mut ended = Vec::new();
+    for tick in (1..ticks).step_by(20) {
+        let abort = Faults {
+            operator: Some((tick, Press::Abort)),
+            ..faults()
+        };
+        let rises = lock(&run(abort.clone()).world).ticks - tick;
+        if rises < 10 {
+            continue;
+        }
+        let told = run(Faults {
+            halt_after: Some(5),
+            ..abort
+        });
+        let case = format!("abort at tick {tick}, halt 5 ticks later");
+        told.check_rig(&case);
+        assert!(told.report.disarmed && !told.report.retracted, "{case}");
+        assert!(lock(&told.world).ticks <= tick + 6, "{case}");
+        ended.push(kinds(&told));
+    }
+    let both = [InterruptionKind::Abort, InterruptionKind::Halt];
+    assert!(
+        ended.len() > 3 && ended.iter().all(|k| k[..] == both),
+        "{ended:?}"
+    );
 }
 
 #[test]

@@ -27,8 +27,10 @@ pub enum Failure {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Press {
     Pause,
+    PauseNow,
     Stop,
     Abort,
+    Halt,
 }
 
 /// What goes wrong with the feedback.
@@ -70,6 +72,8 @@ pub struct Faults {
     pub strike: Option<Strike>,
     /// The operator's hand at this tick.
     pub operator: Option<(u64, Press)>,
+    /// A halt this many ticks after it.
+    pub halt_after: Option<u64>,
     /// N per mm of indentation.
     pub stiffness_n_mm: f64,
     pub train_ms: i64,
@@ -289,11 +293,16 @@ impl Clock for MockClock {
             if tick == w.ticks {
                 match press {
                     Press::Pause => w.control.pause(),
+                    Press::PauseNow => w.control.pause_now(),
                     Press::Stop => w.control.stop(),
                     Press::Abort => w.control.abort(),
+                    Press::Halt => w.control.halt(),
                 }
-            } else if press == Press::Pause && w.ticks == tick + 200 {
+            } else if matches!(press, Press::Pause | Press::PauseNow) && w.ticks == tick + 200 {
                 w.control.resume();
+            }
+            if w.faults.halt_after.is_some_and(|n| tick + n == w.ticks) {
+                w.control.halt();
             }
         }
     }

@@ -132,20 +132,13 @@ impl SessionReader {
     /// # Errors
     /// When the file is damaged.
     pub fn interruptions(&self) -> Result<Vec<InterruptionRow>, RecorderError> {
-        const KINDS: [InterruptionKind; 5] = [
-            InterruptionKind::Pause,
-            InterruptionKind::Resume,
-            InterruptionKind::Stop,
-            InterruptionKind::Abort,
-            InterruptionKind::Fault,
-        ];
         self.all(
             "reading interruptions",
             "SELECT * FROM interruption ORDER BY id",
             |row| {
                 Ok(InterruptionRow {
                     t: HostTime(int(row, "t_ns")?),
-                    kind: named(row, "kind", &KINDS, InterruptionKind::name)?,
+                    kind: named(row, "kind", &InterruptionKind::ALL, InterruptionKind::name)?,
                     reason: text(row, "reason")?,
                 })
             },
