@@ -150,7 +150,7 @@ fn ctrl_c_three_times_switches_the_motors_off_and_seals() {
         .as_array()
         .unwrap()
         .iter()
-        .map(|i| i["kind"].as_str().unwrap().to_owned())
+        .map(|i| i[1].as_str().unwrap().to_owned())
         .collect();
     // A fast retraction may be over before the third signal.
     assert!(
