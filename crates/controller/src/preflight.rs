@@ -224,10 +224,23 @@ pub(crate) fn motion_limits(
             limits.max_force_n, can.max_force_n
         ));
     }
+    if let Some(wanted) = limits.max_acceleration_mm_s2
+        && wanted > can.max_acceleration_mm_s2
+    {
+        remarks.push(format!(
+            "acceleration: the plan allows {wanted} mm/s², the robot is set up for at most {} mm/s²",
+            can.max_acceleration_mm_s2
+        ));
+    }
     let chosen = MotionLimits {
         min_mm,
         max_mm,
         max_speed_mm_s: limits.max_speed_mm_s.min(can.max_speed_mm_s),
+        max_acceleration_mm_s2: limits
+            .max_acceleration_mm_s2
+            .map_or(can.max_acceleration_mm_s2, |a| {
+                a.min(can.max_acceleration_mm_s2)
+            }),
         max_force_n: limits.max_force_n.min(can.max_force_n),
     };
     check_reach(plan, robot_from_skin, &chosen)?;

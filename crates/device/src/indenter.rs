@@ -13,6 +13,8 @@ pub struct IndenterCapabilities {
     pub workspace_max_mm: [f64; 3],
     /// Fastest straight-line motion, mm/s.
     pub max_speed_mm_s: f64,
+    /// Largest acceleration of its set point, mm/s².
+    pub max_acceleration_mm_s2: f64,
     /// Largest force it can exert, N.
     pub max_force_n: f64,
     /// Rate of the pose stream, Hz of host time.
@@ -30,6 +32,8 @@ pub struct MotionLimits {
     pub max_mm: [f64; 3],
     /// mm/s.
     pub max_speed_mm_s: f64,
+    /// mm/s², of the set point.
+    pub max_acceleration_mm_s2: f64,
     /// N.
     pub max_force_n: f64,
 }

@@ -47,6 +47,11 @@ pub fn check_limits(
     }
     for (name, value, most) in [
         ("max_speed_mm_s", limits.max_speed_mm_s, can.max_speed_mm_s),
+        (
+            "max_acceleration_mm_s2",
+            limits.max_acceleration_mm_s2,
+            can.max_acceleration_mm_s2,
+        ),
         ("max_force_n", limits.max_force_n, can.max_force_n),
     ] {
         if !(value > 0.0 && value <= most) {
@@ -103,6 +108,10 @@ pub fn settings(limits: &MotionLimits) -> Vec<Setting> {
         ("min_mm", millimetres(limits.min_mm)),
         ("max_mm", millimetres(limits.max_mm)),
         ("max_speed_mm_s", limits.max_speed_mm_s.to_string()),
+        (
+            "max_acceleration_mm_s2",
+            limits.max_acceleration_mm_s2.to_string(),
+        ),
         ("max_force_n", limits.max_force_n.to_string()),
     ];
     all.into_iter()

@@ -19,6 +19,7 @@ const LIMITS: MotionLimits = MotionLimits {
     min_mm: [-80.0, -80.0, -60.0],
     max_mm: [80.0, 80.0, 60.0],
     max_speed_mm_s: 100.0,
+    max_acceleration_mm_s2: 500.0,
     max_force_n: 8.0,
 };
 

@@ -13,6 +13,7 @@ pub struct SimIndenter {
     shared: Shared,
     serial: String,
     workspace_mm: ([f64; 3], [f64; 3]),
+    max_acceleration_mm_s2: f64,
     limits: Option<MotionLimits>,
     lost: Option<When>,
     read_back_fault: bool,
@@ -30,6 +31,7 @@ impl SimIndenter {
             shared,
             serial: format!("sim-{:08x}-r", config.seed as u32),
             workspace_mm: config.workspace_mm,
+            max_acceleration_mm_s2: config.motion.acceleration_mm_s2,
             limits: None,
             lost,
             read_back_fault: config.faults.contains(&Fault::IndenterReadBack),
@@ -63,6 +65,7 @@ impl Indenter for SimIndenter {
             workspace_max_mm: self.workspace_mm.1,
             // omega3.md: 12 N; public servers move at 0.1 to 1 m/s.
             max_speed_mm_s: 200.0,
+            max_acceleration_mm_s2: self.max_acceleration_mm_s2,
             max_force_n: 12.0,
             pose_rate_hz: 1000.0,
             reports_force: true,
@@ -83,6 +86,7 @@ impl Indenter for SimIndenter {
             });
         }
         world.set_force_limit(limits.max_force_n);
+        world.motion.set_acceleration(limits.max_acceleration_mm_s2);
         self.limits = Some(*limits);
         Ok(limits::settings(limits))
     }

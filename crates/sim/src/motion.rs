@@ -106,6 +106,11 @@ impl Motion {
         self.powered
     }
 
+    /// From now on the set point accelerates by at most this much, mm/s².
+    pub const fn set_acceleration(&mut self, acceleration_mm_s2: f64) {
+        self.config.acceleration_mm_s2 = acceleration_mm_s2;
+    }
+
     /// Sends the set point to `target` along a straight line.
     pub fn move_to(&mut self, target: Point3<Robot>, speed_mm_s: f64) {
         self.target = Some((target.to_array(), speed_mm_s));

@@ -81,6 +81,7 @@ impl Indenter for ScheduledIndenter {
             workspace_min_mm: [-1e6; 3],
             workspace_max_mm: [1e6; 3],
             max_speed_mm_s: 1e9,
+            max_acceleration_mm_s2: 1e9,
             max_force_n: 1e9,
             pose_rate_hz: POSE_RATE_HZ as f64,
             reports_force: false,

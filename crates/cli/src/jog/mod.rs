@@ -50,6 +50,7 @@ struct Bench {
     min_mm: [f64; 3],
     max_mm: [f64; 3],
     max_speed_mm_s: f64,
+    max_acceleration_mm_s2: f64,
     max_force_n: f64,
     robot_from_skin: RigidTransform<Robot, Skin>,
     search: TouchSearch,
@@ -65,9 +66,11 @@ fn open(args: &JogArgs) -> Result<Bench, Failure> {
         Some(Surface::Touch(search)) => search,
         _ => SEARCH,
     };
+    let indenter = bench::open_robot(&file, clock)?;
     Ok(Bench {
         name: bench::display_name(&file),
-        indenter: bench::open_robot(&file, clock)?,
+        max_acceleration_mm_s2: indenter.capabilities().max_acceleration_mm_s2,
+        indenter,
         clock: Box::new(clock),
         min_mm: file.limits.workspace_min_mm,
         max_mm: file.limits.workspace_max_mm,
@@ -93,6 +96,7 @@ fn simulated() -> Bench {
         min_mm: can.workspace_min_mm,
         max_mm: can.workspace_max_mm,
         max_speed_mm_s: can.max_speed_mm_s,
+        max_acceleration_mm_s2: can.max_acceleration_mm_s2,
         max_force_n: can.max_force_n,
         robot_from_skin: rig.robot_from_skin,
         search: SEARCH,
@@ -118,6 +122,7 @@ fn limits(bench: &Bench) -> (RunLimits, MotionLimits) {
         min_mm: bench.min_mm,
         max_mm: bench.max_mm,
         max_speed_mm_s: bench.max_speed_mm_s,
+        max_acceleration_mm_s2: bench.max_acceleration_mm_s2,
         max_force_n: bench.max_force_n,
     };
     (run, robot)

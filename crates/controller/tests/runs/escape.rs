@@ -154,8 +154,8 @@ impl Books {
         if !self.armed {
             self.escape("a motion while disarmed".to_owned());
         }
-        if !target.iter().all(|v| v.is_finite()) || !(speed > 0.0 && speed <= LIMITS.max_speed_mm_s)
-        {
+        let sound = speed > 0.0 && speed <= LIMITS.max_speed_mm_s;
+        if !sound || !target.iter().all(|v| v.is_finite()) {
             self.escape(format!("{target:?} at {speed} mm/s"));
         }
         for i in 0..3 {

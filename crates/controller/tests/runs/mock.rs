@@ -314,6 +314,7 @@ pub fn can() -> IndenterCapabilities {
         workspace_min_mm: [-100.0; 3],
         workspace_max_mm: [100.0; 3],
         max_speed_mm_s: 200.0,
+        max_acceleration_mm_s2: 500.0,
         max_force_n: 12.0,
         pose_rate_hz: 1000.0,
         reports_force: true,

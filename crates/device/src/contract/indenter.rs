@@ -142,6 +142,10 @@ fn indenter_refusals(
         max_speed_mm_s: f64::NAN,
         ..base
     };
+    let jerky = MotionLimits {
+        max_acceleration_mm_s2: can.max_acceleration_mm_s2 * 2.0,
+        ..base
+    };
     let strong = MotionLimits {
         max_force_n: can.max_force_n * 2.0,
         ..base
@@ -152,6 +156,7 @@ fn indenter_refusals(
         (nan, "not a number"),
         (fast, "faster than the robot"),
         (no_speed, "without a speed"),
+        (jerky, "with more acceleration than the robot's"),
         (strong, "stronger than the robot"),
     ] {
         expect_error!(

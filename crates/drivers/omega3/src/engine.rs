@@ -179,6 +179,9 @@ impl<C: Clock> Engine<C> {
         self.limits = Some(*wanted);
         if let State::Armed(armed) = &mut self.state {
             armed.monitor.set_limits(*wanted);
+            armed
+                .trajectory
+                .set_acceleration(wanted.max_acceleration_mm_s2);
         }
         Ok(settings)
     }
@@ -270,8 +273,10 @@ impl<C: Clock> Engine<C> {
         }
         let mut freshness = Freshness::new(self.config.trips.min_control_khz);
         freshness.set_rate(khz);
+        let mut trajectory = Trajectory::at_rest(self.config.motion, tip);
+        trajectory.set_acceleration(limits.max_acceleration_mm_s2);
         self.state = State::Armed(Box::new(Armed {
-            trajectory: Trajectory::at_rest(self.config.motion, tip),
+            trajectory,
             monitor: Monitor::new(self.config.trips, *limits, now, tip.to_array()),
             correction: Correction::none(self.config.motion, tip.to_array()),
             freshness,

@@ -93,6 +93,7 @@ pub(crate) fn capabilities(config: &OmegaConfig) -> IndenterCapabilities {
         workspace_min_mm: e.min_mm,
         workspace_max_mm: e.max_mm,
         max_speed_mm_s: e.max_speed_mm_s,
+        max_acceleration_mm_s2: config.motion.acceleration_mm_s2,
         max_force_n: e.max_force_n,
         pose_rate_hz: config.motion.cycle_hz / 2.0,
         reports_force: true,

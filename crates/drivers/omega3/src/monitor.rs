@@ -313,6 +313,7 @@ mod tests {
         min_mm: [-10.0; 3],
         max_mm: [10.0; 3],
         max_speed_mm_s: 20.0,
+        max_acceleration_mm_s2: 200.0,
         max_force_n: 4.0,
     };
 

@@ -37,7 +37,7 @@ pub(crate) fn apply(
     let m = &config.motion;
     let metres = 1e-3 * m.filter_headroom;
     let pace = Pace {
-        acceleration_m_s2: m.acceleration_mm_s2 * metres,
+        acceleration_m_s2: limits.max_acceleration_mm_s2 * metres,
         speed_m_s: limits.max_speed_mm_s * metres,
         jerk_m_s3: m.jerk_mm_s3 * metres,
     };

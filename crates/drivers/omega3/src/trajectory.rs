@@ -60,6 +60,11 @@ impl Trajectory {
         }
     }
 
+    /// From the next move on accelerates by at most this much, mm/s².
+    pub const fn set_acceleration(&mut self, acceleration_mm_s2: f64) {
+        self.limits.acceleration_mm_s2 = acceleration_mm_s2;
+    }
+
     /// Where the set point is.
     #[must_use]
     pub const fn set_point(&self) -> Point3<Robot> {

@@ -47,6 +47,7 @@ impl Indenter for ReplayedIndenter {
             workspace_min_mm: [-1_000.0; 3],
             workspace_max_mm: [1_000.0; 3],
             max_speed_mm_s: 1_000.0,
+            max_acceleration_mm_s2: 1e9,
             max_force_n: 1_000.0,
             pose_rate_hz: 1_000.0,
             reports_force: true,

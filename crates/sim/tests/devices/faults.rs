@@ -308,6 +308,37 @@ fn dead_press_gives_background_only() {
 }
 
 #[test]
+fn the_set_point_keeps_the_configured_acceleration() {
+    // (limit, largest found), mm/s².
+    let found = [40.0, 500.0].map(|limit| {
+        let mut rig = simulated_rig(&SimConfig::new(4, SimLevel::Kinematic));
+        let limits = skinrig_device::MotionLimits {
+            max_acceleration_mm_s2: limit,
+            ..LIMITS
+        };
+        rig.indenter.configure(&limits).unwrap();
+        rig.indenter.arm().unwrap();
+        let to = rig
+            .robot_from_skin
+            .apply(skinrig_model::Point3::new(20.0, 0.0, 20.0));
+        rig.indenter.command(to, 30.0).unwrap();
+        let until = rig.clock.now() + skinrig_model::HostDuration::from_millis(2_000);
+        rig.clock.wait_until(until);
+        let mut samples = Vec::new();
+        rig.indenter.poll(&mut samples).unwrap();
+        let z: Vec<f64> = samples.iter().map(|s| s.commanded.x_mm).collect();
+        let bends = z.windows(3).map(|w| (w[0] - 2.0 * w[1] + w[2]).abs() * 1e6);
+        (limit, bends.fold(0.0, f64::max))
+    });
+    for (limit, largest) in found {
+        assert!(
+            largest <= limit * 1.001 && largest > limit * 0.3,
+            "{found:?}"
+        );
+    }
+}
+
+#[test]
 fn too_much_force_stops_the_robot() {
     let config = SimConfig::new(4, SimLevel::Kinematic);
     let mut rig = simulated_rig(&config);

@@ -157,6 +157,7 @@ const LIMITS: MotionLimits = MotionLimits {
     min_mm: [-10.0, -30.0, -30.0],
     max_mm: [50.0, 30.0, 30.0],
     max_speed_mm_s: 40.0,
+    max_acceleration_mm_s2: 200.0,
     max_force_n: 4.0,
 };
 

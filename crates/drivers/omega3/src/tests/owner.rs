@@ -16,6 +16,7 @@ const LIMITS: MotionLimits = MotionLimits {
     min_mm: [0.0, -10.0, 0.0],
     max_mm: [40.0, 10.0, 30.0],
     max_speed_mm_s: 20.0,
+    max_acceleration_mm_s2: 200.0,
     max_force_n: 4.0,
 };
 

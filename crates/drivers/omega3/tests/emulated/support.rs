@@ -14,6 +14,7 @@ pub const LIMITS: MotionLimits = MotionLimits {
     min_mm: [0.0, -15.0, 0.0],
     max_mm: [30.0, 15.0, 35.0],
     max_speed_mm_s: 40.0,
+    max_acceleration_mm_s2: 200.0,
     max_force_n: 4.0,
 };
 
