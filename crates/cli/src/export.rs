@@ -132,7 +132,10 @@ fn hdf5(
     let mut writer: Option<EventWriter> = None;
     let mut fault = None;
     reader
-        .for_each_chunk(camera, 0, |_, bytes| {
+        .for_each_chunk(camera, 0, |meta, bytes| {
+            if let Some(origin_us) = meta.restart_us {
+                decoder.restart(origin_us);
+            }
             decoder.for_each_slice(bytes, |events| {
                 if fault.is_some() || events.is_empty() {
                     return;

@@ -44,7 +44,12 @@ fn inspect_session(path: &Path, gap_us: u64) -> Result<Inspection, Failure> {
         let mut stream = StreamInspection::new(&camera.to_string(), gap_us);
         let mut decoder = Decoder::new(header.stream_formats[camera.index()]);
         reader
-            .for_each_chunk(camera, 0, |_, bytes| decoder.push(bytes, &mut stream))
+            .for_each_chunk(camera, 0, |meta, bytes| {
+                if let Some(origin_us) = meta.restart_us {
+                    decoder.restart(origin_us);
+                }
+                decoder.push(bytes, &mut stream);
+            })
             .map_err(Failure::input)?;
         stream.finish(&decoder);
         streams.push(stream);

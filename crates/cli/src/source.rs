@@ -34,7 +34,10 @@ impl EventSource for SessionEvents {
         let reader = SessionReader::open(&self.path).map_err(|e| e.to_string())?;
         let mut decoder = Decoder::new(self.formats[camera.index()]);
         reader
-            .for_each_chunk(camera, 0, |_, bytes| {
+            .for_each_chunk(camera, 0, |meta, bytes| {
+                if let Some(origin_us) = meta.restart_us {
+                    decoder.restart(origin_us);
+                }
                 decoder.for_each_slice(bytes, &mut *each)
             })
             .map_err(|e| e.to_string())
@@ -57,5 +60,11 @@ impl ChunkScanner for Rescan {
         self.scanners[camera.index()]
             .get_or_insert_with(|| Scanner::new(format))
             .push(bytes)
+    }
+
+    fn restart(&mut self, camera: CameraId, format: StreamFormat, origin_us: u64) {
+        self.scanners[camera.index()]
+            .get_or_insert_with(|| Scanner::new(format))
+            .restart(origin_us);
     }
 }

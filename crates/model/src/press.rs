@@ -78,6 +78,16 @@ impl PressVerdict {
         }
     }
 
+    /// What stands for the outcome of an attempt that leg `leg` of a session began and did not live to end: whether the robot
+    /// pressed is not known.
+    #[must_use]
+    pub fn cut_off(leg: u32) -> Self {
+        let why = Self::CUT_OFF;
+        Self::Invalid(format!(
+            "{why}: leg {leg} of the session ended without its outcome"
+        ))
+    }
+
     /// How the reason begins of an attempt that did not come to its end: the program was gone, or the run ended during it.
     pub const CUT_OFF: &'static str = "cut off";
 

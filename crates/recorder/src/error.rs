@@ -66,6 +66,20 @@ pub enum RecorderError {
         /// What came.
         found: String,
     },
+    /// Another process writes the session.
+    #[error("{}: expected a session that nobody writes, found {by} writing it; wait for its end, or end it", path.display())]
+    InUse {
+        /// The session file.
+        path: PathBuf,
+        /// Who.
+        by: String,
+    },
+    /// A session was to go on that has reached its end.
+    #[error("{}: expected a session that was cut off or not finished, found a completed one: there is nothing to resume", path.display())]
+    Completed {
+        /// The session file.
+        path: PathBuf,
+    },
     /// An earlier write failed; the session takes nothing more.
     #[error("the session is no longer written: {0}")]
     Failed(String),

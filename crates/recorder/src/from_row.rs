@@ -161,6 +161,7 @@ pub(crate) fn chunk_from(row: &SqliteRow) -> Result<ChunkMeta, Fault> {
             first_us: opt_num(row, "first_us")?,
             last_us: opt_num(row, "last_us")?,
         },
+        restart_us: None,
     })
 }
 

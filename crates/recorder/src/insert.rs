@@ -115,7 +115,8 @@ impl Journal {
                 Ok(())
             }
             Record::Preflight(checks) => self.preflight(&checks).await,
-            Record::Resumed(_) => Err(Fault::bad("record", "a new session", "a resumed one")),
+            // Written by `resume`, before the journal of its leg is opened.
+            Record::Resumed(_) => Err(Fault::bad("record", "one of a leg", "the leg's header")),
             Record::Intent { attempt, t } => {
                 sqlx::query(
                     "INSERT INTO attempt (press, number, previous, intent_ns) VALUES (?, ?, ?, ?)",

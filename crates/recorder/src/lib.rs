@@ -21,10 +21,13 @@ pub mod writer;
 
 mod from_row;
 mod insert;
+mod leg;
+mod lock;
 mod pose;
 mod prepare;
 mod query;
 mod queue;
+mod resume;
 mod schema;
 mod seal;
 mod worker;
@@ -32,10 +35,11 @@ mod worker;
 pub use catalogue::{SESSION_SUFFIX, SessionState, SessionSummary, list};
 pub use codec::Codec;
 pub use error::RecorderError;
+pub use lock::writer_of;
 pub use reader::SessionReader;
 pub use rows::{
-    AttemptRow, ChunkMeta, CommandRow, DeviceRow, InterruptionRow, NoteRow, PressTally, Seal,
-    SessionTotals,
+    AttemptRow, ChunkMeta, CommandRow, DeviceRow, InterruptionRow, LegRow, NoteRow, PressTally,
+    Seal, SessionTotals,
 };
 pub use schema::SCHEMA_VERSION;
 pub use verify::{ChunkScanner, VerifyReport, verify};

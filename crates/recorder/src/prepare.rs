@@ -59,19 +59,20 @@ impl Drop for Farewell {
 }
 
 /// Prepares records in their order until there are no more.
-pub fn run(shared: &Arc<Shared>) {
+pub fn run(shared: &Arc<Shared>, mut preparer: Preparer) {
     let _farewell = Farewell(Arc::clone(shared));
-    let mut preparer = Preparer::default();
     while let Some((record, bytes)) = shared.next_to_prepare() {
         shared.prepared(preparer.prepare(record), bytes);
     }
 }
 
 /// What is remembered from record to record.
-#[derive(Default)]
-struct Preparer {
-    formats: Option<[StreamFormat; 2]>,
-    next_seq: [u64; 2],
+#[derive(Debug, Default)]
+pub struct Preparer {
+    /// How the cameras' bytes encode events; known from the run's header on.
+    pub formats: Option<[StreamFormat; 2]>,
+    /// The next chunk of each camera.
+    pub next_seq: [u64; 2],
 }
 
 impl Preparer {

@@ -14,6 +14,7 @@ use crate::rows::{DeviceRow, Seal, SessionTotals};
 use crate::schema;
 
 mod journal;
+mod legs;
 mod poses;
 mod stream;
 

@@ -3,7 +3,7 @@
 use serde::Serialize;
 use skinrig_model::{
     AttemptId, CameraId, ChunkFacts, DeviceIdentity, DeviceRole, HostTime, InterruptionKind,
-    MotionCommand, PressOutcome, Setting,
+    MotionCommand, PressOutcome, ResumeHeader, RunEnd, Setting,
 };
 
 use crate::codec::Codec;
@@ -17,6 +17,29 @@ pub struct DeviceRow {
     pub identity: DeviceIdentity,
     /// Its settings, asked for and read back, in the order in which they were written.
     pub settings: Vec<Setting>,
+}
+
+/// One leg of a session: one life of the process that ran it. The first has number 1 and begins at zero of everything.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct LegRow {
+    /// 1, 2, 3, ...
+    pub number: u32,
+    /// Who began it, when, with what.
+    pub began: ResumeHeader,
+    /// Where its host clock begins on the session's. No time of an earlier leg is at or after it.
+    pub origin: HostTime,
+    /// Where each camera's clock begins on the session's, µs.
+    pub camera_origin_us: [u64; 2],
+    /// Number of each camera's first chunk; there is none of that number when the leg ended before it.
+    pub first_seq: [u64; 2],
+    /// How many of [`devices`](crate::SessionReader::devices) belong to earlier legs.
+    pub devices_before: usize,
+    /// How many of [`preflight`](crate::SessionReader::preflight) belong to earlier legs.
+    pub preflight_before: usize,
+    /// When and how it ended; `None`: under way or cut off.
+    pub end: Option<(HostTime, RunEnd)>,
+    /// The tree hash that it was sealed with before the next leg took the seal off, or that the session has.
+    pub tree_sha256: Option<[u8; 32]>,
 }
 
 /// One attempt at a press.
@@ -82,6 +105,9 @@ pub struct ChunkMeta {
     pub raw_crc32: u32,
     /// What one decoding in stream order found.
     pub facts: ChunkFacts,
+    /// Set on the first chunk of a further leg: these bytes do not go on from those before. Their decoder starts anew, and the
+    /// times that it finds are moved by this, µs.
+    pub restart_us: Option<u64>,
 }
 
 /// How presses ended, each counted once by its last attempt.

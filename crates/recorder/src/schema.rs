@@ -7,13 +7,13 @@ use std::time::Duration;
 
 use sqlx::migrate::Migrator;
 use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection, SqliteJournalMode, SqliteSynchronous};
-use sqlx::{ConnectOptions, Row};
+use sqlx::{ConnectOptions, Connection, Row, Sqlite, Transaction};
 
 use crate::error::RecorderError;
 use crate::query::{Fault, each_row};
 
 /// The schema version that this build writes, and the newest that it reads (`PRAGMA user_version`).
-pub const SCHEMA_VERSION: u32 = 4;
+pub const SCHEMA_VERSION: u32 = 5;
 
 /// `skrg` in ASCII (`PRAGMA application_id`).
 pub const APPLICATION_ID: u32 = u32::from_be_bytes(*b"skrg");
@@ -49,16 +49,11 @@ pub async fn create(path: &Path) -> Result<SqliteConnection, RecorderError> {
         }
     }
     let fault = |e: sqlx::Error| Fault::from(e).at(path, "creating the schema");
-    let mut conn = SqliteConnectOptions::new()
-        .filename(path)
+    let mut conn = writable(path)
         .page_size(PAGE_BYTES)
-        .pragma("wal_autocheckpoint", CHECKPOINT_PAGES.to_string())
         .journal_mode(SqliteJournalMode::Wal)
         // Feasibility measurement: after a power cut NORMAL lost acknowledged rows, FULL none.
         .synchronous(SqliteSynchronous::Full)
-        .foreign_keys(true)
-        .busy_timeout(BUSY)
-        .thread_name(|_| "session-sqlite".to_owned())
         .connect()
         .await
         .map_err(fault)?;
@@ -66,11 +61,88 @@ pub async fn create(path: &Path) -> Result<SqliteConnection, RecorderError> {
     Ok(conn)
 }
 
+fn writable(path: &Path) -> SqliteConnectOptions {
+    SqliteConnectOptions::new()
+        .filename(path)
+        .pragma("wal_autocheckpoint", CHECKPOINT_PAGES.to_string())
+        .foreign_keys(true)
+        .busy_timeout(BUSY)
+        .thread_name(|_| "session-sqlite".to_owned())
+}
+
+/// Opens an existing session for writing, in the journal mode that it is in: a sealed one is in rollback mode.
+pub async fn open_again(path: &Path) -> Result<SqliteConnection, RecorderError> {
+    allow_writing(path).map_err(|source| RecorderError::Io {
+        path: path.to_owned(),
+        doing: "making it writable",
+        source,
+    })?;
+    writable(path)
+        // In rollback mode a transaction is durable only with its folder synchronised too.
+        .synchronous(SqliteSynchronous::Extra)
+        .connect()
+        .await
+        .map_err(|e| Fault::from(e).at(path, "opening it for writing"))
+}
+
+/// Brings the schema up to this build's, within a transaction. What a session of an older schema does not know stays empty.
+pub async fn migrate(all: &mut Transaction<'_, Sqlite>) -> Result<(), Fault> {
+    let done = MIGRATOR.run(&mut **all).await;
+    done.map_err(|e| Fault::from(sqlx::Error::from(e)))
+}
+
+/// From here on a write-ahead log, as in a new session.
+pub async fn log_ahead(conn: &mut SqliteConnection) -> Result<(), Fault> {
+    let mode: String = sqlx::query_scalar("PRAGMA journal_mode = WAL")
+        .fetch_one(&mut *conn)
+        .await?;
+    if mode != "wal" {
+        return Err(Fault::bad("journal mode", "wal", mode));
+    }
+    sqlx::query("PRAGMA synchronous = FULL")
+        .execute(conn)
+        .await?;
+    Ok(())
+}
+
+/// A sealed session is read-only.
+fn allow_writing(path: &Path) -> std::io::Result<()> {
+    let mut permissions = std::fs::metadata(path)?.permissions();
+    if !permissions.readonly() {
+        return Ok(());
+    }
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        permissions.set_mode(permissions.mode() | 0o200);
+    }
+    #[cfg(not(unix))]
+    permissions.set_readonly(false);
+    std::fs::set_permissions(path, permissions)
+}
+
+/// Undoes a transaction in rollback mode in the middle of which a writer was ended: until then nobody can read the file.
+async fn roll_back(path: &Path) -> Result<(), RecorderError> {
+    let fault = |e: sqlx::Error| Fault::from(e).at(path, "undoing a write that was cut off");
+    let mut conn = writable(path).connect().await.map_err(fault)?;
+    sqlx::query("SELECT count(*) FROM sqlite_schema")
+        .execute(&mut conn)
+        .await
+        .map_err(fault)?;
+    conn.close().await.map_err(fault)
+}
+
 /// Opens a session file for reading, after a look at its first page.
 pub async fn open(path: &Path) -> Result<SqliteConnection, RecorderError> {
     let rollback = check_first_page(path)?;
-    // A sealed file is in rollback mode, never has a log beside it and never changes again.
-    let immutable = rollback && !log_of(path).exists();
+    if rollback && beside(path, "-journal").exists() && crate::lock::writer_of(path).is_none() {
+        roll_back(path).await?;
+    }
+    // A sealed file is in rollback mode, has nothing beside it and does not change.
+    let immutable = rollback
+        && !["-wal", "-journal"]
+            .iter()
+            .any(|end| beside(path, end).exists());
     let mut conn = SqliteConnectOptions::new()
         .filename(path)
         .read_only(true)
@@ -99,10 +171,11 @@ async fn check_schema_text(conn: &mut SqliteConnection) -> Result<(), Fault> {
     .await
 }
 
-/// The write-ahead log of a session file.
-fn log_of(path: &Path) -> PathBuf {
+/// The file that SQLite keeps beside a session: `-wal`, the write-ahead log, or `-journal`, what a transaction in rollback mode
+/// would be undone with.
+fn beside(path: &Path, ending: &str) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
-    name.push("-wal");
+    name.push(ending);
     PathBuf::from(name)
 }
 
@@ -145,7 +218,7 @@ fn check_first_page(path: &Path) -> Result<bool, RecorderError> {
     let number =
         |at: usize| u32::from_be_bytes([page[at], page[at + 1], page[at + 2], page[at + 3]]);
     let (version, application) = (number(60), number(68));
-    if application != APPLICATION_ID && !(application == 0 && log_of(path).exists()) {
+    if application != APPLICATION_ID && !(application == 0 && beside(path, "-wal").exists()) {
         return not("another program's SQLite file");
     }
     if version > SCHEMA_VERSION {
@@ -172,6 +245,13 @@ mod tests {
     fn sessions_of_the_first_schema_stay_sound() {
         struct NoBytes;
         impl crate::ChunkScanner for NoBytes {
+            fn restart(
+                &mut self,
+                _: skinrig_model::CameraId,
+                _: skinrig_model::StreamFormat,
+                _: u64,
+            ) {
+            }
             fn scan(
                 &mut self,
                 _: skinrig_model::CameraId,
@@ -192,6 +272,7 @@ mod tests {
             for undo in [
                 "DROP TABLE box_report",
                 "DROP TABLE preflight",
+                "DROP TABLE leg",
                 "ALTER TABLE attempt DROP COLUMN touched_mm",
                 "DELETE FROM _sqlx_migrations WHERE version > 20261121000000",
                 "PRAGMA user_version = 1",
@@ -201,7 +282,7 @@ mod tests {
             }
             crate::seal::digest_tables(&mut conn).await.unwrap()
         });
-        let later = ["box_report", "preflight"];
+        let later = ["box_report", "preflight", "leg"];
         assert!(digests.iter().all(|d| !later.contains(&d.name.as_str())));
         assert_eq!(digests.len(), 15);
         let reader = crate::SessionReader::open(&path).unwrap();

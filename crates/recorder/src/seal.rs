@@ -17,8 +17,9 @@ use crate::rows::SessionTotals;
 
 /// The tables that the tree hash covers, in its order, each with the rows and columns that count. Blobs of
 /// camera bytes and poses are covered by the SHA-256 beside them.
-const TABLES: [(&str, &str); 17] = [
+const TABLES: [(&str, &str); 18] = [
     ("session", "SELECT * FROM session ORDER BY id"),
+    ("leg", "SELECT * FROM leg ORDER BY number"),
     ("robot_from_skin", "SELECT * FROM robot_from_skin ORDER BY axis"),
     ("device", "SELECT * FROM device ORDER BY id"),
     ("setting", "SELECT * FROM setting ORDER BY device, position"),

@@ -4,9 +4,11 @@ use std::path::Path;
 
 use sha2::{Digest, Sha256};
 use skinrig_model::{
-    BoxReport, BoxTime, CameraId, ChunkFacts, HostTime, PlannedPress, RunEnd, RunHeader,
-    StreamFormat, TriggerEdge,
+    BoxReport, BoxTime, CameraId, ChunkFacts, HostTime, PlannedPress, PressVerdict, RunEnd,
+    RunHeader, StreamFormat, TriggerEdge, press::PressRole,
 };
+
+mod legs;
 
 use crate::error::RecorderError;
 use crate::query::{each_row, int, num, sha, text};
@@ -28,6 +30,10 @@ pub trait ChunkScanner {
         format: StreamFormat,
         bytes: &[u8],
     ) -> (ChunkFacts, Vec<TriggerEdge>);
+
+    /// The next bytes of `camera` are the first of a further leg: nothing carries over from those before, and times count from
+    /// `origin_us`. Called before their `scan`.
+    fn restart(&mut self, camera: CameraId, format: StreamFormat, origin_us: u64);
 
     /// Bytes were lost between the previous chunk of `camera` and the next one. Called before its `scan`.
     fn lost(&mut self, _camera: CameraId, _bytes: u64) {}
@@ -106,6 +112,7 @@ pub fn verify(
         report.add(e);
     }
     check_journal(&reader, &mut report);
+    legs::check(&reader, &mut report);
     report.totals = report.take_totals(&reader);
     check_seal(&reader, &mut report);
     Ok(report)
@@ -215,6 +222,9 @@ fn check_chunks(
             continue;
         };
         let Some(format) = format else { continue };
+        if let Some(origin_us) = meta.restart_us {
+            scanner.restart(camera, format, origin_us);
+        }
         if meta.lost_before > 0 {
             scanner.lost(camera, meta.lost_before);
         }
@@ -282,6 +292,25 @@ fn check_journal(reader: &SessionReader, report: &mut VerifyReport) {
         for (number, attempt) in (1u32..).zip(&attempts) {
             if attempt.id.number != number {
                 report.add(format!("{}: expected attempt {number}", attempt.id));
+            }
+            let verdict = attempt.outcome.as_ref().map(|o| &o.verdict);
+            if attempts.len() > number as usize {
+                match verdict {
+                    None => report.add(format!(
+                        "{}: expected a verdict of an attempt that was repeated, found none",
+                        attempt.id
+                    )),
+                    // Sync presses are made again in every leg.
+                    Some(PressVerdict::Valid | PressVerdict::Excluded(_))
+                        if planned.role != PressRole::Sync =>
+                    {
+                        report.add(format!(
+                            "{}: expected no further attempt, found the press made twice",
+                            attempt.id
+                        ));
+                    }
+                    Some(_) => {}
+                }
             }
             if let Some(t) = attempt.outcome.as_ref().and_then(|o| o.timing) {
                 let moments = [

@@ -5,14 +5,19 @@ use std::sync::Arc;
 use std::thread::JoinHandle;
 
 use sha2::{Digest, Sha256};
-use skinrig_model::{Record, RunHeader};
+use skinrig_model::{Record, ResumeHeader, RunHeader};
+use sqlx::sqlite::SqliteConnection;
+use tokio::runtime::Runtime;
 
 use crate::error::RecorderError;
 use crate::insert::Journal;
+use crate::leg::Joint;
+use crate::lock::WriterLock;
+use crate::prepare::Preparer;
 use crate::queue::{Close, Shared};
 use crate::rows::SessionTotals;
 use crate::worker::Worker;
-use crate::{prepare, schema};
+use crate::{prepare, resume, schema};
 
 /// A sealed session.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -40,6 +45,11 @@ pub struct SessionWriter {
     /// The preparing and the writing one.
     threads: Option<(JoinHandle<()>, Written)>,
     phase: Phase,
+    /// Of a further leg; nothing moves in the first.
+    joint: Joint,
+    /// Given back when everything else is done: fields are dropped in their order, after `drop`.
+    #[expect(dead_code, reason = "held, not used")]
+    lock: WriterLock,
 }
 
 type Written = JoinHandle<Option<Result<Sealed, RecorderError>>>;
@@ -47,6 +57,7 @@ type Written = JoinHandle<Option<Result<Sealed, RecorderError>>>;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Phase {
     New,
+    Resuming,
     Started,
     Ended,
 }
@@ -59,36 +70,77 @@ impl SessionWriter {
     /// [`RecorderError::Sql`] when it cannot be made.
     pub fn create(path: impl AsRef<Path>) -> Result<Self, RecorderError> {
         let path = path.as_ref().to_owned();
-        let io = |source| RecorderError::Io {
-            path: path.clone(),
-            doing: "starting the recorder thread",
-            source,
-        };
-        let runtime = tokio::runtime::Builder::new_current_thread()
-            .build()
-            .map_err(io)?;
+        let runtime = runtime(&path)?;
         let conn = runtime.block_on(schema::create(&path))?;
-        let shared = Arc::new(Shared::default());
+        let mut writer = Self {
+            lock: WriterLock::take(&path)?,
+            path,
+            shared: Arc::new(Shared::default()),
+            threads: None,
+            phase: Phase::New,
+            joint: Joint::default(),
+        };
+        writer.start(runtime, conn, Preparer::default())?;
+        Ok(writer)
+    }
+
+    /// Opens a session that was cut off, stopped or broken off by a fault, to go on with it in a further leg. Nothing in the file
+    /// changes before the first record, which is [`Record::Resumed`]: with it, in one durable step, the seal is taken off, attempts
+    /// that were cut off get their verdict, and the schema becomes the newest. All times and chunk numbers of the leg may begin
+    /// anew: they are joined to those before.
+    ///
+    /// # Errors
+    /// [`RecorderError::InUse`] while another process writes the session; [`RecorderError::Completed`] when there is nothing to
+    /// resume; or why it cannot be read.
+    pub fn resume(path: impl AsRef<Path>) -> Result<Self, RecorderError> {
+        let path = path.as_ref().to_owned();
+        let lock = resume::lock_unfinished(&path)?;
+        Ok(Self {
+            lock,
+            path,
+            shared: Arc::new(Shared::default()),
+            threads: None,
+            phase: Phase::Resuming,
+            joint: Joint::default(),
+        })
+    }
+
+    /// Starts the two threads on an open file.
+    fn start(
+        &mut self,
+        runtime: Runtime,
+        conn: SqliteConnection,
+        preparer: Preparer,
+    ) -> Result<(), RecorderError> {
         let worker = Worker {
             runtime,
-            journal: Journal::new(path.clone(), conn),
-            shared: Arc::clone(&shared),
+            journal: Journal::new(self.path.clone(), conn),
+            shared: Arc::clone(&self.shared),
         };
+        let io = |e| starting(&self.path, e);
         let named = |name: &str| std::thread::Builder::new().name(name.to_owned());
-        let records = Arc::clone(&shared);
+        let records = Arc::clone(&self.shared);
         let preparing = named("recorder-prepare")
-            .spawn(move || prepare::run(&records))
+            .spawn(move || prepare::run(&records, preparer))
             .map_err(io)?;
         let writing = named("recorder").spawn(move || worker.run()).map_err(|e| {
-            shared.close(Close::AsItIs);
+            self.shared.close(Close::AsItIs);
             io(e)
         })?;
-        Ok(Self {
-            path,
-            shared,
-            threads: Some((preparing, writing)),
-            phase: Phase::New,
-        })
+        self.threads = Some((preparing, writing));
+        Ok(())
+    }
+
+    /// Writes the beginning of a further leg; it is durable on return.
+    fn begin_leg(&mut self, header: &ResumeHeader) -> Result<(), RecorderError> {
+        let runtime = runtime(&self.path)?;
+        let (conn, leg) = runtime.block_on(resume::begin(&self.path, header))?;
+        self.joint = leg.joint;
+        let preparer = Preparer {
+            formats: Some(leg.formats),
+            next_seq: leg.joint.first_seq,
+        };
+        self.start(runtime, conn, preparer)
     }
 
     /// The session file.
@@ -97,10 +149,10 @@ impl SessionWriter {
         &self.path
     }
 
-    /// Takes one record. `Started`, `Intent`, `Outcome` and `Ended` return when they and all records before
+    /// Takes one record. `Started`, `Resumed`, `Intent`, `Outcome` and `Ended` return when they and all records before
     /// them are on the disk; others return at once, or wait while 64 MiB of records wait to be written.
     ///
-    /// The first record is `Started`, the last is `Ended`. An `Outcome` needs its `Intent` before it.
+    /// The first record is `Started`, or `Resumed` in a further leg, the last is `Ended`. An `Outcome` needs its `Intent` before it.
     ///
     /// # Errors
     /// [`RecorderError::Record`] for a record out of order or a header whose digests are not those of its texts
@@ -108,7 +160,12 @@ impl SessionWriter {
     /// record could not be written, from then on always.
     pub fn accept(&mut self, record: Record) -> Result<(), RecorderError> {
         let next = self.next_phase(&record)?;
-        self.shared.accept(record).map_err(RecorderError::Failed)?;
+        if let Record::Resumed(header) = &record {
+            self.begin_leg(header)?;
+        } else {
+            let record = self.joint.join(record)?;
+            self.shared.accept(record).map_err(RecorderError::Failed)?;
+        }
         self.phase = next;
         Ok(())
     }
@@ -126,8 +183,12 @@ impl SessionWriter {
                 check_digests(header)?;
                 Ok(Phase::Started)
             }
+            (Phase::Resuming, Record::Resumed(_)) => Ok(Phase::Started),
             (Phase::New, _) => out_of_order("the run's header first", "another record"),
-            (Phase::Started, Record::Started(_)) => out_of_order("one header", "a second one"),
+            (Phase::Resuming, _) => out_of_order("the leg's header first", "another record"),
+            (Phase::Started, Record::Started(_) | Record::Resumed(_)) => {
+                out_of_order("one header", "a second one")
+            }
             (Phase::Started, Record::Ended { .. }) => Ok(Phase::Ended),
             (Phase::Started, _) => Ok(Phase::Started),
             (Phase::Ended, _) => out_of_order("nothing after the run's end", "a record"),
@@ -143,6 +204,13 @@ impl SessionWriter {
     pub fn finish(mut self) -> Result<Sealed, RecorderError> {
         if let Some(detail) = self.shared.failure() {
             return Err(RecorderError::Failed(detail));
+        }
+        if self.threads.is_none() {
+            return Err(RecorderError::Unsealable {
+                path: self.path.clone(),
+                expected: "the run's end as last record".into(),
+                found: "a leg that was not begun".into(),
+            });
         }
         let ended = || "the recorder thread ended".to_owned();
         self.close(Close::Seal).unwrap_or_else(|| {
@@ -163,6 +231,20 @@ impl SessionWriter {
 impl Drop for SessionWriter {
     fn drop(&mut self) {
         self.close(Close::AsItIs);
+    }
+}
+
+fn runtime(path: &Path) -> Result<Runtime, RecorderError> {
+    tokio::runtime::Builder::new_current_thread()
+        .build()
+        .map_err(|e| starting(path, e))
+}
+
+fn starting(path: &Path, source: std::io::Error) -> RecorderError {
+    RecorderError::Io {
+        path: path.to_owned(),
+        doing: "starting the recorder thread",
+        source,
     }
 }
 

@@ -26,6 +26,15 @@ impl<const BITS: u32, const SHIFT: u32> TimeBase<BITS, SHIFT> {
     pub const HALF: u32 = 1 << (BITS - 1);
     const RANGE_US: u64 = 1 << (BITS + SHIFT);
 
+    /// A counter of which nothing was seen yet; its times count from `origin_us`.
+    pub const fn starting_at(origin_us: u64) -> Self {
+        Self {
+            high: 0,
+            epoch_us: origin_us,
+            known: false,
+        }
+    }
+
     /// True once a time base word was seen.
     pub const fn known(&self) -> bool {
         self.known
@@ -36,7 +45,7 @@ impl<const BITS: u32, const SHIFT: u32> TimeBase<BITS, SHIFT> {
         self.epoch_us + ((self.high as u64) << SHIFT)
     }
 
-    /// µs of all passed ranges.
+    /// µs of the origin and of all passed ranges.
     pub const fn epoch_us(&self) -> u64 {
         self.epoch_us
     }

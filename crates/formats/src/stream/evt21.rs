@@ -27,6 +27,11 @@ impl Words {
         }
     }
 
+    /// As at the start of a stream whose times count from `origin_us`.
+    pub fn restart(&mut self, origin_us: u64) {
+        self.base = TimeBase::starting_at(origin_us);
+    }
+
     /// Decodes whole words.
     pub fn run<const KEEP: bool>(
         &mut self,

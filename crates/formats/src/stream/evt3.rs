@@ -42,6 +42,14 @@ struct Other {
 }
 
 impl Words {
+    /// As at the start of a stream whose times count from `origin_us`.
+    pub fn restart(&mut self, origin_us: u64) {
+        *self = Self {
+            base: TimeBase::starting_at(origin_us),
+            ..Self::default()
+        };
+    }
+
     /// Decodes whole words.
     pub fn run<const KEEP: bool>(
         &mut self,

@@ -55,6 +55,15 @@ impl Words {
         }
     }
 
+    /// Forgets the stream so far.
+    fn restart(&mut self, origin_us: u64) {
+        match self {
+            Self::Evt2(w) => w.restart(origin_us),
+            Self::Evt21(w) => w.restart(origin_us),
+            Self::Evt3(w) => w.restart(origin_us),
+        }
+    }
+
     const fn word_bytes(&self) -> usize {
         match self {
             Self::Evt2(_) => 4,
@@ -89,6 +98,14 @@ impl Decoder {
         }
     }
 
+    /// The bytes so far end here, and others follow: of a device that was started anew. Nothing of the state carries over; times
+    /// count from `origin_us`, which the caller chooses so that they go on behind those before. Counts go on.
+    pub fn restart(&mut self, origin_us: u64) {
+        self.output.stats.trailing_bytes += self.partial_len as u64;
+        self.partial_len = 0;
+        self.words.restart(origin_us);
+    }
+
     /// Decodes `bytes` and hands everything found to `sink`, in stream order; CD events come in slices of at
     /// most a few thousand, so that they stay in the processor's cache. This is the fast way to use events
     /// once.
@@ -115,7 +132,7 @@ impl Decoder {
     #[must_use]
     pub fn stats(&self) -> StreamStats {
         StreamStats {
-            trailing_bytes: self.partial_len as u64,
+            trailing_bytes: self.output.stats.trailing_bytes + self.partial_len as u64,
             ..self.output.stats
         }
     }

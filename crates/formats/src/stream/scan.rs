@@ -37,6 +37,11 @@ impl Scanner {
         }
     }
 
+    /// Other bytes follow, of a device that was started anew: see [`Decoder::restart`].
+    pub fn restart(&mut self, origin_us: u64) {
+        self.decoder.restart(origin_us);
+    }
+
     /// Scans the next bytes. A word that is split between two chunks counts in the chunk that completes it.
     /// `first_us` and `last_us` are the times of the first and last timed word, in stream order.
     pub fn push(&mut self, bytes: &[u8]) -> (ChunkFacts, Vec<TriggerEdge>) {

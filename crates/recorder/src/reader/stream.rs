@@ -18,12 +18,15 @@ impl SessionReader {
     /// # Errors
     /// When the file is damaged.
     pub fn chunk_index(&self, camera: CameraId) -> Result<Vec<ChunkMeta>, RecorderError> {
+        let restarts = self.restarts(camera)?;
         self.ask("reading the chunk index", async |conn| {
             let sql = format!("SELECT {CHUNK_COLUMNS} FROM chunk WHERE camera = ? ORDER BY seq");
             let query = sqlx::query(sqlx::AssertSqlSafe(sql)).bind(camera.number());
             let mut index = Vec::new();
             each_row(query, conn, |row| {
-                index.push(chunk_from(row)?);
+                let mut meta = chunk_from(row)?;
+                meta.restart_us = restarts.get(&meta.seq).copied();
+                index.push(meta);
                 Ok(())
             })
             .await?;
@@ -45,7 +48,7 @@ impl SessionReader {
         }
     }
 
-    /// The first chunk from `seq` on, with its bytes as they came, checked.
+    /// The first chunk from `seq` on, with its bytes as they came, checked; whether it begins a leg is left to the caller.
     pub(crate) fn chunk_at_or_after(
         &self,
         camera: CameraId,
@@ -94,8 +97,10 @@ impl SessionReader {
         from_seq: u64,
         mut each: impl FnMut(ChunkMeta, &[u8]),
     ) -> Result<(), RecorderError> {
+        let restarts = self.restarts(camera)?;
         let mut next = from_seq;
-        while let Some((meta, bytes)) = self.chunk_at_or_after(camera, next)? {
+        while let Some((mut meta, bytes)) = self.chunk_at_or_after(camera, next)? {
+            meta.restart_us = restarts.get(&meta.seq).copied();
             each(meta, &bytes);
             next = meta.seq + 1;
         }

@@ -11,27 +11,34 @@ use skinrig_recorder::{ChunkScanner, Sealed, SessionWriter};
 #[derive(Default)]
 pub struct Evt2 {
     base: [Option<u64>; 2],
+    origin_us: [u64; 2],
 }
 
 impl ChunkScanner for Evt2 {
+    fn restart(&mut self, camera: CameraId, _format: StreamFormat, origin_us: u64) {
+        self.base[camera.index()] = None;
+        self.origin_us[camera.index()] = origin_us;
+    }
+
     fn scan(
         &mut self,
         camera: CameraId,
         _format: StreamFormat,
         bytes: &[u8],
     ) -> (ChunkFacts, Vec<TriggerEdge>) {
+        let origin_us = self.origin_us[camera.index()];
         let base = &mut self.base[camera.index()];
         let (mut facts, mut edges) = (ChunkFacts::default(), Vec::new());
         for word in bytes.as_chunks::<4>().0 {
             let w = u32::from_le_bytes(*word);
             if w >> 28 == 8 {
-                *base = Some(u64::from(w & 0x0FFF_FFFF) << 6);
+                *base = Some(origin_us + (u64::from(w & 0x0FFF_FFFF) << 6));
             }
             let Some(base) = *base else { continue };
             let t = if w >> 28 == 8 {
                 base
             } else {
-                base | u64::from(w >> 22 & 63)
+                base + u64::from(w >> 22 & 63)
             };
             match w >> 28 {
                 8 => {}
@@ -172,6 +179,66 @@ fn box_reports(mark: Mark, t: HostTime, k: u64) -> Vec<BoxReport> {
 /// All records of a run of `presses` presses of 20 ms each; the last but one needs two attempts, the last is missed.
 pub fn records(presses: u32) -> Vec<Record> {
     let mut out = vec![Record::Started(Box::new(header(presses)))];
+    let mut ids: Vec<AttemptId> = (0..presses - 1)
+        .map(|i| AttemptId {
+            press: PressId(i),
+            number: 1,
+        })
+        .collect();
+    ids.push(AttemptId {
+        press: PressId(presses - 2),
+        number: 2,
+    });
+    let t = attempts(&ids, &mut out);
+    out.push(Record::Interruption {
+        kind: InterruptionKind::Stop,
+        t,
+        reason: "operator".into(),
+    });
+    out.push(Record::Note {
+        t,
+        text: "tip cleaned".into(),
+    });
+    let last = AttemptId {
+        press: PressId(presses - 1),
+        number: 1,
+    };
+    out.push(Record::Missed(last, "stopped before it".into()));
+    out.push(Record::Ended {
+        t,
+        end: RunEnd::Stopped("operator".into()),
+    });
+    out
+}
+
+/// All records of a further leg that makes the sync press again and every press that has no valid attempt: its clocks and its
+/// chunk numbers begin anew.
+pub fn further_leg(known: &[PressHistory]) -> Vec<Record> {
+    let mut out = vec![Record::Resumed(Box::new(ResumeHeader {
+        operator: "another tester".into(),
+        started_at: "2026-01-03T03:04:05Z".into(),
+        host: "bench".into(),
+        software: "0.1.0".into(),
+        command_line: "skinrig resume".into(),
+    }))];
+    let ids: Vec<AttemptId> = (0u32..)
+        .zip(known)
+        .filter(|(press, history)| *press == 0 || history.verdict != Some(PressVerdict::Valid))
+        .map(|(press, history)| AttemptId {
+            press: PressId(press),
+            number: history.attempts + 1,
+        })
+        .collect();
+    let t = attempts(&ids, &mut out);
+    out.push(Record::Ended {
+        t,
+        end: RunEnd::Completed,
+    });
+    out
+}
+
+/// Devices, preflight and these attempts in turn, the last at each press valid, from time zero on; returns the end.
+fn attempts(ids: &[AttemptId], out: &mut Vec<Record>) -> HostTime {
     let mut scanner = Evt2::default();
     for (role, setting) in [
         (DeviceRole::Indenter, "speed"),
@@ -196,17 +263,7 @@ pub fn records(presses: u32) -> Vec<Record> {
         PreflightCheck::new("clock", "advancing", "no time", false, "power-cycle it"),
         PreflightCheck::skipped("retouch", "a touch", "not asked for"),
     ]));
-    let mut ids: Vec<AttemptId> = (0..presses - 1)
-        .map(|i| AttemptId {
-            press: PressId(i),
-            number: 1,
-        })
-        .collect();
-    ids.push(AttemptId {
-        press: PressId(presses - 2),
-        number: 2,
-    });
-    for (k, id) in (0u64..).zip(&ids) {
+    for (k, id) in (0u64..).zip(ids) {
         let t = HostTime(k as i64 * 20_000_000);
         out.push(Record::Intent { attempt: *id, t });
         let target = Point3::new(0.1, 0.2, 5.0);
@@ -263,26 +320,7 @@ pub fn records(presses: u32) -> Vec<Record> {
         };
         out.push(Record::Outcome(outcome(*id, t.0, verdict)));
     }
-    let t = HostTime(ids.len() as i64 * 20_000_000);
-    out.push(Record::Interruption {
-        kind: InterruptionKind::Stop,
-        t,
-        reason: "operator".into(),
-    });
-    out.push(Record::Note {
-        t,
-        text: "tip cleaned".into(),
-    });
-    let last = AttemptId {
-        press: PressId(presses - 1),
-        number: 1,
-    };
-    out.push(Record::Missed(last, "stopped before it".into()));
-    out.push(Record::Ended {
-        t,
-        end: RunEnd::Stopped("operator".into()),
-    });
-    out
+    HostTime(ids.len() as i64 * 20_000_000)
 }
 
 /// Records `presses` presses and seals the session.

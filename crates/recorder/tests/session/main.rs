@@ -4,5 +4,6 @@
 mod common;
 mod crash;
 mod damage;
+mod legs;
 mod python;
 mod round_trip;

@@ -1,0 +1,148 @@
+//! The legs of a session, and where a further one would go on.
+
+use std::collections::BTreeMap;
+
+use skinrig_model::{CameraId, HostTime, PressHistory, ResumeHeader, RunEnd};
+
+use super::SessionReader;
+use crate::error::RecorderError;
+use crate::query::{Fault, has_table, int, num, opt_int, opt_text, text};
+use crate::rows::LegRow;
+
+impl SessionReader {
+    /// Every leg in order; at least one.
+    ///
+    /// # Errors
+    /// When the file is damaged, or its header is not yet written.
+    pub fn legs(&self) -> Result<Vec<LegRow>, RecorderError> {
+        const DOING: &str = "reading legs";
+        let first = "SELECT operator, started_at, host, software, command_line FROM session";
+        let mut legs = self.all(DOING, first, |row| {
+            Ok(LegRow {
+                number: 1,
+                began: began_from(row)?,
+                origin: HostTime::ZERO,
+                camera_origin_us: [0; 2],
+                first_seq: [0; 2],
+                devices_before: 0,
+                preflight_before: 0,
+                end: None,
+                tree_sha256: None,
+            })
+        })?;
+        let mut last = legs.pop().ok_or_else(|| self.no_header())?;
+        if self.ask(DOING, async |conn| has_table(conn, "leg").await)? {
+            for (leg, (end, tree_sha256)) in
+                self.all(DOING, "SELECT * FROM leg ORDER BY number", further_from)?
+            {
+                // What a row says of the leg before belongs to that.
+                (last.end, last.tree_sha256) = (end, tree_sha256);
+                legs.push(std::mem::replace(&mut last, leg));
+            }
+        }
+        last.end = self.end()?;
+        last.tree_sha256 = self.seal()?.map(|seal| seal.tree_sha256);
+        legs.push(last);
+        Ok(legs)
+    }
+
+    /// What is known of each planned press, in plan order: where a further leg goes on.
+    ///
+    /// # Errors
+    /// When the file is damaged.
+    pub fn history(&self) -> Result<Vec<PressHistory>, RecorderError> {
+        let known = |attempts: Vec<crate::rows::AttemptRow>| {
+            let last = attempts.last()?;
+            let verdict = last.outcome.as_ref().map(|o| o.verdict.clone());
+            Some(PressHistory {
+                attempts: last.id.number,
+                verdict: verdict.filter(|v| !v.is_cut_off()),
+            })
+        };
+        let presses = self.presses()?.into_iter();
+        Ok(presses
+            .map(|(_, attempts)| known(attempts).unwrap_or_default())
+            .collect())
+    }
+
+    /// The chunks of `camera` at which its decoder starts anew, each with the origin of its times, µs.
+    pub(crate) fn restarts(&self, camera: CameraId) -> Result<BTreeMap<u64, u64>, RecorderError> {
+        const DOING: &str = "reading legs";
+        if !self.ask(DOING, async |conn| has_table(conn, "leg").await)? {
+            return Ok(BTreeMap::new());
+        }
+        let sql = match camera {
+            CameraId::One => {
+                "SELECT first_seq_1 AS seq, camera1_origin_us AS origin_us FROM leg ORDER BY number"
+            }
+            CameraId::Two => {
+                "SELECT first_seq_2 AS seq, camera2_origin_us AS origin_us FROM leg ORDER BY number"
+            }
+        };
+        let restarts = self.all(DOING, sql, |row| {
+            Ok((num(row, "seq")?, num(row, "origin_us")?))
+        })?;
+        // Of legs that begin with the same chunk all but the last have none.
+        Ok(restarts.into_iter().collect())
+    }
+}
+
+fn began_from(row: &sqlx::sqlite::SqliteRow) -> Result<ResumeHeader, Fault> {
+    Ok(ResumeHeader {
+        operator: text(row, "operator")?,
+        started_at: text(row, "started_at")?,
+        host: text(row, "host")?,
+        software: text(row, "software")?,
+        command_line: text(row, "command_line")?,
+    })
+}
+
+type Before = (Option<(HostTime, RunEnd)>, Option<[u8; 32]>);
+
+/// A row of `leg`, and what it says of the leg before.
+fn further_from(row: &sqlx::sqlite::SqliteRow) -> Result<(LegRow, Before), Fault> {
+    let leg = LegRow {
+        number: num(row, "number")?,
+        began: began_from(row)?,
+        origin: HostTime(int(row, "origin_ns")?),
+        camera_origin_us: [
+            num(row, "camera1_origin_us")?,
+            num(row, "camera2_origin_us")?,
+        ],
+        first_seq: [num(row, "first_seq_1")?, num(row, "first_seq_2")?],
+        devices_before: num(row, "devices_before")?,
+        preflight_before: num(row, "preflight_before")?,
+        end: None,
+        tree_sha256: None,
+    };
+    let end = match (
+        opt_int(row, "previous_end_ns")?,
+        opt_text(row, "previous_status")?,
+    ) {
+        (None, None) => None,
+        (Some(t), Some(status)) => {
+            let reason = opt_text(row, "previous_reason")?.unwrap_or_default();
+            let end = match status.as_str() {
+                "stopped" => RunEnd::Stopped(reason),
+                "faulted" => RunEnd::Faulted(reason),
+                other => return Err(Fault::bad("leg", "stopped or faulted", other)),
+            };
+            Some((HostTime(t), end))
+        }
+        _ => {
+            return Err(Fault::bad(
+                "leg",
+                "an end with its time or none",
+                "half of it",
+            ));
+        }
+    };
+    let tree: Option<Vec<u8>> = sqlx::Row::try_get(row, "previous_tree_sha256")?;
+    let tree = tree
+        .map(|bytes| {
+            <[u8; 32]>::try_from(bytes.as_slice())
+                .map_err(|_| Fault::bad("previous_tree_sha256", "32 bytes", bytes.len()))
+        })
+        .transpose()?;
+    Ok((leg, (end, tree)))
+}

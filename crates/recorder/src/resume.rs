@@ -1,0 +1,185 @@
+//! How a session goes on that was cut off, stopped or broken off by a fault: the one transaction that begins a further leg.
+
+use std::fs::File;
+use std::path::Path;
+
+use skinrig_model::{PressVerdict, ResumeHeader, StreamFormat};
+use sqlx::sqlite::{SqliteConnection, SqliteRow};
+use sqlx::{Connection, Sqlite, Transaction};
+
+use crate::error::RecorderError;
+use crate::leg::{Joint, next_second};
+use crate::lock::WriterLock;
+use crate::query::{Fault, blob, int, opt_int, opt_text, text};
+use crate::reader::SessionReader;
+use crate::schema;
+
+/// What the writer of a leg needs to know.
+pub struct Begun {
+    pub joint: Joint,
+    pub formats: [StreamFormat; 2],
+}
+
+/// Locks a session that can go on, and looks whether it can; nothing changes.
+pub fn lock_unfinished(path: &Path) -> Result<WriterLock, RecorderError> {
+    // A lock beside a file that is not there would be all that is left.
+    File::open(path).map_err(|source| match source.kind() {
+        std::io::ErrorKind::NotFound => RecorderError::Missing {
+            path: path.to_owned(),
+        },
+        _ => RecorderError::Io {
+            path: path.to_owned(),
+            doing: "opening it",
+            source,
+        },
+    })?;
+    let lock = WriterLock::take(path)?;
+    let reader = SessionReader::open(path)?;
+    reader.header()?;
+    match reader.end()? {
+        Some((_, skinrig_model::RunEnd::Completed)) => Err(RecorderError::Completed {
+            path: path.to_owned(),
+        }),
+        _ => Ok(lock),
+    }
+}
+
+/// Begins the leg: durable on return, all of it or nothing.
+pub async fn begin(
+    path: &Path,
+    header: &ResumeHeader,
+) -> Result<(SqliteConnection, Begun), RecorderError> {
+    let mut conn = schema::open_again(path).await?;
+    let begun = write(&mut conn, header)
+        .await
+        .map_err(|fault| fault.at(path, "beginning a further leg"))?;
+    schema::log_ahead(&mut conn)
+        .await
+        .map_err(|fault| fault.at(path, "beginning a further leg"))?;
+    Ok((conn, begun))
+}
+
+async fn write(conn: &mut SqliteConnection, header: &ResumeHeader) -> Result<Begun, Fault> {
+    // A sealed session is still in rollback mode: killed at any instant in here, it is rolled back to the sealed bytes.
+    let mut all = conn.begin_with("BEGIN IMMEDIATE").await?;
+    schema::migrate(&mut all).await?;
+    let (joint, formats) = joint(&mut all).await?;
+    let number = insert_leg(&mut all, header, &joint).await?;
+    sqlx::query(
+        "UPDATE attempt SET verdict = 'invalid', reason = ?, scheduled = 0 WHERE verdict IS NULL",
+    )
+    .bind(PressVerdict::cut_off(number - 1).reason())
+    .execute(&mut *all)
+    .await?;
+    // The box's clock in this leg does not go on from the one before.
+    sqlx::query("INSERT INTO box_report (taken_ns, what, received_ns) VALUES (?1, 'reset', ?1)")
+        .bind(joint.origin_ns)
+        .execute(&mut *all)
+        .await?;
+    for table in ["run_end", "seal", "table_digest"] {
+        sqlx::query(sqlx::AssertSqlSafe(format!("DELETE FROM {table}")))
+            .execute(&mut *all)
+            .await?;
+    }
+    all.commit().await?;
+    Ok(Begun { joint, formats })
+}
+
+async fn joint(conn: &mut Transaction<'_, Sqlite>) -> Result<(Joint, [StreamFormat; 2]), Fault> {
+    let row = sqlx::query(
+        "SELECT (SELECT coalesce(max(t), 0) FROM (
+             SELECT max(intent_ns) AS t FROM attempt UNION ALL SELECT max(clear_ns) FROM attempt
+             UNION ALL SELECT max(t_ns) FROM command UNION ALL SELECT max(last_ns) FROM pose_block
+             UNION ALL SELECT max(t_ns) FROM mark UNION ALL SELECT max(taken_ns) FROM box_report
+             UNION ALL SELECT max(received_ns) FROM box_report UNION ALL SELECT max(host_ns) FROM chunk
+             UNION ALL SELECT max(t_ns) FROM interruption UNION ALL SELECT max(t_ns) FROM note
+             UNION ALL SELECT max(t_ns) FROM run_end UNION ALL SELECT max(origin_ns) FROM leg)) AS host_ns,
+           (SELECT max(last_us) FROM chunk WHERE camera = 1) AS camera1_us,
+           (SELECT max(last_us) FROM chunk WHERE camera = 2) AS camera2_us,
+           (SELECT coalesce(max(seq) + 1, 0) FROM chunk WHERE camera = 1) AS seq1,
+           (SELECT coalesce(max(seq) + 1, 0) FROM chunk WHERE camera = 2) AS seq2,
+           stream_format_1, stream_format_2
+         FROM session",
+    )
+    .fetch_one(&mut **conn)
+    .await?;
+    let origin = |column: &str, per_second: i64| {
+        let last = opt_int(&row, column)?;
+        next_second(last, per_second)
+            .ok_or_else(|| Fault::bad("recorded times", "less than a century", format!("{last:?}")))
+    };
+    let unsigned =
+        |value: i64| u64::try_from(value).map_err(|_| Fault::bad("leg", "a number from 0", value));
+    let format = |column: &str| -> Result<StreamFormat, Fault> {
+        text(&row, column)?
+            .parse()
+            .map_err(|e: String| Fault::bad(column, "a stream format", e))
+    };
+    let joint = Joint {
+        origin_ns: origin("host_ns", 1_000_000_000)?,
+        camera_origin_us: [
+            unsigned(origin("camera1_us", 1_000_000)?)?,
+            unsigned(origin("camera2_us", 1_000_000)?)?,
+        ],
+        first_seq: [unsigned(int(&row, "seq1")?)?, unsigned(int(&row, "seq2")?)?],
+    };
+    Ok((
+        joint,
+        [format("stream_format_1")?, format("stream_format_2")?],
+    ))
+}
+
+/// Writes the row of the leg; returns its number.
+async fn insert_leg(
+    conn: &mut Transaction<'_, Sqlite>,
+    header: &ResumeHeader,
+    joint: &Joint,
+) -> Result<u32, Fault> {
+    let one = |sql: &'static str| sqlx::query(sql);
+    let counts = one(
+        "SELECT (SELECT coalesce(max(number), 1) + 1 FROM leg) AS number,
+           (SELECT count(*) FROM device) AS devices, (SELECT count(*) FROM preflight) AS preflight",
+    )
+    .fetch_one(&mut **conn)
+    .await?;
+    let end: Option<SqliteRow> = one("SELECT t_ns, status, reason FROM run_end")
+        .fetch_optional(&mut **conn)
+        .await?;
+    let seal: Option<SqliteRow> = one("SELECT tree_sha256 FROM seal")
+        .fetch_optional(&mut **conn)
+        .await?;
+    let number: u32 = crate::query::num(&counts, "number")?;
+    let signed = |value: u64| value as i64; // they come from this file
+    let mut insert = sqlx::query(
+        "INSERT INTO leg (number, operator, started_at, host, software, command_line, origin_ns, camera1_origin_us,
+           camera2_origin_us, first_seq_1, first_seq_2, devices_before, preflight_before, previous_status,
+           previous_reason, previous_end_ns, previous_tree_sha256)
+         VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+    )
+    .bind(number)
+    .bind(&header.operator)
+    .bind(&header.started_at)
+    .bind(&header.host)
+    .bind(&header.software)
+    .bind(&header.command_line)
+    .bind(joint.origin_ns);
+    for value in joint.camera_origin_us.into_iter().chain(joint.first_seq) {
+        insert = insert.bind(signed(value));
+    }
+    insert = insert
+        .bind(int(&counts, "devices")?)
+        .bind(int(&counts, "preflight")?);
+    insert = match &end {
+        Some(end) => insert
+            .bind(text(end, "status")?)
+            .bind(opt_text(end, "reason")?)
+            .bind(int(end, "t_ns")?),
+        None => insert
+            .bind(None::<String>)
+            .bind(None::<String>)
+            .bind(None::<i64>),
+    };
+    let tree = seal.map(|row| blob(&row, "tree_sha256")).transpose()?;
+    insert.bind(tree).execute(&mut **conn).await?;
+    Ok(number)
+}

@@ -1,0 +1,133 @@
+//! The legs of a session: each behind the one before on every clock, nothing of a leg outside of it.
+
+use skinrig_model::{BoxReport, CameraId, HostTime};
+
+use super::VerifyReport;
+use crate::error::RecorderError;
+use crate::reader::SessionReader;
+use crate::rows::LegRow;
+
+/// Checks the order of the legs, and that attempts and chunks lie within theirs.
+pub fn check(reader: &SessionReader, report: &mut VerifyReport) {
+    // A missing header is told elsewhere.
+    let Ok(legs) = reader.legs() else { return };
+    if legs.len() == 1 {
+        return;
+    }
+    let told = order(&legs, report)
+        .and_then(|()| chunks(reader, &legs, report))
+        .and_then(|()| attempts(reader, &legs, report))
+        .and_then(|()| resets(reader, &legs, report));
+    report.take(told);
+}
+
+fn order(legs: &[LegRow], report: &mut VerifyReport) -> Result<(), RecorderError> {
+    for (number, pair) in (2u32..).zip(legs.windows(2)) {
+        let [before, leg] = pair else { continue };
+        let place = format!("leg {}", leg.number);
+        report.equal("leg", &number, &leg.number);
+        let end = before.end.as_ref().map_or(before.origin, |(t, _)| *t);
+        if leg.origin <= end.max(before.origin) {
+            report.add(format!(
+                "{place}: expected to begin after {end}, found {}",
+                leg.origin
+            ));
+        }
+        let earlier = |before: [u64; 2], now: [u64; 2]| before[0] > now[0] || before[1] > now[1];
+        if earlier(before.camera_origin_us, leg.camera_origin_us)
+            || earlier(before.first_seq, leg.first_seq)
+            || before.devices_before > leg.devices_before
+            || before.preflight_before > leg.preflight_before
+        {
+            report.add(format!(
+                "{place}: expected origins from those of the leg before, found earlier ones"
+            ));
+        }
+    }
+    Ok(())
+}
+
+fn chunks(
+    reader: &SessionReader,
+    legs: &[LegRow],
+    report: &mut VerifyReport,
+) -> Result<(), RecorderError> {
+    for camera in CameraId::ALL {
+        let k = camera.index();
+        for meta in reader.chunk_index(camera)? {
+            let after = legs.partition_point(|leg| leg.first_seq[k] <= meta.seq);
+            let Some(leg) = legs.get(after - 1) else {
+                continue;
+            };
+            let next = legs.get(after);
+            let host =
+                leg.origin <= meta.host_time && next.is_none_or(|n| meta.host_time < n.origin);
+            let camera_time = [meta.facts.first_us, meta.facts.last_us]
+                .into_iter()
+                .flatten()
+                .all(|t| {
+                    leg.camera_origin_us[k] <= t && next.is_none_or(|n| t < n.camera_origin_us[k])
+                });
+            if !host || !camera_time {
+                report.add(format!(
+                    "{camera} chunk {}: expected the times of leg {}, found others",
+                    meta.seq, leg.number
+                ));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// An attempt belongs to one leg, and each to a later or the same one as the attempt before.
+fn attempts(
+    reader: &SessionReader,
+    legs: &[LegRow],
+    report: &mut VerifyReport,
+) -> Result<(), RecorderError> {
+    let leg_at = |t: HostTime| legs.partition_point(|leg| leg.origin <= t);
+    for (_, attempts) in reader.presses()? {
+        let mut last = None;
+        for attempt in attempts {
+            let timing = attempt.outcome.as_ref().and_then(|o| o.timing);
+            if let (Some(intent), Some(timing)) = (attempt.intent, timing)
+                && leg_at(intent) != leg_at(timing.clear)
+            {
+                report.add(format!(
+                    "{}: expected moments of leg {}, found others",
+                    attempt.id,
+                    leg_at(intent)
+                ));
+            }
+            if attempt.intent < last && attempt.intent.is_some() {
+                report.add(format!(
+                    "{}: expected to begin after the attempt before, found earlier",
+                    attempt.id
+                ));
+            }
+            last = attempt.intent.or(last);
+        }
+    }
+    Ok(())
+}
+
+/// The box's clock of a leg is not that of the leg before: without a reset between them the time base would join the two.
+fn resets(
+    reader: &SessionReader,
+    legs: &[LegRow],
+    report: &mut VerifyReport,
+) -> Result<(), RecorderError> {
+    let reports = reader.box_reports()?;
+    for leg in &legs[1..] {
+        let reset = BoxReport::Reset {
+            noticed: leg.origin,
+        };
+        if !reports.iter().any(|(_, said)| *said == reset) {
+            report.add(format!(
+                "leg {}: expected a reset of the box's clock at its origin, found none",
+                leg.number
+            ));
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,276 @@
+//! A session that goes on in a further leg: one line of time, every press counted once, sound at every instant.
+
+use proptest::prelude::*;
+use skinrig_model::*;
+use skinrig_recorder::{LegRow, RecorderError, SessionReader, SessionWriter, verify};
+
+use crate::common::{Evt2, further_leg, header, records, sealed};
+
+const PRESSES: u32 = 5;
+
+fn sound(path: &std::path::Path, sealed: bool) {
+    let report = verify(path, &mut Evt2::default()).unwrap();
+    assert_eq!((report.problems, report.sealed), (vec![], sealed));
+}
+
+/// Goes on to the end and seals.
+fn go_on(path: &std::path::Path) -> Vec<Record> {
+    let known = SessionReader::open(path).unwrap().history().unwrap();
+    let leg = further_leg(&known);
+    let mut writer = SessionWriter::resume(path).unwrap();
+    for record in &leg {
+        writer.accept(record.clone()).unwrap();
+    }
+    let totals = writer.finish().unwrap().totals;
+    let all = (
+        totals.presses.planned,
+        totals.presses.valid,
+        totals.sync.valid,
+    );
+    assert_eq!(all, (u64::from(PRESSES) - 1, u64::from(PRESSES) - 1, 1));
+    leg
+}
+
+fn is_sorted(times: impl IntoIterator<Item = HostTime>) -> bool {
+    times.into_iter().is_sorted()
+}
+
+/// What a leg told comes back, moved by its origins and by nothing else.
+fn comes_back(reader: &SessionReader, leg: &LegRow, told: &[Record]) {
+    let moved = |t: HostTime| HostTime(t.0 + leg.origin.0);
+    let mut outcomes = Vec::new();
+    let mut chunks = 0;
+    for record in told {
+        match record {
+            Record::Outcome(o) => outcomes.push(o.clone()),
+            Record::Chunk(c) => {
+                chunks += 1;
+                let k = c.camera.index();
+                let seq = c.seq + leg.first_seq[k];
+                let index = reader.chunk_index(c.camera).unwrap();
+                let meta = index[seq as usize];
+                assert_eq!(meta.host_time, moved(c.host_time));
+                let later = |t: Option<u64>| t.map(|t| t + leg.camera_origin_us[k]);
+                assert_eq!(meta.facts.first_us, later(c.facts.first_us));
+                assert_eq!(meta.facts.last_us, later(c.facts.last_us));
+                assert_eq!(reader.chunk_bytes(c.camera, seq).unwrap(), c.bytes);
+                let restart = (leg.number > 1 && c.seq == 0).then_some(leg.camera_origin_us[k]);
+                assert_eq!(meta.restart_us, restart);
+            }
+            _ => {}
+        }
+    }
+    assert!(chunks > 0);
+    let presses = reader.presses().unwrap();
+    for mut told in outcomes {
+        let attempts = &presses[told.attempt.press.0 as usize].1;
+        let attempt = &attempts[told.attempt.number as usize - 1];
+        let timing = told.timing.as_mut().unwrap();
+        assert_eq!(
+            attempt.intent,
+            Some(moved(HostTime(timing.approach.0 - 1_000_000)))
+        );
+        for moment in [
+            &mut timing.approach,
+            &mut timing.contact,
+            &mut timing.at_depth,
+            &mut timing.retract,
+            &mut timing.release,
+            &mut timing.clear,
+        ] {
+            *moment = moved(*moment);
+        }
+        assert_eq!(attempt.outcome.as_ref(), Some(&told));
+    }
+}
+
+/// One line of time from the first leg to the last.
+fn one_line(reader: &SessionReader) {
+    let everything = (HostTime(i64::MIN), HostTime(i64::MAX));
+    let poses = reader.poses(everything.0, everything.1).unwrap();
+    assert!(is_sorted(poses.iter().map(|p| p.t)));
+    assert!(is_sorted(reader.commands().unwrap().iter().map(|c| c.t)));
+    assert!(is_sorted(reader.marks_sent().unwrap().iter().map(|m| m.t)));
+    assert!(is_sorted(reader.box_reports().unwrap().iter().map(|r| r.0)));
+    for camera in CameraId::ALL {
+        let index = reader.chunk_index(camera).unwrap();
+        assert!(index.iter().map(|m| m.seq).eq(0..index.len() as u64));
+        let times = index
+            .iter()
+            .flat_map(|m| [m.facts.first_us, m.facts.last_us]);
+        assert!(times.flatten().is_sorted());
+        let edges = reader.trigger_edges(camera).unwrap();
+        assert!(edges.is_sorted_by_key(|e| e.t_us));
+        assert_eq!(
+            reader.gaps(camera).unwrap().len(),
+            usize::from(camera == CameraId::Two)
+        );
+    }
+}
+
+#[test]
+fn a_stopped_and_sealed_session_goes_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.session.sqlite");
+    let first = sealed(&path, PRESSES);
+    let known = SessionReader::open(&path).unwrap().history().unwrap();
+    let counted: Vec<_> = known
+        .iter()
+        .map(|k| (k.attempts, k.verdict.clone()))
+        .collect();
+    let missed = PressVerdict::Missed("stopped before it".into());
+    let valid = || Some(PressVerdict::Valid);
+    assert_eq!(
+        counted,
+        [
+            (1, valid()),
+            (1, valid()),
+            (1, valid()),
+            (2, valid()),
+            (1, Some(missed))
+        ]
+    );
+    // Opened and left again: still the sealed session.
+    drop(SessionWriter::resume(&path).unwrap());
+    sound(&path, true);
+
+    let second = go_on(&path);
+    sound(&path, true);
+    assert!(std::fs::metadata(&path).unwrap().permissions().readonly());
+    assert_eq!(
+        std::fs::read_dir(folder.path()).unwrap().count(),
+        1,
+        "one file remains"
+    );
+
+    let reader = SessionReader::open(&path).unwrap();
+    assert_eq!(reader.header().unwrap(), header(PRESSES));
+    let legs = reader.legs().unwrap();
+    assert_eq!(legs.len(), 2);
+    let stopped = RunEnd::Stopped("operator".into());
+    assert_eq!(legs[0].end.as_ref().map(|e| &e.1), Some(&stopped));
+    assert_eq!(legs[0].tree_sha256, Some(first.tree_sha256));
+    assert_eq!(legs[1].began.operator, "another tester");
+    assert_eq!((legs[1].devices_before, legs[1].preflight_before), (2, 3));
+    assert_eq!(legs[1].origin.0 % 1_000_000_000, 0);
+    assert_eq!(legs[1].end, reader.end().unwrap());
+    comes_back(&reader, &legs[0], &records(PRESSES));
+    comes_back(&reader, &legs[1], &second);
+    one_line(&reader);
+    let resets = reader
+        .box_reports()
+        .unwrap()
+        .into_iter()
+        .filter(|(t, said)| {
+            *t == legs[1].origin
+                && *said
+                    == BoxReport::Reset {
+                        noticed: legs[1].origin,
+                    }
+        });
+    assert!(resets.count() >= 1);
+    match SessionWriter::resume(&path) {
+        Err(RecorderError::Completed { .. }) => {}
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn one_writer_at_a_time_and_the_header_of_a_leg_first() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.session.sqlite");
+    match SessionWriter::resume(&path) {
+        Err(RecorderError::Missing { .. }) => {}
+        other => panic!("{other:?}"),
+    }
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+    let mut writer = SessionWriter::create(&path).unwrap();
+    for record in records(PRESSES).into_iter().take(9) {
+        writer.accept(record).unwrap();
+    }
+    match SessionWriter::resume(&path) {
+        Err(RecorderError::InUse { by, .. }) => assert!(by.starts_with("process "), "{by}"),
+        other => panic!("{other:?}"),
+    }
+    drop(writer);
+    let mut writer = SessionWriter::resume(&path).unwrap();
+    assert!(matches!(
+        SessionWriter::resume(&path),
+        Err(RecorderError::InUse { .. })
+    ));
+    let note = Record::Note {
+        t: HostTime(0),
+        text: "too early".into(),
+    };
+    assert!(matches!(
+        writer.accept(note),
+        Err(RecorderError::Record { .. })
+    ));
+    assert!(matches!(
+        writer.finish(),
+        Err(RecorderError::Unsealable { .. })
+    ));
+    sound(&path, false);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 12, ..ProptestConfig::default() })]
+
+    /// Left at any record, twice, and gone on with each time.
+    #[test]
+    fn a_session_goes_on_from_any_record(first in 1usize..70, second in 1usize..70) {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.session.sqlite");
+        let begun = records(PRESSES);
+        let first = first.min(begun.len());
+        let mut writer = SessionWriter::create(&path).unwrap();
+        for record in &begun[..first] {
+            writer.accept(record.clone()).unwrap();
+        }
+        drop(writer);
+        sound(&path, false);
+
+        let reader = SessionReader::open(&path).unwrap();
+        let open = |reader: &SessionReader| -> Vec<AttemptId> {
+            let presses = reader.presses().unwrap().into_iter();
+            let attempts = presses.flat_map(|(_, attempts)| attempts);
+            attempts.filter(|a| a.outcome.is_none()).map(|a| a.id).collect()
+        };
+        let cut_off = open(&reader);
+        prop_assert!(cut_off.len() <= 1);
+        let leg = further_leg(&reader.history().unwrap());
+        drop(reader);
+        let second = second.min(leg.len() - 1);
+        let mut writer = SessionWriter::resume(&path).unwrap();
+        for record in &leg[..second] {
+            writer.accept(record.clone()).unwrap();
+        }
+        drop(writer);
+        sound(&path, false);
+        let reader = SessionReader::open(&path).unwrap();
+        if let Some(id) = cut_off.first() {
+            let presses = reader.presses().unwrap();
+            let attempt = &presses[id.press.0 as usize].1[id.number as usize - 1];
+            let verdict = &attempt.outcome.as_ref().unwrap().verdict;
+            prop_assert_eq!(verdict, &PressVerdict::cut_off(1));
+            let known = &reader.history().unwrap()[id.press.0 as usize];
+            prop_assert!(known.attempts > id.number || known.verdict.is_none());
+        }
+
+        drop(reader); // a session with a reader is not sealed
+        let last = go_on(&path);
+        sound(&path, true);
+        let reader = SessionReader::open(&path).unwrap();
+        prop_assert_eq!(open(&reader), vec![]);
+        let legs = reader.legs().unwrap();
+        prop_assert_eq!(legs.len(), 3);
+        comes_back(&reader, &legs[2], &last);
+        let index = reader.chunk_index(CameraId::One).unwrap();
+        let restarts = index.iter().filter(|m| m.restart_us.is_some()).count();
+        let with_chunks = legs[1..].iter().enumerate().filter(|(k, leg)| {
+            let end = legs.get(k + 2).map_or(index.len() as u64, |next| next.first_seq[0]);
+            leg.first_seq[0] < end
+        });
+        prop_assert_eq!(restarts, with_chunks.count());
+    }
+}
