@@ -16,7 +16,10 @@ impl Core<'_> {
         let Some(header) = self.header.take() else {
             return Err(ControllerError::Internal("armed twice".to_owned()).into());
         };
-        self.journal.emit(Record::Started(header.clone()))?;
+        self.journal.emit(match &self.resume {
+            None => Record::Started(header.clone()),
+            Some(resume) => Record::Resumed(Box::new(resume.header.clone())),
+        })?;
         if let Some(preflight) = &self.preflight {
             self.checks.extend_from_slice(&preflight.made);
         }
@@ -35,7 +38,8 @@ impl Core<'_> {
 
     /// Everything short of power: devices configured and read back, cameras streaming and checked.
     fn prepare(&mut self, header: &RunHeader) -> Result<(), Halt> {
-        preflight::check_plan(self.plan, header)?;
+        let histories = self.resume.as_ref().map(|r| r.histories.as_slice());
+        preflight::check_plan(self.plan, header, histories)?;
         if header.robot_from_skin != self.robot_from_skin {
             return Err(rig_error("header", "the rig's place of the skin", "another").into());
         }

@@ -15,7 +15,7 @@ use crate::error::{ControllerError, Halt};
 use crate::guard::GuardedIndenter;
 use crate::journal::Journal;
 use crate::moments::{PressTracker, Settling};
-use crate::run::RunReport;
+use crate::run::{Resume, RunReport};
 use crate::settings::ControllerSettings;
 use crate::sink::RecordSink;
 use crate::states::{Event, Machine, State};
@@ -36,6 +36,10 @@ pub(crate) struct Core<'a> {
     pub(crate) plan: &'a Plan,
     pub(crate) settings: ControllerSettings,
     pub(crate) header: Option<Box<RunHeader>>,
+    /// When this is a further leg of a session.
+    pub(crate) resume: Option<Resume>,
+    /// Presses taken again at once so far.
+    pub(crate) retaken: u32,
     pub(crate) robot_from_skin: RigidTransform<Robot, Skin>,
     pub(crate) indenter: GuardedIndenter,
     pub(crate) cameras: [Box<dyn EventCamera>; 2],
@@ -92,6 +96,8 @@ impl<'a> Core<'a> {
             plan,
             settings,
             header: Some(Box::new(header)),
+            resume: None,
+            retaken: 0,
             robot_from_skin,
             indenter: GuardedIndenter::new(indenter, robot_from_skin, plan.limits, &settings),
             cameras,

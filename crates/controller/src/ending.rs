@@ -8,6 +8,7 @@ use crate::core::Core;
 use crate::error::{ControllerError, Halt};
 use crate::run::RunReport;
 use crate::states::{Event, State};
+use crate::verdict::Trouble;
 
 /// How often a device that does not answer is told to rise, to disarm, to stop.
 const TRIES: u32 = 3;
@@ -117,7 +118,7 @@ impl Core<'_> {
         self.attempt("outcome", |core| {
             core.emit_poses()?;
             if core.open.is_some() {
-                core.close_press(Some(reason.clone()))?;
+                core.close_press(Some(Trouble::cut_off(&reason)))?;
             }
             core.journal.miss_the_rest(&reason)
         });

@@ -2,7 +2,7 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use skinrig_model::{AttemptId, PressId, PressOutcome, PressVerdict, Record};
+use skinrig_model::{AttemptId, PressHistory, PressId, PressOutcome, PressVerdict, Record};
 
 use crate::error::ControllerError;
 use crate::sink::RecordSink;
@@ -21,6 +21,8 @@ enum Fate {
 pub(crate) struct Journal<'a> {
     sink: &'a mut dyn RecordSink,
     fates: Vec<Fate>,
+    /// Attempts at each press so far, those of earlier legs counted.
+    attempts: Vec<u32>,
     /// While ending: a failing or panicking sink no longer stops anything.
     lenient: bool,
     /// What went wrong while ending.
@@ -32,8 +34,32 @@ impl<'a> Journal<'a> {
         Self {
             sink,
             fates: vec![Fate::Planned; presses],
+            attempts: vec![0; presses],
             lenient: false,
             problems: Vec::new(),
+        }
+    }
+
+    /// What earlier legs of the session did, one history per planned press.
+    pub(crate) fn remember(&mut self, histories: &[PressHistory]) {
+        for (i, history) in histories.iter().enumerate().take(self.fates.len()) {
+            self.attempts[i] = history.attempts;
+            self.fates[i] = match &history.verdict {
+                _ if history.attempts == 0 => Fate::Planned,
+                Some(PressVerdict::Valid | PressVerdict::Excluded(_)) => Fate::Valid,
+                Some(PressVerdict::Missed(_)) => Fate::Missed,
+                // An attempt that was cut off is invalid already.
+                Some(PressVerdict::Invalid(_)) | None => Fate::Invalid,
+            };
+        }
+    }
+
+    /// The attempt that comes next at `press`.
+    pub(crate) fn next_attempt(&self, press: PressId) -> AttemptId {
+        let before = self.attempts.get(press.0 as usize).copied();
+        AttemptId {
+            press,
+            number: before.unwrap_or(0) + 1,
         }
     }
 
@@ -75,6 +101,9 @@ impl<'a> Journal<'a> {
         t: skinrig_model::HostTime,
     ) -> Result<(), ControllerError> {
         self.emit(Record::Intent { attempt, t })?;
+        if let Some(attempts) = self.attempts.get_mut(attempt.press.0 as usize) {
+            *attempts = attempt.number;
+        }
         self.set(attempt.press, Fate::Under);
         Ok(())
     }
@@ -95,10 +124,7 @@ impl<'a> Journal<'a> {
     pub(crate) fn miss_the_rest(&mut self, reason: &str) -> Result<(), ControllerError> {
         for i in 0..self.fates.len() {
             if self.fates[i] == Fate::Planned {
-                let attempt = AttemptId {
-                    press: PressId(i as u32),
-                    number: 1,
-                };
+                let attempt = self.next_attempt(PressId(i as u32));
                 self.emit(Record::Missed(attempt, reason.to_owned()))?;
                 self.fates[i] = Fate::Missed;
             }

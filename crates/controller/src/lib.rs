@@ -19,6 +19,8 @@
 //! }
 //! ```
 //!
+//! A session that was cut off goes on as a further leg of it: [`Run::resumed`] with what is left of the plan.
+//!
 //! # Decisions and replay
 //!
 //! Every decision depends on what devices delivered and on the injected clock alone, and no motion target
@@ -46,6 +48,7 @@ pub mod sink;
 pub mod states;
 mod steps;
 mod touch;
+mod verdict;
 pub mod watchdog;
 
 pub use checks::{ExpectedDevice, Loopback, Preflight};
@@ -54,7 +57,9 @@ pub use error::{ControllerError, GuardError};
 pub use guard::GuardedIndenter;
 pub use jog::{Jog, Moved, Touched};
 pub use progress::{Progress, ProgressTracker};
-pub use run::{Armed, Finished, Planned, Run, RunReport, Running, execute, execute_checked};
+pub use run::{
+    Armed, Finished, Planned, Resume, Run, RunReport, Running, execute, execute_checked,
+};
 pub use settings::ControllerSettings;
 pub use sink::{RecordSink, SinkFault};
 pub use watchdog::{Trip, WatchLimits, Watchdog};

@@ -1,7 +1,7 @@
 //! What must fit together before anything is armed: plan, header and rig.
 
 use skinrig_device::{IndenterCapabilities, MotionLimits};
-use skinrig_model::{Point3, RigidTransform, Robot, RunHeader, Skin};
+use skinrig_model::{Point3, PressHistory, RigidTransform, Robot, RunHeader, Skin};
 use skinrig_protocol::Surface;
 use skinrig_protocol::plan::{Plan, PressStep, Step};
 
@@ -23,9 +23,14 @@ fn plan_error(
     }
 }
 
-/// Checks that `plan` can be executed as it stands: every press exactly once, from above its place, every
-/// target and speed within the plan's own limits, and the header's presses those of the plan.
-pub(crate) fn check_plan(plan: &Plan, header: &RunHeader) -> Result<(), ControllerError> {
+/// Checks that `plan` can be executed as it stands: every press exactly once (of a session that goes on, with the
+/// `histories` of its presses: those that are wanted, and no other), from above its place, every target and speed within
+/// the plan's own limits, and the header's presses those of the plan.
+pub(crate) fn check_plan(
+    plan: &Plan,
+    header: &RunHeader,
+    histories: Option<&[PressHistory]>,
+) -> Result<(), ControllerError> {
     if header.presses != plan.presses {
         return Err(plan_error(
             "header",
@@ -56,6 +61,17 @@ pub(crate) fn check_plan(plan: &Plan, header: &RunHeader) -> Result<(), Controll
             return Err(plan_error("presses", format!("press {i}"), found));
         }
     }
+    let wanted = match histories {
+        None => vec![true; plan.presses.len()],
+        Some(histories) if histories.len() == plan.presses.len() => plan.wanted(histories),
+        Some(histories) => {
+            return Err(plan_error(
+                "histories",
+                format!("those of {} presses", plan.presses.len()),
+                format!("{}", histories.len()),
+            ));
+        }
+    };
     let mut seen = vec![false; plan.presses.len()];
     let mut above: Option<Point3<Skin>> = None;
     for (n, step) in plan.steps.iter().enumerate() {
@@ -127,8 +143,13 @@ pub(crate) fn check_plan(plan: &Plan, header: &RunHeader) -> Result<(), Controll
             }
         }
     }
-    if let Some(i) = seen.iter().position(|done| !done) {
-        return Err(plan_error("steps", format!("a step for press {i}"), "none"));
+    if let Some(i) = (0..seen.len()).find(|i| seen[*i] != wanted[*i]) {
+        let step = |there: bool| if there { "a step" } else { "no step" };
+        return Err(plan_error(
+            "steps",
+            format!("{} for press {i}", step(wanted[i])),
+            step(seen[i]),
+        ));
     }
     Ok(())
 }

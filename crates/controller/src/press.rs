@@ -1,23 +1,39 @@
 //! One press: down to the surface, to depth, hold, and back up; every moment measured.
 
-use skinrig_model::{AttemptId, CameraId, HostTime, PressOutcome, PressTiming, PressVerdict};
+use skinrig_model::HostTime;
 use skinrig_protocol::Surface;
 use skinrig_protocol::plan::PressStep;
 
 use crate::core::{Collect, Core, OpenPress};
 use crate::error::{ControllerError, Halt};
 use crate::moments::PressTracker;
+use crate::verdict::{Trouble, judge};
 
 impl Core<'_> {
-    /// Executes one press. A press that goes wrong without harm ends invalid and the run goes on.
+    /// Executes one press. A press that goes wrong without harm ends invalid and the run goes on, after it was taken again
+    /// at once where another attempt may bring what this one did not.
     pub(crate) fn press(&mut self, step: &PressStep) -> Result<(), Halt> {
         if let Some(after) = step.start_after_begin {
             self.wait_at_clearance(self.begin + after)?;
         }
-        let attempt = AttemptId {
-            press: step.press,
-            number: 1,
-        };
+        let mut again = self.attempt_press(step)?;
+        let first_ended = self.now();
+        let limits = self.plan.retakes;
+        let mut retakes = 0;
+        while again && retakes < limits.per_press && self.retaken < limits.per_session {
+            self.safe_point()?;
+            retakes += 1;
+            self.retaken += 1;
+            again = self.attempt_press(step)?;
+        }
+        // What the retakes took does not shorten the time up to the next press.
+        self.begin += self.now() - first_ended;
+        Ok(())
+    }
+
+    /// One attempt at a press. Gives whether it is worth another one.
+    fn attempt_press(&mut self, step: &PressStep) -> Result<bool, Halt> {
+        let attempt = self.journal.next_attempt(step.press);
         let t = self.now();
         self.journal.intent(attempt, t)?;
         self.open = Some(OpenPress {
@@ -31,17 +47,17 @@ impl Core<'_> {
         // A durable intent may have taken a while: know the present pose before moving.
         self.observe()?;
         let trouble = self.press_motion(step)?;
-        self.close_press(trouble)?;
-        Ok(())
+        Ok(self.close_press(trouble)?)
     }
 
     /// The motion. `Some` says why the press is invalid although the tip is back at clearance height.
-    fn press_motion(&mut self, step: &PressStep) -> Result<Option<String>, Halt> {
+    fn press_motion(&mut self, step: &PressStep) -> Result<Option<Trouble>, Halt> {
         let began = self.now();
         if let Surface::Touch(search) = step.surface {
             self.breakable = true;
             let tared = self.tare(step, search);
-            if let Some(trouble) = self.unless_paused(tared.map(Result::err))? {
+            let tared = tared.map(|t| t.err().map(Trouble::stays));
+            if let Some(trouble) = self.unless_paused(tared)? {
                 return Ok(Some(trouble)); // the tip never left clearance height
             }
         }
@@ -83,22 +99,22 @@ impl Core<'_> {
         let clear = self.tracker().and_then(PressTracker::clear);
         Ok(trouble.or_else(|| {
             let clear = clear.filter(|clear| *clear > deadline)?;
-            Some(format!(
+            Some(Trouble::passing(format!(
                 "expected to be back at clearance height within {}, found {}",
                 step.deadline,
                 clear - down
-            ))
+            )))
         }))
     }
 
     /// What became of a part of the press that `pause_now` may break off.
     fn unless_paused(
         &mut self,
-        part: Result<Option<String>, Halt>,
-    ) -> Result<Option<String>, Halt> {
+        part: Result<Option<Trouble>, Halt>,
+    ) -> Result<Option<Trouble>, Halt> {
         self.breakable = false;
         match part {
-            Err(Halt::PausedNow) => Ok(Some("paused by the operator".to_owned())),
+            Err(Halt::PausedNow) => Ok(Some(Trouble::passing("paused by the operator".to_owned()))),
             other => other,
         }
     }
@@ -109,10 +125,11 @@ impl Core<'_> {
         step: &PressStep,
         down: HostTime,
         deadline: HostTime,
-    ) -> Result<Option<String>, Halt> {
+    ) -> Result<Option<Trouble>, Halt> {
         let late = |core: &Self, what: &str, z_mm: f64| {
             let target = step.at.at_height(z_mm);
-            Some(core.not_arrived(what, target, step.deadline).to_string())
+            let reason = core.not_arrived(what, target, step.deadline).to_string();
+            Some(Trouble::passing(reason))
         };
         let surface_mm = match step.surface {
             Surface::Known if self.until(PressTracker::at_surface, deadline)? => 0.0,
@@ -122,7 +139,7 @@ impl Core<'_> {
                     self.with_tracker(|t| t.touched(&found));
                     found.measured.z_mm
                 }
-                Err(trouble) => return Ok(Some(trouble)),
+                Err(trouble) => return Ok(Some(Trouble::stays(trouble))),
             },
         };
         let bottom_mm = surface_mm - step.depth_mm;
@@ -175,8 +192,11 @@ impl Core<'_> {
         }
     }
 
-    /// Hands over all bytes and poses up to now, then the outcome.
-    pub(crate) fn close_press(&mut self, trouble: Option<String>) -> Result<(), ControllerError> {
+    /// Hands over all bytes and poses up to now, then the outcome. Gives whether the press is worth another attempt.
+    pub(crate) fn close_press(
+        &mut self,
+        trouble: Option<Trouble>,
+    ) -> Result<bool, ControllerError> {
         let flushed = self.observe().and(self.collect(Collect::Flush));
         if self.ending {
             if let Err(e) = flushed {
@@ -187,51 +207,11 @@ impl Core<'_> {
         }
         self.emit_poses()?;
         let Some(open) = &self.open else {
-            return Ok(());
+            return Ok(false);
         };
-        let outcome = judge(open, trouble);
+        let (outcome, again) = judge(open, trouble);
         self.journal.outcome(outcome)?;
         self.open = None;
-        Ok(())
-    }
-}
-
-/// The outcome of a press: valid only when all was measured, stayed in place and nothing was lost.
-fn judge(open: &OpenPress, trouble: Option<String>) -> PressOutcome {
-    let mut reasons: Vec<String> = trouble.into_iter().collect();
-    let mut timing: Option<PressTiming> = None;
-    if let Some(tracker) = &open.tracker {
-        match tracker.timing() {
-            Ok(t) => timing = Some(t),
-            Err(reason) if reasons.is_empty() => reasons.push(reason),
-            Err(_) => {}
-        }
-        if tracker.at_depth().is_some() {
-            reasons.extend(tracker.check_hold().err());
-        }
-    }
-    for camera in CameraId::ALL {
-        let (lost, bytes) = (open.lost[camera.index()], open.bytes[camera.index()]);
-        if lost > 0 {
-            reasons.push(format!("{camera} lost {lost} bytes"));
-        } else if bytes == 0 {
-            reasons.push(format!("{camera} sent no bytes"));
-        }
-    }
-    let tracker = open.tracker.as_ref();
-    let mean = tracker.and_then(PressTracker::mean);
-    PressOutcome {
-        attempt: open.attempt,
-        verdict: if reasons.is_empty() {
-            PressVerdict::Valid
-        } else {
-            PressVerdict::Invalid(reasons.join("; "))
-        },
-        timing,
-        measured_at: mean.map(skinrig_model::Point3::plane),
-        measured_depth_mm: mean.zip(tracker).map(|(m, t)| t.surface_mm() - m.z_mm),
-        touched_mm: tracker.and_then(PressTracker::touched_mm),
-        peak_force_n: tracker.and_then(PressTracker::peak_force_n),
-        scheduled: false,
+        Ok(again)
     }
 }

@@ -4,8 +4,8 @@ use std::collections::{BTreeMap, VecDeque};
 
 use skinrig_model::pulse::decode_marks;
 use skinrig_model::{
-    CameraId, HostDuration, HostTime, PlannedPress, Point2, PressVerdict, PulseTrain, RawChunk,
-    Record, RunEnd, TriggerEdge,
+    CameraId, HostDuration, HostTime, PlannedPress, Point2, PressHistory, PressId, PressVerdict,
+    PulseTrain, RawChunk, Record, RunEnd, TriggerEdge,
 };
 
 /// Event rates are taken over this span of rig time.
@@ -39,6 +39,8 @@ pub struct Progress {
     pub invalid: usize,
     /// How many of them were missed.
     pub missed: usize,
+    /// Attempts beyond the first at a press, by this process.
+    pub retaken: usize,
     /// The press under way, or the last one.
     pub press: Option<PlannedPress>,
     /// The measured tip's place on the skin, and its height in mm.
@@ -57,11 +59,23 @@ pub struct Progress {
     pub end: Option<RunEnd>,
 }
 
+/// How a press ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Fate {
+    Valid,
+    Invalid,
+    Missed,
+}
+
 /// Follows a run by its records.
 #[derive(Debug, Clone, Default)]
 pub struct ProgressTracker {
     progress: Progress,
     presses: Vec<PlannedPress>,
+    /// How each press ended last, as far as it did.
+    fates: Vec<Option<Fate>>,
+    /// Presses that had ended before this process, and are not taken again.
+    before: usize,
     expected: Option<HostDuration>,
     first: Option<HostTime>,
     chunks: [VecDeque<(HostTime, u64)>; 2],
@@ -78,6 +92,49 @@ impl ProgressTracker {
         }
     }
 
+    /// Goes on with a session whose presses have these histories; those that are `wanted` are still to be done.
+    #[must_use]
+    pub fn resumed(
+        mut self,
+        presses: &[PlannedPress],
+        histories: &[PressHistory],
+        wanted: &[bool],
+    ) -> Self {
+        self.plan(presses);
+        for ((fate, history), wanted) in self.fates.iter_mut().zip(histories).zip(wanted) {
+            *fate = match &history.verdict {
+                _ if *wanted => None,
+                Some(PressVerdict::Valid | PressVerdict::Excluded(_)) => Some(Fate::Valid),
+                Some(PressVerdict::Invalid(_)) => Some(Fate::Invalid),
+                Some(PressVerdict::Missed(_)) | None => None,
+            };
+        }
+        self.count();
+        self.before = self.progress.done;
+        self
+    }
+
+    fn plan(&mut self, presses: &[PlannedPress]) {
+        self.presses = presses.to_vec();
+        self.fates = vec![None; presses.len()];
+        self.progress.planned = presses.len();
+    }
+
+    fn ended(&mut self, press: PressId, fate: Fate) {
+        if let Some(f) = self.fates.get_mut(press.0 as usize) {
+            *f = Some(fate);
+        }
+        self.count();
+    }
+
+    fn count(&mut self) {
+        let n = |fate| self.fates.iter().filter(|f| **f == Some(fate)).count();
+        let [valid, invalid, missed] = [Fate::Valid, Fate::Invalid, Fate::Missed].map(n);
+        let p = &mut self.progress;
+        (p.valid, p.invalid, p.missed) = (valid, invalid, missed);
+        p.done = valid + invalid + missed;
+    }
+
     /// The run as of the last record.
     #[must_use]
     pub const fn progress(&self) -> &Progress {
@@ -88,11 +145,10 @@ impl ProgressTracker {
     pub fn update(&mut self, record: &Record) -> &Progress {
         let p = &mut self.progress;
         match record {
-            Record::Started(header) => {
-                self.presses = header.presses.clone();
-                p.planned = header.presses.len();
-            }
+            Record::Started(header) => self.plan(&header.presses),
             Record::Intent { attempt, t } => {
+                let known = self.fates.get(attempt.press.0 as usize);
+                p.retaken += usize::from(known.is_some_and(Option::is_some));
                 p.press = self.presses.get(attempt.press.0 as usize).copied();
                 self.reached(*t);
             }
@@ -109,16 +165,13 @@ impl ProgressTracker {
             Record::BoxReports { t, .. } => self.reached(*t),
             Record::Chunk(chunk) => self.chunk(chunk),
             Record::Outcome(outcome) => {
-                p.done += 1;
-                match outcome.verdict {
-                    PressVerdict::Valid => p.valid += 1,
-                    _ => p.invalid += 1,
-                }
+                let fate = match outcome.verdict {
+                    PressVerdict::Valid => Fate::Valid,
+                    _ => Fate::Invalid,
+                };
+                self.ended(outcome.attempt.press, fate);
             }
-            Record::Missed(..) => {
-                p.done += 1;
-                p.missed += 1;
-            }
+            Record::Missed(attempt, _) => self.ended(attempt.press, Fate::Missed),
             Record::Interruption { kind, t, .. } => {
                 use skinrig_model::InterruptionKind as K;
                 p.paused = matches!(kind, K::Pause | K::PauseNow);
@@ -140,7 +193,7 @@ impl ProgressTracker {
         let first = *self.first.get_or_insert(t);
         let p = &mut self.progress;
         p.elapsed = p.elapsed.max(t - first);
-        p.eta = remaining(p, self.expected).filter(|_| p.end.is_none());
+        p.eta = remaining(p, self.before, self.expected).filter(|_| p.end.is_none());
     }
 
     fn chunk(&mut self, chunk: &RawChunk) {
@@ -189,12 +242,13 @@ impl ProgressTracker {
 }
 
 /// The expected rest: what the plan said at first, then more and more the pace of the presses done.
-fn remaining(p: &Progress, expected: Option<HostDuration>) -> Option<HostDuration> {
+fn remaining(p: &Progress, before: usize, expected: Option<HostDuration>) -> Option<HostDuration> {
     let planned = HostDuration((expected?.0 - p.elapsed.0).max(0));
-    if p.done == 0 || p.planned == 0 {
+    let (done, of) = (p.done - before.min(p.done), p.planned - before);
+    if done == 0 || of == 0 {
         return Some(planned);
     }
-    let share = p.done as f64 / p.planned as f64;
+    let share = done as f64 / of as f64;
     let pace = p.elapsed.as_secs_f64() * (1.0 - share) / share;
     Some(HostDuration::from_secs_f64(
         share * pace + (1.0 - share) * planned.as_secs_f64(),

@@ -3,7 +3,7 @@
 use std::marker::PhantomData;
 
 use skinrig_device::Rig;
-use skinrig_model::{HostTime, RunEnd, RunHeader};
+use skinrig_model::{HostTime, PressHistory, ResumeHeader, RunEnd, RunHeader};
 use skinrig_protocol::plan::Plan;
 
 use crate::checks::Preflight;
@@ -13,7 +13,16 @@ use crate::settings::ControllerSettings;
 use crate::sink::RecordSink;
 use crate::states::Event;
 
-/// What became of a run. `planned = valid + invalid + missed`, always.
+/// How a session goes on that was cut off, stopped or broken off by a fault.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Resume {
+    /// The first record of the leg.
+    pub header: ResumeHeader,
+    /// What the legs before know of each planned press, in plan order.
+    pub histories: Vec<PressHistory>,
+}
+
+/// What became of a run, all legs of its session together. `planned = valid + invalid + missed`, always.
 #[derive(Debug, Clone, PartialEq)]
 #[must_use]
 pub struct RunReport {
@@ -107,6 +116,23 @@ impl<'a> Run<'a, Planned> {
         self
     }
 
+    /// As a further leg of a session: the plan given is what is left of the session's own
+    /// ([`Plan::remaining`] with the presses that [`Plan::wanted`] names), the header that of the session.
+    #[must_use]
+    pub fn resumed(mut self, resume: Resume) -> Self {
+        self.core.journal.remember(&resume.histories);
+        self.core.resume = Some(resume);
+        self
+    }
+
+    /// Executes the plan from arming to disarming, and says what became of it; see [`execute`].
+    pub fn execute(self) -> RunReport {
+        match self.arm() {
+            Ok(run) => run.begin().run().report(),
+            Err(report) => report,
+        }
+    }
+
     /// Checks the plan against the rig, configures every device and reads it back, starts the cameras and
     /// powers the robot, which holds its position.
     ///
@@ -177,7 +203,7 @@ pub fn execute(
     control: &ControlHandle,
     sink: &mut dyn RecordSink,
 ) -> RunReport {
-    finish(Run::new(plan, header, rig, control, sink))
+    Run::new(plan, header, rig, control, sink).execute()
 }
 
 /// As [`execute`], after a preflight: with a failed check the robot is not powered, and the report says which.
@@ -191,12 +217,5 @@ pub fn execute_checked(
     settings: ControllerSettings,
 ) -> RunReport {
     let run = Run::with_settings(plan, header, rig, control, sink, settings);
-    finish(run.checked(preflight))
-}
-
-fn finish(run: Run<'_, Planned>) -> RunReport {
-    match run.arm() {
-        Ok(run) => run.begin().run().report(),
-        Err(report) => report,
-    }
+    run.checked(preflight).execute()
 }

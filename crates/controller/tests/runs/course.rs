@@ -119,7 +119,7 @@ impl Told {
     }
 
     /// What must hold of the rig after every run.
-    fn check_rig(&self, case: &str) {
+    pub fn check_rig(&self, case: &str) {
         let w = lock(&self.world);
         let r = &self.report;
         assert_eq!(w.violations, Vec::<String>::new(), "{case}");

@@ -7,6 +7,7 @@ mod guard;
 mod mock;
 mod preflight;
 mod progress;
+mod resumed;
 mod rig_faults;
 mod simulated;
 mod touch;
