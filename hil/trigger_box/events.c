@@ -5,12 +5,18 @@
 #include <util/atomic.h>
 
 #define CAPACITY 64 // a power of two
+#define FOR_TRAINS 16 // of them that edges of the input never take
 
 static struct event ring[CAPACITY];
 static uint32_t oldest; // number of the first kept event
 static uint8_t first;   // its place
 static uint8_t kept;
 static uint16_t dropped;
+
+struct event *events_new_input(void)
+{
+    return kept < CAPACITY - FOR_TRAINS ? &ring[(uint8_t)(first + kept++) % CAPACITY] : NULL;
+}
 
 struct event *events_new(void)
 {

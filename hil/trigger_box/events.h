@@ -12,6 +12,10 @@ struct event {
 // counted as dropped. Interrupts are off until the place is filled.
 struct event *events_new(void);
 
+// The same for an edge of the input, which leaves places to trains: a null pointer while only those are free, and nothing is
+// counted.
+struct event *events_new_input(void);
+
 // Number of the event that will come next; the first since reset is 0.
 uint32_t events_next(void);
 

@@ -10,6 +10,15 @@
 #include "protocol.h"
 
 static struct input_counts counts;
+volatile bool input_muted;
+static uint8_t turn; // of the clock, in which the last edge came
+static uint8_t edges_left = EDGES_PER_TURN; // in this turn
+
+static inline void count(uint16_t *n)
+{
+    if (*n != UINT16_MAX)
+        ++*n;
+}
 
 static inline bool is_high(void)
 {
@@ -19,10 +28,12 @@ static inline bool is_high(void)
 // Kept short: while it runs, an edge of a train that is due must wait.
 static void record(bool level, uint16_t timer)
 {
-    ++counts.edges;
-    struct event *e = events_new();
-    if (!e)
+    struct event *e = events_new_input();
+    if (!e) {
+        count(&counts.ignored);
         return;
+    }
+    ++counts.edges;
     e->kind = level ? EVENT_INPUT_ROSE : EVENT_INPUT_FELL;
     e->code = 0;
     clock_extend(timer, &e->ticks);
@@ -36,14 +47,36 @@ static inline void wait_for(bool level)
         TCCR1B &= (uint8_t)~_BV(ICES1);
 }
 
+// True while the input is within its bounds; otherwise it is left alone until `input_tend` says so.
+static inline bool within_bounds(void)
+{
+    uint8_t now = (uint8_t)clock_overflows;
+    if (now != turn) {
+        turn = now;
+        edges_left = EDGES_PER_TURN;
+    }
+    if (edges_left == 0) {
+        TIMSK1 &= (uint8_t)~_BV(ICIE1);
+        input_muted = true;
+        count(&counts.mutes);
+        return false;
+    }
+    --edges_left;
+    return true;
+}
+
 ISR(TIMER1_CAPT_vect)
 {
     uint16_t timer = ICR1;
+    if (!within_bounds())
+        return;
+    // The edge of a train that has become due comes before the next edge of the input, whose interrupt ranks higher.
+    if (TIFR1 & _BV(OCF1A))
+        TIMSK1 &= (uint8_t)~_BV(ICIE1);
     bool level = TCCR1B & _BV(ICES1);
     if (is_high() != level) {
         // Over before it could be looked at (or raised by the change of polarity itself): not an edge to rely on.
-        if (counts.glitches != UINT16_MAX)
-            ++counts.glitches;
+        count(&counts.glitches);
         return;
     }
     record(level, timer);
@@ -59,8 +92,23 @@ void input_setup(void)
 {
     // With its pull-up an input that nothing is wired to stays silent.
     PORTB |= _BV(PIN_INPUT);
+    // The noise canceller wants four equal samples: spikes under 250 ns are none, and stamps are late by so much.
+    TCCR1B |= _BV(ICNC1);
     wait_for(!is_high());
     TIMSK1 |= _BV(ICIE1);
+}
+
+void input_tend(void)
+{
+    ATOMIC_BLOCK(ATOMIC_RESTORESTATE)
+    {
+        if (input_muted && (uint8_t)clock_overflows != turn) {
+            wait_for(!is_high());
+            TIFR1 = _BV(ICF1); // what came meanwhile
+            input_muted = false;
+            TIMSK1 |= _BV(ICIE1);
+        }
+    }
 }
 
 bool input_high(void)

@@ -1,5 +1,6 @@
 // The time-stamped input: a contact against ground, or an optical gate.
 #pragma once
+#include <avr/io.h>
 #include <stdbool.h>
 #include <stdint.h>
 
@@ -8,9 +9,29 @@ void input_setup(void);
 // The level now.
 bool input_high(void);
 
-// Edges that were stamped, and pulses too short to be stamped, since reset.
+// An input that changes without end may take neither the processor nor the memory for events from the trains. After
+// EDGES_PER_TURN edges within one turn of the clock (4.096 ms) it is not looked at until the next turn.
+#define EDGES_PER_TURN 32
+
+// The input is not looked at until the clock's next turn.
+extern volatile bool input_muted;
+
+// Looks at the input again when its turn has come. To be called again and again.
+void input_tend(void);
+
+// Ends the precedence that the input gave to the edge of a train. Interrupts are off.
+static inline void input_resume(void)
+{
+    if (!input_muted)
+        TIMSK1 |= _BV(ICIE1);
+}
+
+// Since reset: edges that were stamped; pulses too short to be stamped; edges that found their share of the memory taken; times
+// that the input was not looked at for the rest of a turn.
 struct input_counts {
     uint32_t edges;
     uint16_t glitches;
+    uint16_t ignored;
+    uint16_t mutes;
 };
 void input_count(struct input_counts *out);

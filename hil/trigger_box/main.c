@@ -197,6 +197,8 @@ static uint8_t status(void)
     append_16(link.bad_checksums);
     append_16(link.bad_frames);
     append_16(link.overruns);
+    append_16(inputs.ignored);
+    append_16(inputs.mutes);
     return RESULT_OK;
 }
 
@@ -302,6 +304,7 @@ int main(void)
         if (length)
             answer(body, length);
         keep_schedule();
+        input_tend();
         // Until the next interrupt: a byte, an edge, or the clock's overflow after 4 ms at most. `sei` takes effect
         // after the instruction that follows it, so that nothing comes between the look and the sleep.
         cli();

@@ -2,11 +2,11 @@
 #pragma once
 
 #define FIRMWARE_MAJOR 1
-#define FIRMWARE_MINOR 0
+#define FIRMWARE_MINOR 1
 #define FIRMWARE_PATCH 0
 
 // Changes with any change of a frame's meaning. The layout of HELLO never changes.
-#define PROTOCOL_VERSION 1
+#define PROTOCOL_VERSION 2
 #define BOX_NAME "skinrig-trigger-box"
 
 #define BAUD_RATE 250000UL

@@ -10,6 +10,7 @@
 
 #include "clock.h"
 #include "events.h"
+#include "input.h"
 #include "pins.h"
 #include "protocol.h"
 
@@ -90,6 +91,7 @@ static void begin(void)
 
 ISR(TIMER1_COMPA_vect)
 {
+    input_resume();
     if (state == IDLE)
         return;
     // A match of an old setting, or an edge more than a turn of the timer away: it will come again.

@@ -15,7 +15,7 @@ use crate::access::Registers;
 use crate::biases::{BIASES, DIFF};
 use crate::chunks::Chunker;
 use crate::config::Evk1Config;
-use crate::error::{Evk1Error, UsbError};
+use crate::error::{Evk1Error, FirstError, UsbError};
 use crate::identify::{Identity, identify, open_serial};
 use crate::inbox::{Inbox, Taken};
 use crate::registers::{CHIP_ID, OVERFLOW_HITCOUNT, TEMPERATURE};
@@ -147,10 +147,11 @@ impl Evk1 {
         Ok(f64::from(self.registers().get(TEMPERATURE)?) / 4096.0)
     }
 
-    /// Stops, powers the camera down, empties its buffers and gives it free. Bytes of a running stream are let go.
+    /// Stops, powers the camera down, empties its buffers and gives it free. Every step is taken whatever became of those
+    /// before. Bytes of a running stream are let go.
     ///
     /// # Errors
-    /// [`Evk1Error::Usb`], [`Evk1Error::ReadBack`]; the camera is given free all the same.
+    /// The first of [`Evk1Error::Usb`], [`Evk1Error::ReadBack`]; the camera is given free all the same.
     pub fn close(mut self) -> Result<(), Evk1Error> {
         self.shut()
     }
@@ -164,13 +165,16 @@ impl Evk1 {
         if self.gone {
             return Ok(());
         }
-        back.map_err(|e| e.during("stopping the stream"))?;
+        // Whatever failed, the sensor must not stay under power.
+        let mut done = FirstError::default();
+        done.after(back.map_err(|e| e.during("stopping the stream")));
         let mut registers =
             Registers::new(self.transport.as_mut(), &self.config.read_back_exceptions);
         if streaming {
-            sequences::stop(&mut registers)?;
+            done.after(sequences::stop(&mut registers));
         }
-        sequences::close(&mut registers, self.clock.as_ref())
+        done.after(sequences::close(&mut registers, self.clock.as_ref()));
+        done.outcome()
     }
 
     fn registers(&mut self) -> Registers<'_> {

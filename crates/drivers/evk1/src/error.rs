@@ -154,6 +154,24 @@ pub enum Evk1Error {
     },
 }
 
+/// What became of steps that are all taken, whatever became of those before: the first error.
+#[derive(Debug, Default)]
+pub(crate) struct FirstError(Option<Evk1Error>);
+
+impl FirstError {
+    /// A step was taken.
+    pub(crate) fn after(&mut self, step: Result<(), Evk1Error>) {
+        if let Err(error) = step {
+            self.0.get_or_insert(error);
+        }
+    }
+
+    /// What became of all of them.
+    pub(crate) fn outcome(self) -> Result<(), Evk1Error> {
+        self.0.map_or(Ok(()), Err)
+    }
+}
+
 impl Evk1Error {
     pub(crate) fn refused(expected: impl Into<String>, found: impl Into<String>) -> Self {
         Self::Refused {

@@ -10,7 +10,7 @@ use skinrig_device::Clock;
 use skinrig_model::{HostDuration, SENSOR_HEIGHT, SENSOR_WIDTH};
 
 use crate::access::Registers;
-use crate::error::Evk1Error;
+use crate::error::{Evk1Error, FirstError};
 use crate::registers as r;
 use crate::roi::Map;
 
@@ -26,14 +26,20 @@ pub const TRIGGER_OUT_SINCE: u32 = 0x0003_0000;
 /// # Errors
 /// [`Evk1Error::Usb`], [`Evk1Error::ReadBack`].
 pub fn power_down(registers: &mut Registers<'_>) -> Result<(), Evk1Error> {
-    registers.set_blind(r::CLK_OUT_EN, 0)?;
-    registers.set(r::TD_RSTN, 0)?;
-    registers.set(r::EN_VDDA, 0)?;
-    registers.set(r::SENSOR_CLK_EN, 0)?;
-    registers.set(r::SENSOR_SOFT_RESET, 0)?;
-    registers.set(r::EN_VDDC, 0)?;
-    registers.set(r::EN_VDDD, 0)?;
-    soft_reset(registers)
+    let mut done = FirstError::default();
+    done.after(registers.set_blind(r::CLK_OUT_EN, 0));
+    for off in [
+        r::TD_RSTN,
+        r::EN_VDDA,
+        r::SENSOR_CLK_EN,
+        r::SENSOR_SOFT_RESET,
+        r::EN_VDDC,
+        r::EN_VDDD,
+    ] {
+        done.after(registers.set(off, 0));
+    }
+    done.after(soft_reset(registers));
+    done.outcome()
 }
 
 fn soft_reset(registers: &mut Registers<'_>) -> Result<(), Evk1Error> {
@@ -183,8 +189,10 @@ pub fn start(
 /// # Errors
 /// [`Evk1Error::Usb`], [`Evk1Error::ReadBack`].
 pub fn stop(registers: &mut Registers<'_>) -> Result<(), Evk1Error> {
-    registers.set(r::ROI_TD_RSTN, 0)?;
-    registers.set(r::STEREO_MERGE_ENABLE, 0)
+    let mut done = FirstError::default();
+    done.after(registers.set(r::ROI_TD_RSTN, 0));
+    done.after(registers.set(r::STEREO_MERGE_ENABLE, 0));
+    done.outcome()
 }
 
 /// Longest wait for bytes that may not be there.
@@ -227,11 +235,17 @@ pub fn clear_left_over(registers: &mut Registers<'_>, clock: &dyn Clock) -> Resu
 /// # Errors
 /// [`Evk1Error::Usb`], [`Evk1Error::ReadBack`].
 pub fn close(registers: &mut Registers<'_>, clock: &dyn Clock) -> Result<(), Evk1Error> {
+    let mut done = FirstError::default();
+    done.after(power_down(registers));
+    let cleared = registers.transport().clear_halt();
+    done.after(cleared.map_err(|e| e.during("clearing the event endpoint")));
+    done.after(empty_buffers(registers, clock));
+    done.outcome()
+}
+
+fn empty_buffers(registers: &mut Registers<'_>, clock: &dyn Clock) -> Result<(), Evk1Error> {
     const ROUNDS: u32 = 8;
     const ENOUGH_BYTES: usize = 300_000;
-    power_down(registers)?;
-    let cleared = registers.transport().clear_halt();
-    cleared.map_err(|e| e.during("clearing the event endpoint"))?;
     let end = clock.now() + EMPTYING_LIMIT;
     let mut total = 0;
     for _ in 0..ROUNDS {

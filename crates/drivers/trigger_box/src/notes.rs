@@ -11,6 +11,8 @@ pub(crate) struct Losses {
     bad_checksums: u16,
     bad_frames: u16,
     overruns: u16,
+    ignored_edges: u16,
+    input_mutes: u16,
 }
 
 impl From<Counters> for Losses {
@@ -22,6 +24,8 @@ impl From<Counters> for Losses {
             bad_checksums: c.bad_checksums,
             bad_frames: c.bad_frames,
             overruns: c.overruns,
+            ignored_edges: c.ignored_edges,
+            input_mutes: c.input_mutes,
         }
     }
 }
@@ -56,7 +60,17 @@ pub(crate) fn note(
     part(
         before.dropped_events,
         now.dropped_events,
-        "events found its memory full (is the input wired to a source of noise?)",
+        "events found its memory full (the host was too slow, or the usb cable is bad)",
+    );
+    part(
+        before.ignored_edges,
+        now.ignored_edges,
+        "edges of its input were ignored to leave memory to marks (does the contact bounce without end?)",
+    );
+    part(
+        before.input_mutes,
+        now.input_mutes,
+        "times its input changed so often that it was not looked at for up to 4 ms (check the input's wiring and shield)",
     );
     part(
         before.bad_checksums,

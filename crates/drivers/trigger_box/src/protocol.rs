@@ -4,11 +4,11 @@ use skinrig_model::pulse::{MAX_MARKED_PRESS, SYNC_CODE};
 use skinrig_model::{BoxTime, Mark, MarkKind, PressId, PulseTrain};
 
 /// The version of the protocol that this driver speaks.
-pub const PROTOCOL_VERSION: u8 = 1;
+pub const PROTOCOL_VERSION: u8 = 2;
 /// The firmware that this driver was written for.
 pub const FIRMWARE_VERSION: Firmware = Firmware {
     major: 1,
-    minor: 0,
+    minor: 1,
     patch: 0,
 };
 /// How a box names itself.
@@ -467,6 +467,10 @@ pub struct Counters {
     pub bad_frames: u16,
     /// Bytes that were lost because nobody took them in time.
     pub overruns: u16,
+    /// Edges of the input that found its share of the memory taken.
+    pub ignored_edges: u16,
+    /// Times that the input changed too often and was not looked at for the rest of a turn of the clock, 4 ms at most.
+    pub input_mutes: u16,
 }
 
 impl Counters {
@@ -485,6 +489,8 @@ impl Counters {
             bad_checksums: c.u16()?,
             bad_frames: c.u16()?,
             overruns: c.u16()?,
+            ignored_edges: c.u16()?,
+            input_mutes: c.u16()?,
         };
         c.end()?;
         Some(counters)

@@ -31,6 +31,10 @@ pub struct Faults {
     pub answers: BTreeMap<u8, u16>,
     /// Bits of registers that cannot be set.
     pub stuck_at_zero: BTreeMap<u32, u32>,
+    /// Registers that take no write: the request stalls.
+    pub refused: Vec<u32>,
+    /// Transfers do not come back.
+    pub stop_fails: bool,
     /// Status byte of register reads.
     pub read_status: Option<u8>,
     /// Ends the stream, and every request from then on when the device is gone.
@@ -304,6 +308,9 @@ impl Transport for Bench {
         );
         let address = u32::from(value) | u32::from(index) << 16;
         let word = u32::from_be_bytes(data.try_into().expect("4 bytes"));
+        if model.faults.refused.contains(&address) {
+            return Err(UsbError::Stall);
+        }
         model.steps.push(Step::Write(address, word));
         let stuck = model
             .faults
@@ -358,6 +365,9 @@ impl Transport for Bench {
         let mut model = self.model();
         if model.inbox.take().is_some() {
             model.other("take transfers back");
+        }
+        if model.faults.stop_fails {
+            return Err(UsbError::Stall);
         }
         Ok(())
     }

@@ -330,6 +330,36 @@ fn a_camera_that_never_falls_silent_is_named_at_start_and_left_at_close() {
 }
 
 #[test]
+fn the_sensor_loses_its_power_whatever_else_fails_at_close() {
+    let pixels = r::ROI_TD_RSTN.register;
+    let time_base = r::STEREO_MERGE_ENABLE.register;
+    let clock_out = r::CLK_OUT_EN.register;
+    let interface = r::SENSOR_CLK_EN.register;
+    for (refused, stop_fails, first) in [
+        (vec![pixels, time_base], false, pixels.name),
+        (vec![time_base, clock_out], false, time_base.name),
+        (vec![clock_out, interface], false, clock_out.name),
+        (vec![pixels], true, "stopping the stream"),
+    ] {
+        let bench = Bench::new();
+        let mut camera = bench.open().unwrap();
+        camera.start().unwrap();
+        let faults = bench.model().faults.clone();
+        bench.model().faults = super::model::Faults {
+            refused: refused.iter().map(|r| r.address).collect(),
+            stop_fails,
+            ..faults
+        };
+        let error = camera.close().unwrap_err().to_string();
+        assert!(error.contains(first), "{first}: {error}");
+        for power in [r::EN_VDDA, r::EN_VDDC, r::EN_VDDD, r::TD_RSTN] {
+            assert_eq!(bench.model().get(power), 0, "{first}: {power:?}");
+        }
+        assert!(bench.trace().contains("clear halt"), "{first}");
+    }
+}
+
+#[test]
 fn a_start_that_fails_is_taken_back_with_the_noise_filter_as_set() {
     let bench = Bench::new();
     let mut camera = bench.open().unwrap();
