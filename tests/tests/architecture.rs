@@ -5,6 +5,7 @@
 )]
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
 use std::process::Command;
 
 use serde_json::Value;
@@ -112,6 +113,116 @@ const LICENCE_BY_TEXT: &[(&str, &str)] = &[
     ("neuromorphic-drivers", "MIT"),
     ("neuromorphic-types", "MIT"),
 ];
+
+/// The files that may hold `unsafe` code, all at the border to foreign functions or to memory shared with another process.
+const UNSAFE_HOMES: &[&str] = &[
+    // The vendor's robot library: its functions' types, loading it, calling it.
+    "crates/drivers/drd_abi/src/functions.rs",
+    "crates/drivers/drd_abi/src/version.rs",
+    "crates/drivers/drd_abi/tests/table.rs",
+    "crates/drivers/omega3/src/library.rs",
+    "crates/drivers/omega3/src/load.rs",
+    // libusb's asynchronous transfers.
+    "crates/drivers/evk1/src/usb/transfers.rs",
+    // The stand-in for the robot library: what it exports, and the page that it shares with its firmware.
+    "hil/emulated/libdrd/src/entry.rs",
+    "hil/emulated/libdrd/src/exports/device.rs",
+    "hil/emulated/libdrd/src/exports/library.rs",
+    "hil/emulated/libdrd/src/exports/mod.rs",
+    "hil/emulated/libdrd/src/exports/reading.rs",
+    "hil/emulated/libdrd/src/exports/regulation.rs",
+    "hil/emulated/libdrd/src/exports/settings.rs",
+    "hil/emulated/libdrd/src/host.rs",
+    "hil/emulated/libdrd/src/journal.rs",
+    "hil/emulated/libdrd/src/page.rs",
+    "hil/emulated/libdrd/src/time.rs",
+    "hil/emulated/libdrd/tests/arm/faults.rs",
+    "hil/emulated/libdrd/tests/arm/host_death.rs",
+    "hil/emulated/libdrd/tests/arm/motion.rs",
+    "hil/emulated/libdrd/tests/arm/procedure.rs",
+    "hil/emulated/libdrd/tests/arm/processes.rs",
+    "hil/emulated/libdrd/tests/arm/strictness.rs",
+    "hil/emulated/libdrd/tests/arm/support.rs",
+    // The stand-in for the USB bus: functions of the C library, interposed.
+    "hil/emulated/usbshim/src/interpose.rs",
+    "hil/emulated/usbshim/src/wire.rs",
+];
+
+/// A line without its comment and without what is quoted in it.
+fn code(line: &str) -> String {
+    let line = line.split("//").next().unwrap_or_default();
+    line.split('"').step_by(2).collect()
+}
+
+/// What of `source` stands against the rule that each `unsafe` block or implementation follows its reason.
+fn without_reason(source: &str) -> Vec<usize> {
+    let lines: Vec<&str> = source.lines().collect();
+    let needs_reason = |line: &str| {
+        let words = code(line);
+        words.contains("unsafe {") || words.contains("unsafe impl ")
+    };
+    let reason_above = |at: usize| {
+        // A statement may begin some lines above its block.
+        let above = lines[at.saturating_sub(12)..at].iter().rev();
+        let mut near = above.take_while(|l| !l.trim().is_empty() && !l.contains("unsafe {"));
+        lines[at].contains("SAFETY:") || near.any(|l| l.trim().starts_with("// SAFETY:"))
+    };
+    (0..lines.len())
+        .filter(|&at| needs_reason(lines[at]) && !reason_above(at))
+        .map(|at| at + 1)
+        .collect()
+}
+
+/// Rust files under `folder`, by their path from the workspace's root.
+fn rust_files(folder: &Path, root: &Path, to: &mut Vec<(String, String)>) {
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() && !path.ends_with("target") {
+            rust_files(&path, root, to);
+        } else if path.extension().is_some_and(|e| e == "rs") {
+            let name = path.strip_prefix(root).unwrap().display().to_string();
+            to.push((name, std::fs::read_to_string(&path).unwrap()));
+        }
+    }
+}
+
+#[test]
+fn unsafe_code_lives_at_named_borders_and_gives_its_reason() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
+    let mut files = Vec::new();
+    for folder in ["crates", "hil", "tests", "benches"] {
+        rust_files(&root.join(folder), root, &mut files);
+    }
+    let mut faults = Vec::new();
+    for (name, source) in &files {
+        let home = UNSAFE_HOMES.contains(&name.as_str());
+        let unsafe_word = |line: &str| {
+            let code = code(line);
+            let mut words = code.split(|c: char| !c.is_alphanumeric() && c != '_');
+            words.any(|w| w == "unsafe")
+        };
+        let uses = source.lines().any(unsafe_word);
+        match (home, uses) {
+            (false, true) => faults.push(format!("{name}: unsafe code, and no home of it")),
+            (true, false) => faults.push(format!("{name}: a home of unsafe code without any")),
+            _ => {}
+        }
+        for line in without_reason(source) {
+            faults.push(format!("{name}:{line}: unsafe without a SAFETY comment"));
+        }
+    }
+    for home in UNSAFE_HOMES {
+        if !files.iter().any(|(name, _)| name == home) {
+            faults.push(format!("{home}: is not there"));
+        }
+    }
+    assert!(faults.is_empty(), "{}", faults.join("\n"));
+    let block = ["fn f() {", "    unsafe", " { g() }", "}"];
+    let bare = format!("{}\n{}{}\n{}", block[0], block[1], block[2], block[3]);
+    assert_eq!(without_reason(&bare), [2]);
+    let with = bare.replacen("    ", "    // SAFETY: g asks for nothing.\n    ", 1);
+    assert!(without_reason(&with).is_empty());
+}
 
 fn metadata() -> Value {
     let output = Command::new(env!("CARGO"))
