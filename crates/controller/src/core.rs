@@ -99,7 +99,8 @@ impl<'a> Core<'a> {
             resume: None,
             retaken: 0,
             robot_from_skin,
-            indenter: GuardedIndenter::new(indenter, robot_from_skin, plan.limits, &settings),
+            indenter: GuardedIndenter::new(indenter, robot_from_skin, plan.limits, &settings)
+                .within(plan.surroundings.clone()),
             cameras,
             camera_settings,
             trigger_box,

@@ -55,6 +55,28 @@ pub enum GuardError {
         /// The lower end of the motion, mm.
         height_mm: f64,
     },
+    /// A target below clearance height beside the skin.
+    #[error(
+        "expected a target inside the skin's outline below clearance height, found one {outside_mm:.3} mm outside at {height_mm:.3} mm"
+    )]
+    Outline {
+        /// How far outside, at least, mm.
+        outside_mm: f64,
+        /// Its height, mm.
+        height_mm: f64,
+    },
+    /// The straight way to the target leads too close to something.
+    #[error(
+        "expected a straight way more than {margin_mm} mm from `{name}`, found {found_mm:.3} mm"
+    )]
+    KeepOut {
+        /// What stands there.
+        name: String,
+        /// mm.
+        margin_mm: f64,
+        /// mm.
+        found_mm: f64,
+    },
     /// The robot's position is not known well enough to move.
     #[error("expected a pose sample no older than {limit}, found {found}")]
     StalePose {

@@ -7,6 +7,7 @@ use skinrig_model::{
     DeviceIdentity, HostDuration, HostTime, Point3, PoseSample, RigidTransform, Robot, Setting,
     Skin,
 };
+use skinrig_protocol::area::Surroundings;
 use skinrig_protocol::plan::{OnTrip, RunLimits};
 
 use crate::error::{ControllerError, GuardError};
@@ -20,6 +21,7 @@ pub struct GuardedIndenter {
     robot_from_skin: RigidTransform<Robot, Skin>,
     skin_from_robot: RigidTransform<Skin, Robot>,
     limits: RunLimits,
+    surroundings: Option<Surroundings>,
     stale_after: HostDuration,
     armed: bool,
     watchdog: Watchdog,
@@ -43,6 +45,7 @@ impl GuardedIndenter {
             robot_from_skin,
             skin_from_robot: robot_from_skin.inverse(),
             limits,
+            surroundings: None,
             stale_after,
             armed: false,
             watchdog: Watchdog::new(WatchLimits::of(&limits, stale_after, late_after)),
@@ -50,6 +53,13 @@ impl GuardedIndenter {
             target: None,
             samples: Vec::new(),
         }
+    }
+
+    /// With these surroundings: below clearance height only inside the outline, and nowhere too close to a keep-out.
+    #[must_use]
+    pub fn within(mut self, surroundings: Option<Surroundings>) -> Self {
+        self.surroundings = surroundings;
+        self
     }
 
     /// Who the robot is.
@@ -195,6 +205,39 @@ impl GuardedIndenter {
                 lateral_mm,
                 height_mm,
             });
+        }
+        if rises {
+            return Ok(()); // away from everything, wherever it was
+        }
+        self.check_surroundings(last.measured, target)
+    }
+
+    fn check_surroundings(
+        &self,
+        from: Point3<Skin>,
+        target: Point3<Skin>,
+    ) -> Result<(), GuardError> {
+        let Some(around) = &self.surroundings else {
+            return Ok(());
+        };
+        let slack_mm = self.limits.position_tolerance_mm;
+        let inside_mm = around.outline.clearance_mm(target.plane());
+        if target.z_mm < self.clear_height_mm() && inside_mm < -slack_mm {
+            return Err(GuardError::Outline {
+                outside_mm: -inside_mm,
+                height_mm: target.z_mm,
+            });
+        }
+        let lowest_mm = from.z_mm.min(target.z_mm);
+        for keep_out in &around.keep_outs {
+            let (a, b) = (from.plane(), target.plane());
+            if let Some(found_mm) = keep_out.too_close_mm(a, b, lowest_mm, slack_mm) {
+                return Err(GuardError::KeepOut {
+                    name: keep_out.name.clone(),
+                    margin_mm: keep_out.margin_mm,
+                    found_mm,
+                });
+            }
         }
         Ok(())
     }

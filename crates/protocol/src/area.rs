@@ -1,10 +1,10 @@
 //! The skin's surroundings: outline, margin and keep-out areas, and distances to them.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use skinrig_model::{Point2, SkinOutline};
 
 /// The skin's outline and what must not be touched.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Surroundings {
     /// The skin's outline.
     pub outline: SkinOutline,
@@ -27,7 +27,7 @@ impl Surroundings {
 }
 
 /// An area that the tip must not enter.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct KeepOut {
     /// What stands there.
     pub name: String,
@@ -39,8 +39,23 @@ pub struct KeepOut {
     pub height_mm: Option<f64>,
 }
 
+impl KeepOut {
+    /// How far from the area a motion from `a` to `b` stays whose lowest point is at `lowest_mm`, when that is too close:
+    /// not more than the margin, and not above the height. `slack_mm` is taken off both.
+    #[must_use]
+    pub fn too_close_mm(&self, a: Point2, b: Point2, lowest_mm: f64, slack_mm: f64) -> Option<f64> {
+        let passes = |h: f64| lowest_mm >= h + self.margin_mm - slack_mm;
+        if self.height_mm.is_some_and(passes) {
+            return None;
+        }
+        let distance_mm = self.area.distance_mm(a, b);
+        let least_mm = (self.margin_mm - slack_mm).max(0.0);
+        (distance_mm.is_nan() || distance_mm <= least_mm).then_some(distance_mm)
+    }
+}
+
 /// A shape in the skin's plane, mm.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Area {
     /// A circle.

@@ -326,14 +326,7 @@ impl Checker<'_> {
         key: &'static str,
     ) {
         for keep_out in &self.around.keep_outs {
-            if keep_out
-                .height_mm
-                .is_some_and(|h| height_mm >= h + keep_out.margin_mm)
-            {
-                continue;
-            }
-            let distance = keep_out.area.distance_mm(a, b);
-            if distance <= keep_out.margin_mm {
+            if let Some(distance) = keep_out.too_close_mm(a, b, height_mm, 0.0) {
                 self.add(
                     segment,
                     &format!("comes too close to `{}`", keep_out.name),

@@ -91,6 +91,7 @@ pub(crate) fn compile(protocol: &Protocol) -> Plan {
         name: protocol.name.clone(),
         seed: protocol.seed,
         limits: protocol.limits,
+        surroundings: Some(protocol.surroundings.clone()),
         retakes: protocol.retakes,
         presses: writer.presses,
         steps: writer.steps,

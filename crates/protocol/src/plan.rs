@@ -6,6 +6,7 @@
 use serde::{Deserialize, Serialize};
 use skinrig_model::{HostDuration, MarkKind, PlannedPress, Point2, Point3, PressId, Skin};
 
+use crate::area::Surroundings;
 use crate::retakes::Retakes;
 use crate::surface::Surface;
 
@@ -20,6 +21,9 @@ pub struct Plan {
     pub seed: u64,
     /// Limits that hold for the whole run.
     pub limits: RunLimits,
+    /// Where the skin lies and what must not be touched; nothing is known of it when absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub surroundings: Option<Surroundings>,
     /// How often a press may be taken again. Not written when it is the default.
     #[serde(default, skip_serializing_if = "Retakes::is_default")]
     pub retakes: Retakes,

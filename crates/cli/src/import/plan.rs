@@ -62,6 +62,7 @@ pub fn compile(schedule: &Schedule, presses: Vec<PlannedPress>, times: &[HostTim
             max_acceleration_mm_s2: None,
             on_trip: OnTrip::Retract,
         },
+        surroundings: None,
         retakes: Retakes::NONE,
         presses,
         steps,

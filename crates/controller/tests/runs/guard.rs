@@ -2,7 +2,8 @@
 
 use proptest::prelude::*;
 use skinrig_controller::{ControllerError, ControllerSettings, GuardError, GuardedIndenter};
-use skinrig_model::{HostTime, Point3};
+use skinrig_model::{HostTime, Point2, Point3, SkinOutline};
+use skinrig_protocol::area::{Area, KeepOut, Surroundings};
 
 use crate::mock::*;
 
@@ -16,6 +17,39 @@ enum Act {
     Hold,
     Arm,
     Disarm,
+}
+
+/// A post of 4 mm about (30, 0), 10 mm high, beside which 1 mm stay free.
+fn around() -> Surroundings {
+    Surroundings {
+        keep_outs: vec![KeepOut {
+            name: "post".into(),
+            area: Area::Circle {
+                centre: Point2::new(30.0, 0.0),
+                radius_mm: 4.0,
+            },
+            margin_mm: 1.0,
+            height_mm: Some(10.0),
+        }],
+        ..Surroundings::of(SkinOutline::PAPER)
+    }
+}
+
+/// What the surroundings allow, in words of its own: by points on the way.
+fn allows(from: [f64; 3], to: [f64; 3]) -> bool {
+    let sideways = (from[0] - to[0]).hypot(from[1] - to[1]);
+    if sideways <= 0.05 && to[2] >= from[2] {
+        return true;
+    }
+    if to[2] < 4.95 && SkinOutline::PAPER.clearance_mm(Point2::new(to[0], to[1])) < -0.05 {
+        return false;
+    }
+    let free = (0..=4000).all(|i| {
+        let s = f64::from(i) / 4000.0;
+        let at = |k: usize| from[k] + s * (to[k] - from[k]);
+        (at(0) - 30.0).hypot(at(1)) > 4.95
+    });
+    free || from[2].min(to[2]) >= 10.95
 }
 
 fn number(low: f64, high: f64) -> impl Strategy<Value = f64> {
@@ -48,7 +82,7 @@ proptest! {
         let world = World::shared(Faults::default(), [0.0, 0.0, 10.0]);
         let mut guard = GuardedIndenter::new(
             Box::new(MockIndenter(world.clone())), robot_from_skin(), LIMITS, &ControllerSettings::default(),
-        );
+        ).within(Some(around()));
         let mut poses = Vec::new();
         guard.arm().map_err(|e| TestCaseError::fail(e.to_string()))?;
         for act in acts {
@@ -75,7 +109,8 @@ proptest! {
                         && speed > 0.0 && speed <= 100.0
                         && (-40.0..=60.0).contains(&x) && (-50.0..=55.0).contains(&y)
                         && (-3.0..=40.0).contains(&z)
-                        && fresh && guard.is_armed() && !sideways;
+                        && fresh && guard.is_armed() && !sideways
+                        && last.is_none_or(|p| allows(p.measured.to_array(), [x, y, z]));
                     prop_assert_eq!(answer.is_ok(), allowed, "{:?} at {} -> {:?}", target, speed, answer);
                     prop_assert_eq!(w.commands.len() - heard, usize::from(allowed));
                 }

@@ -8,6 +8,7 @@ use skinrig_device::{
     IndenterCapabilities, MotionLimits, Rig, RobotSample, TriggerBox, TriggerCapabilities,
 };
 use skinrig_model::*;
+use skinrig_protocol::area::Surroundings;
 use skinrig_protocol::plan::{OnTrip, Plan, PressStep, RunLimits, Step};
 use skinrig_protocol::{Retakes, Surface};
 
@@ -592,6 +593,7 @@ pub fn plan() -> Plan {
         name: "mock".into(),
         seed: 1,
         limits: LIMITS,
+        surroundings: Some(Surroundings::of(SkinOutline::PAPER)),
         retakes: Retakes::NONE,
         presses,
         steps,
