@@ -45,11 +45,12 @@ impl Core<'_> {
         }
         let can = self.indenter.capabilities();
         let touches = |s: &Step| matches!(s, Step::Press(p) if !p.surface.is_known());
-        if !can.reports_force && self.plan.steps.iter().any(touches) {
+        let touches = self.plan.surface_check.is_some() || self.plan.steps.iter().any(touches);
+        if !can.reports_force && touches {
             return Err(rig_error(
                 "indenter",
                 "forces, because the plan finds the surface by touch",
-                "a robot without; write `press: {surface: known}`",
+                "a robot without; write `press: {surface: known}` and no `surface_check`",
             )
             .into());
         }

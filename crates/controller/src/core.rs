@@ -13,6 +13,7 @@ use crate::checks::{Preflight, Watch};
 use crate::control::{ControlHandle, Request};
 use crate::error::{ControllerError, Halt};
 use crate::guard::GuardedIndenter;
+use crate::invalid_run::InvalidRun;
 use crate::journal::Journal;
 use crate::moments::{PressTracker, Settling};
 use crate::run::{Resume, RunReport};
@@ -25,7 +26,6 @@ use crate::touch::TouchDetector;
 pub(crate) struct OpenPress {
     pub(crate) attempt: AttemptId,
     pub(crate) tracker: Option<PressTracker>,
-    pub(crate) touch: Option<TouchDetector>,
     pub(crate) marks: Vec<MarkKind>,
     pub(crate) lost: [u64; 2],
     pub(crate) bytes: [u64; 2],
@@ -54,6 +54,9 @@ pub(crate) struct Core<'a> {
     pub(crate) begin: HostTime,
     pub(crate) open: Option<OpenPress>,
     pub(crate) settling: Option<Settling>,
+    /// The search for the surface under way.
+    pub(crate) touch: Option<TouchDetector>,
+    pub(crate) invalid_run: InvalidRun,
     /// What to check before arming; nothing when absent.
     pub(crate) preflight: Option<Preflight>,
     pub(crate) checks: Vec<PreflightCheck>,
@@ -112,6 +115,8 @@ impl<'a> Core<'a> {
             begin: HostTime::ZERO,
             open: None,
             settling: None,
+            touch: None,
+            invalid_run: InvalidRun::new(plan.max_consecutive_invalid),
             preflight: None,
             checks: Vec::new(),
             watch: None,
@@ -214,7 +219,7 @@ impl<'a> Core<'a> {
             if let Some(tracker) = self.open.as_mut().and_then(|o| o.tracker.as_mut()) {
                 tracker.feed(sample);
             }
-            if let Some(touch) = self.open.as_mut().and_then(|o| o.touch.as_mut()) {
+            if let Some(touch) = &mut self.touch {
                 touch.feed(sample);
             }
             if let Some(settling) = &mut self.settling {

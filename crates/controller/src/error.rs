@@ -128,6 +128,22 @@ pub enum ControllerError {
         /// What there is.
         found: String,
     },
+    /// The surface of the skin is not where the frame says; no press was made on it since.
+    #[error("surface check: {}; {next}", .failed.join("; "))]
+    Surface {
+        /// Each point that failed: place, expected, found. Not empty.
+        failed: Vec<String>,
+        /// What to do.
+        next: &'static str,
+    },
+    /// Presses went wrong one after the other.
+    #[error("invalid presses: expected fewer than {limit} in a row (`limits.max_consecutive_invalid`), found {limit}: {}", .reasons.join("; "))]
+    InvalidInARow {
+        /// So many are too many.
+        limit: u32,
+        /// Why, each reason once. Not empty.
+        reasons: Vec<String>,
+    },
     /// A check before the run failed; nothing was powered.
     #[error("preflight: {} failed: {}", count(.failed), .failed.join("; "))]
     Preflight {

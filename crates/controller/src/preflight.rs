@@ -1,9 +1,9 @@
 //! What must fit together before anything is armed: plan, header and rig.
 
 use skinrig_device::{IndenterCapabilities, MotionLimits};
-use skinrig_model::{Point3, PressHistory, RigidTransform, Robot, RunHeader, Skin};
-use skinrig_protocol::Surface;
+use skinrig_model::{Point2, Point3, PressHistory, RigidTransform, Robot, RunHeader, Skin};
 use skinrig_protocol::plan::{Plan, PressStep, Step};
+use skinrig_protocol::{Surface, TouchSearch};
 
 use crate::error::ControllerError;
 use crate::guard::check_target;
@@ -122,7 +122,9 @@ pub(crate) fn check_plan(
                 for z_mm in [limits.clearance_mm, 0.0, -press.depth_mm] {
                     check_point(plan, &name, press.at.at_height(z_mm))?;
                 }
-                check_search(plan, &name, press)?;
+                if let Surface::Touch(search) = &press.surface {
+                    check_search(plan, &name, press.at, search)?;
+                }
                 let planned = &plan.presses[press.press.0 as usize];
                 if planned.at != press.at || planned.depth_mm != press.depth_mm {
                     return Err(plan_error(
@@ -143,6 +145,20 @@ pub(crate) fn check_plan(
             }
         }
     }
+    if let Some(check) = &plan.surface_check {
+        for at in &check.points {
+            check_point(plan, "surface_check", at.at_height(limits.clearance_mm))?;
+            check_search(plan, "surface_check", *at, &check.search)?;
+        }
+        let (tolerance_mm, band_mm) = (check.tolerance_mm, check.search.band_mm);
+        if check.points.is_empty() || !(tolerance_mm > 0.0 && tolerance_mm < band_mm) {
+            return Err(plan_error(
+                "surface_check",
+                format!("points, and a tolerance above 0 and below {band_mm} mm"),
+                format!("{} points, {tolerance_mm} mm", check.points.len()),
+            ));
+        }
+    }
     if let Some(i) = (0..seen.len()).find(|i| seen[*i] != wanted[*i]) {
         let step = |there: bool| if there { "a step" } else { "no step" };
         return Err(plan_error(
@@ -155,13 +171,15 @@ pub(crate) fn check_plan(
 }
 
 /// The search for the surface stays between clearance height and floor, and can be told from free air.
-fn check_search(plan: &Plan, place: &str, press: &PressStep) -> Result<(), ControllerError> {
-    let Surface::Touch(search) = press.surface else {
-        return Ok(());
-    };
+fn check_search(
+    plan: &Plan,
+    place: &str,
+    at: Point2,
+    search: &TouchSearch,
+) -> Result<(), ControllerError> {
     let limits = &plan.limits;
     check_speed(plan, place, search.speed_mm_s)?;
-    check_point(plan, place, press.at.at_height(-search.band_mm))?;
+    check_point(plan, place, at.at_height(-search.band_mm))?;
     let highest_mm = limits.clearance_mm - limits.position_tolerance_mm;
     let sound = search.band_mm > 0.0
         && search.band_mm < highest_mm
@@ -274,20 +292,9 @@ fn check_reach(
     robot_from_skin: &RigidTransform<Robot, Skin>,
     limits: &MotionLimits,
 ) -> Result<(), ControllerError> {
-    let reach = |n: usize, target: Point3<Skin>, speed: f64| {
-        let p = robot_from_skin.apply(target).to_array();
-        let inside = (0..3).all(|i| (limits.min_mm[i]..=limits.max_mm[i]).contains(&p[i]));
-        if inside && speed <= limits.max_speed_mm_s {
-            return Ok(());
-        }
-        Err(ControllerError::Rig {
-            place: format!("indenter, step {n} of the plan"),
-            expected: format!(
-                "a target from {:?} to {:?} mm (robot frame) and at most {} mm/s",
-                limits.min_mm, limits.max_mm, limits.max_speed_mm_s
-            ),
-            found: format!("{p:?} mm at {speed} mm/s"),
-        })
+    let reach = |n: usize, target: Point3<Skin>, speed_mm_s: f64| {
+        let place = format!("indenter, step {n} of the plan");
+        within(limits, robot_from_skin, place, target, speed_mm_s)
     };
     for (n, step) in plan.steps.iter().enumerate() {
         match step {
@@ -299,10 +306,59 @@ fn check_reach(
                     p.retract_speed_mm_s,
                 )?;
                 reach(n, p.at.at_height(0.0), p.approach_speed_mm_s)?;
-                reach(n, p.at.at_height(-p.depth_mm), p.indent_speed_mm_s)?;
+                reach(n, p.at.at_height(-deepest_mm(plan, p)), p.indent_speed_mm_s)?;
+                if let Surface::Touch(search) = p.surface {
+                    reach(n, p.at.at_height(-search.band_mm), search.speed_mm_s)?;
+                }
             }
             Step::Begin { .. } | Step::Pause { .. } => {}
         }
     }
+    if let Some(check) = &plan.surface_check {
+        for (i, at) in check.points.iter().enumerate() {
+            for z_mm in [plan.limits.clearance_mm, -check.search.band_mm] {
+                let place = format!("indenter, point {} of `surface_check`", i + 1);
+                within(
+                    limits,
+                    robot_from_skin,
+                    place,
+                    at.at_height(z_mm),
+                    check.search.speed_mm_s,
+                )?;
+            }
+        }
+    }
     Ok(())
+}
+
+/// How deep below the frame's surface a press may go, mm: with a surface that is found, as deep as the lowest surface
+/// that is believed and the floor allow.
+fn deepest_mm(plan: &Plan, press: &PressStep) -> f64 {
+    match press.surface {
+        Surface::Known => press.depth_mm,
+        Surface::Touch(search) => (press.depth_mm + search.band_mm).min(plan.limits.max_depth_mm),
+    }
+}
+
+/// A target and speed that the robot will accept.
+fn within(
+    limits: &MotionLimits,
+    robot_from_skin: &RigidTransform<Robot, Skin>,
+    place: String,
+    target: Point3<Skin>,
+    speed_mm_s: f64,
+) -> Result<(), ControllerError> {
+    let p = robot_from_skin.apply(target).to_array();
+    let inside = (0..3).all(|i| (limits.min_mm[i]..=limits.max_mm[i]).contains(&p[i]));
+    if inside && speed_mm_s <= limits.max_speed_mm_s {
+        return Ok(());
+    }
+    Err(ControllerError::Rig {
+        place,
+        expected: format!(
+            "a target from {:?} to {:?} mm (robot frame) and at most {} mm/s",
+            limits.min_mm, limits.max_mm, limits.max_speed_mm_s
+        ),
+        found: format!("{p:?} mm at {speed_mm_s} mm/s"),
+    })
 }

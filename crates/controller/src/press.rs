@@ -6,7 +6,9 @@ use skinrig_protocol::plan::PressStep;
 
 use crate::core::{Collect, Core, OpenPress};
 use crate::error::{ControllerError, Halt};
+use crate::invalid_run::PAUSED;
 use crate::moments::PressTracker;
+use crate::touch::Probe;
 use crate::verdict::{Trouble, judge};
 
 impl Core<'_> {
@@ -28,7 +30,7 @@ impl Core<'_> {
         }
         // What the retakes took does not shorten the time up to the next press.
         self.begin += self.now() - first_ended;
-        Ok(())
+        Ok(self.invalid_run.press_ended()?)
     }
 
     /// One attempt at a press. Gives whether it is worth another one.
@@ -39,11 +41,11 @@ impl Core<'_> {
         self.open = Some(OpenPress {
             attempt,
             tracker: None,
-            touch: None,
             marks: step.marks.clone(),
             lost: [0; 2],
             bytes: [0; 2],
         });
+        self.touch = None;
         // A durable intent may have taken a while: know the present pose before moving.
         self.observe()?;
         let trouble = self.press_motion(step)?;
@@ -55,7 +57,7 @@ impl Core<'_> {
         let began = self.now();
         if let Surface::Touch(search) = step.surface {
             self.breakable = true;
-            let tared = self.tare(step, search);
+            let tared = self.tare(Probe::of(step), search);
             let tared = tared.map(|t| t.err().map(Trouble::stays));
             if let Some(trouble) = self.unless_paused(tared)? {
                 return Ok(Some(trouble)); // the tip never left clearance height
@@ -114,7 +116,7 @@ impl Core<'_> {
     ) -> Result<Option<Trouble>, Halt> {
         self.breakable = false;
         match part {
-            Err(Halt::PausedNow) => Ok(Some(Trouble::passing("paused by the operator".to_owned()))),
+            Err(Halt::PausedNow) => Ok(Some(Trouble::passing(PAUSED.to_owned()))),
             other => other,
         }
     }
@@ -134,13 +136,15 @@ impl Core<'_> {
         let surface_mm = match step.surface {
             Surface::Known if self.until(PressTracker::at_surface, deadline)? => 0.0,
             Surface::Known => return Ok(late(self, "approach", 0.0)),
-            Surface::Touch(search) => match self.find_surface(step, search, down, deadline)? {
-                Ok(found) => {
-                    self.with_tracker(|t| t.touched(&found));
-                    found.measured.z_mm
+            Surface::Touch(search) => {
+                match self.find_surface(Probe::of(step), search, down, deadline)? {
+                    Ok(found) => {
+                        self.with_tracker(|t| t.touched(&found));
+                        found.measured.z_mm
+                    }
+                    Err(trouble) => return Ok(Some(Trouble::stays(trouble))),
                 }
-                Err(trouble) => return Ok(Some(Trouble::stays(trouble))),
-            },
+            }
         };
         let bottom_mm = surface_mm - step.depth_mm;
         let depth = step.at.at_height(bottom_mm);
@@ -210,6 +214,7 @@ impl Core<'_> {
             return Ok(false);
         };
         let (outcome, again) = judge(open, trouble);
+        self.invalid_run.attempt(&outcome.verdict);
         self.journal.outcome(outcome)?;
         self.open = None;
         Ok(again)

@@ -14,6 +14,8 @@ impl Core<'_> {
         self.begin = self.now();
         self.safe_point()?;
         self.rise_first()?;
+        self.check_surface("before the first press")?;
+        self.begin = self.now();
         let plan = self.plan;
         for (n, step) in plan.steps.iter().enumerate() {
             let paused = self.safe_point()?;
@@ -29,7 +31,10 @@ impl Core<'_> {
                     speed_mm_s,
                     deadline,
                 } => self.go(&format!("travel (step {n})"), *to, *speed_mm_s, *deadline)?,
-                Step::Press(press) => self.press(press)?,
+                Step::Press(press) => {
+                    self.press(press)?;
+                    self.check_surface_after(n)?;
+                }
             }
         }
         // A stop or pause that came during the last step finds nothing left to hold back.

@@ -1,6 +1,6 @@
 //! Finding the surface: the force in free air is averaged, then the tip goes down slowly until the force rises.
 
-use skinrig_model::{HostTime, PoseSample};
+use skinrig_model::{HostDuration, HostTime, Point2, PoseSample};
 use skinrig_protocol::TouchSearch;
 use skinrig_protocol::plan::PressStep;
 
@@ -96,6 +96,30 @@ impl TouchDetector {
     }
 }
 
+/// One search for the surface.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Probe {
+    /// Where.
+    pub(crate) at: Point2,
+    /// How deep below the surface the tip goes afterwards, mm.
+    pub(crate) depth_mm: f64,
+    /// Speed down to the band, mm/s.
+    pub(crate) approach_speed_mm_s: f64,
+    /// The time given, for messages.
+    pub(crate) within: HostDuration,
+}
+
+impl Probe {
+    pub(crate) const fn of(step: &PressStep) -> Self {
+        Self {
+            at: step.at,
+            depth_mm: step.depth_mm,
+            approach_speed_mm_s: step.approach_speed_mm_s,
+            within: step.deadline,
+        }
+    }
+}
+
 /// Where the surface is, or why the press cannot go on.
 pub(crate) type Found = Result<PoseSample, String>;
 
@@ -103,13 +127,13 @@ impl Core<'_> {
     /// Averages the force at clearance height, which the tip does not leave.
     pub(crate) fn tare(
         &mut self,
-        step: &PressStep,
+        step: Probe,
         search: TouchSearch,
     ) -> Result<Result<(), String>, Halt> {
         let place = step.at.at_height(self.plan.limits.clearance_mm);
         // The command gives the tare its instant in the journal, and the tip its place.
         let from = self.command(place, step.approach_speed_mm_s)?;
-        self.with_open(|open| open.touch = Some(TouchDetector::new(search, from)));
+        self.touch = Some(TouchDetector::new(search, from));
         let deadline = from + search.tare + self.settings.first_pose_within;
         let done = self.until_touch(deadline, |t| t.is_blind() || t.tare_n().is_some())?;
         Ok(match self.touch() {
@@ -126,7 +150,7 @@ impl Core<'_> {
     /// to the band was commanded at `down`.
     pub(crate) fn find_surface(
         &mut self,
-        step: &PressStep,
+        step: Probe,
         search: TouchSearch,
         down: HostTime,
         deadline: HostTime,
@@ -141,22 +165,18 @@ impl Core<'_> {
         {
             if self.now() >= deadline {
                 self.settling = None;
-                let late = self.not_arrived("approach", above, step.deadline);
+                let late = self.not_arrived("approach", above, step.within);
                 return Ok(Err(late.to_string()));
             }
             self.tick(Some(deadline))?;
         }
         self.settling = None;
         let t = self.command(step.at.at_height(-search.band_mm), search.speed_mm_s)?;
-        self.with_open(|open| {
-            if let Some(touch) = &mut open.touch {
-                touch.search_from(t);
-            }
-        });
+        if let Some(touch) = &mut self.touch {
+            touch.search_from(t);
+        }
         let way_s = 2.0 * search.band_mm / search.speed_mm_s;
-        let until = t
-            + skinrig_model::HostDuration::from_secs_f64(2.0 * way_s)
-            + self.settings.rise_allowance;
+        let until = t + HostDuration::from_secs_f64(2.0 * way_s) + self.settings.rise_allowance;
         let floor_mm = -search.band_mm + self.plan.limits.position_tolerance_mm;
         let low = |core: &Self| {
             let at = core.indenter.position();
@@ -183,7 +203,7 @@ impl Core<'_> {
     }
 
     /// A touch inside the band from which the floor is not in the way.
-    fn believe(&self, found: PoseSample, step: &PressStep, search: TouchSearch) -> Found {
+    fn believe(&self, found: PoseSample, step: Probe, search: TouchSearch) -> Found {
         let limits = &self.plan.limits;
         let height_mm = found.measured.z_mm;
         let highest_mm = search.band_mm - limits.position_tolerance_mm;
@@ -204,7 +224,7 @@ impl Core<'_> {
     }
 
     fn touch(&self) -> Option<&TouchDetector> {
-        self.open.as_ref().and_then(|o| o.touch.as_ref())
+        self.touch.as_ref()
     }
 
     /// Ticks until the detector says so; false when `deadline` came first.
@@ -226,7 +246,7 @@ impl Core<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use skinrig_model::{HostDuration, Point3};
+    use skinrig_model::Point3;
 
     const SEARCH: TouchSearch = TouchSearch {
         threshold_n: 0.2,

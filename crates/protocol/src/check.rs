@@ -7,7 +7,7 @@ use skinrig_model::{HostDuration, Point2, Point3, PressId, Skin};
 
 use crate::area::Surroundings;
 use crate::plan::{Plan, PressStep, Step};
-use crate::surface::Surface;
+use crate::surface::{Surface, TouchSearch};
 use crate::timing;
 
 /// A segment of motion that must not be made.
@@ -92,6 +92,7 @@ pub fn check(plan: &Plan, around: &Surroundings, home: Option<Point3<Skin>>) -> 
         press: None,
     };
     checker.limits();
+    checker.surface_check(home);
     let mut position = home;
     for (index, step) in plan.steps.iter().enumerate() {
         checker.step = index;
@@ -343,10 +344,7 @@ impl Checker<'_> {
     }
 
     /// The search for the surface stays below clearance height, in the workspace and above the floor.
-    fn surface(&mut self, press: &PressStep) {
-        let Surface::Touch(search) = press.surface else {
-            return;
-        };
+    fn search(&mut self, at: Point2, search: &TouchSearch) {
         let limits = self.plan.limits;
         let room = limits
             .max_depth_mm
@@ -362,7 +360,7 @@ impl Checker<'_> {
             );
             self.by(band - room);
         }
-        self.workspace(Segment::Approach, press.at.at_height(-band), "press.band");
+        self.workspace(Segment::Approach, at.at_height(-band), "press.band");
         self.speed(Segment::Approach, search.speed_mm_s, "press.speed");
         if !(search.threshold_n > 0.0 && search.threshold_n < limits.max_force_n) {
             self.add(
@@ -372,6 +370,45 @@ impl Checker<'_> {
                 format!("{} N", search.threshold_n),
                 "press.threshold",
             );
+        }
+    }
+
+    /// The place lies within the outline, its margin kept.
+    fn on_skin(&mut self, at: Point2, key: &'static str) {
+        let inside = self.around.outline.clearance_mm(at);
+        let margin = self.around.margin_mm;
+        if inside.is_nan() || inside < margin - TINY_MM {
+            let found = if inside < 0.0 {
+                format!("({:.3}, {:.3}) mm, outside", at.x_mm, at.y_mm)
+            } else {
+                format!("({:.3}, {:.3}) mm, {inside:.3} mm inside", at.x_mm, at.y_mm)
+            };
+            self.add(
+                Segment::Press,
+                "not on the skin",
+                format!("at least {margin} mm inside the outline"),
+                found,
+                key,
+            );
+            self.by(margin - inside);
+        }
+    }
+
+    /// The points at which the surface is checked, and the ways between them.
+    fn surface_check(&mut self, home: Option<Point3<Skin>>) {
+        let Some(check) = &self.plan.surface_check else {
+            return;
+        };
+        const KEY: &str = "surface_check.points";
+        let clearance = self.plan.limits.clearance_mm;
+        let mut from = home.map(|p| p.plane());
+        for at in &check.points {
+            self.workspace(Segment::Travel, at.at_height(clearance), KEY);
+            self.keep_outs(Segment::Travel, from.unwrap_or(*at), *at, clearance, KEY);
+            self.on_skin(*at, KEY);
+            self.keep_outs(Segment::Press, *at, *at, -check.search.band_mm, KEY);
+            self.search(*at, &check.search);
+            from = Some(*at);
         }
     }
 
@@ -407,7 +444,9 @@ impl Checker<'_> {
         }
         self.workspace(Segment::Approach, above, key);
         self.workspace(Segment::Press, at.at_height(-press.depth_mm), key);
-        self.surface(press);
+        if let Surface::Touch(search) = &press.surface {
+            self.search(at, search);
+        }
         self.speed(
             Segment::Approach,
             press.approach_speed_mm_s,
@@ -426,23 +465,7 @@ impl Checker<'_> {
             );
             self.by(depth - limits.max_depth_mm);
         }
-        let inside = self.around.outline.clearance_mm(at);
-        let margin = self.around.margin_mm;
-        if inside.is_nan() || inside < margin - TINY_MM {
-            let found = if inside < 0.0 {
-                format!("({:.3}, {:.3}) mm, outside", at.x_mm, at.y_mm)
-            } else {
-                format!("({:.3}, {:.3}) mm, {inside:.3} mm inside", at.x_mm, at.y_mm)
-            };
-            self.add(
-                Segment::Press,
-                "not on the skin",
-                format!("at least {margin} mm inside the outline"),
-                found,
-                key,
-            );
-            self.by(margin - inside);
-        }
+        self.on_skin(at, key);
         self.keep_outs(Segment::Press, at, at, -depth, key);
         if press.hold.0 < 0 || press.start_after_begin.is_some_and(|s| s.0 < 0) {
             self.add(

@@ -10,6 +10,8 @@ use skinrig_model::{HostDuration, PlannedPress, Point2, Point3, PressId, PressRo
 
 use crate::plan::{Plan, PressStep, Step};
 use crate::protocol::Protocol;
+use crate::surface::Surface;
+use crate::surface_check::SurfaceCheck;
 use crate::timing;
 
 /// Version of the plan's layout.
@@ -93,6 +95,15 @@ pub(crate) fn compile(protocol: &Protocol) -> Plan {
         limits: protocol.limits,
         surroundings: Some(protocol.surroundings.clone()),
         retakes: protocol.retakes,
+        max_consecutive_invalid: protocol.max_consecutive_invalid,
+        surface_check: protocol.surface_check.clone().map(|check| SurfaceCheck {
+            // A rig file may say how to touch when the protocol does not.
+            search: match protocol.surface {
+                Some(Surface::Touch(search)) => search,
+                _ => check.search,
+            },
+            ..check
+        }),
         presses: writer.presses,
         steps: writer.steps,
     }

@@ -31,6 +31,7 @@ const KEYS: &[&str] = &[
     "press.speed",
     "press.threshold",
     "repetitions.between.pause",
+    "surface_check.points",
     "sync.at",
     "sync.depth",
 ];

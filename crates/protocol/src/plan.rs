@@ -9,6 +9,7 @@ use skinrig_model::{HostDuration, MarkKind, PlannedPress, Point2, Point3, PressI
 use crate::area::Surroundings;
 use crate::retakes::Retakes;
 use crate::surface::Surface;
+use crate::surface_check::SurfaceCheck;
 
 /// Everything a run does, in order.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -27,10 +28,28 @@ pub struct Plan {
     /// How often a press may be taken again. Not written when it is the default.
     #[serde(default, skip_serializing_if = "Retakes::is_default")]
     pub retakes: Retakes,
+    /// So many invalid presses in a row end the run; 0: no limit. Not written when it is the default.
+    #[serde(
+        default = "default_invalid_in_a_row",
+        skip_serializing_if = "is_default_invalid_in_a_row"
+    )]
+    pub max_consecutive_invalid: u32,
+    /// Where the surface is touched before the first press; `None`: nowhere.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub surface_check: Option<SurfaceCheck>,
     /// Every planned press; `presses[i].id == PressId(i)`.
     pub presses: Vec<PlannedPress>,
     /// What to do, in order.
     pub steps: Vec<Step>,
+}
+
+const fn default_invalid_in_a_row() -> u32 {
+    5
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde gives a reference")]
+const fn is_default_invalid_in_a_row(n: &u32) -> bool {
+    *n == default_invalid_in_a_row()
 }
 
 /// Limits that hold for the whole run, skin frame.

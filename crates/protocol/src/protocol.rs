@@ -13,6 +13,7 @@ use crate::diagnostic::Diagnostics;
 use crate::plan::{Plan, RunLimits};
 use crate::retakes::Retakes;
 use crate::surface::Surface;
+use crate::surface_check::SurfaceCheck;
 
 /// Reads a file that a protocol names. The path is the protocol's folder joined with the name in the protocol.
 pub type Loader<'a> = &'a dyn Fn(&Path) -> std::io::Result<Vec<u8>>;
@@ -64,6 +65,10 @@ pub struct Protocol {
     pub limits: RunLimits,
     /// How often a press may be taken again.
     pub retakes: Retakes,
+    /// So many invalid presses in a row end the run; 0: no limit.
+    pub max_consecutive_invalid: u32,
+    /// Where the surface is touched before the first press.
+    pub surface_check: Option<SurfaceCheck>,
     /// Moments that emit a mark on the trigger line.
     pub marks: Vec<MarkKind>,
     /// How presses find the surface; `None`: as the rig says, at z = 0 when it says nothing.

@@ -42,6 +42,19 @@ pub struct TouchSearch {
     pub tare: HostDuration,
 }
 
+/// The defaults of the keys of `press`.
+impl Default for TouchSearch {
+    fn default() -> Self {
+        Self {
+            threshold_n: 0.2,
+            samples: 5,
+            speed_mm_s: 2.0,
+            band_mm: 1.0,
+            tare: HostDuration::from_millis(300),
+        }
+    }
+}
+
 /// How the surface is found: keys of protocols and of rig files.
 pub(crate) static PRESS: Table = Table {
     name: "press",

@@ -64,6 +64,8 @@ pub fn compile(schedule: &Schedule, presses: Vec<PlannedPress>, times: &[HostTim
         },
         surroundings: None,
         retakes: Retakes::NONE,
+        max_consecutive_invalid: 0,
+        surface_check: None,
         presses,
         steps,
     }

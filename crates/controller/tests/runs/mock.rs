@@ -595,6 +595,8 @@ pub fn plan() -> Plan {
         limits: LIMITS,
         surroundings: Some(Surroundings::of(SkinOutline::PAPER)),
         retakes: Retakes::NONE,
+        max_consecutive_invalid: 0,
+        surface_check: None,
         presses,
         steps,
     }

@@ -3,7 +3,7 @@
 use skinrig_controller::{ControlHandle, execute};
 use skinrig_model::*;
 use skinrig_protocol::plan::{Plan, Step};
-use skinrig_protocol::{Surface, TouchSearch};
+use skinrig_protocol::{Surface, SurfaceCheck, TouchSearch};
 use skinrig_sim::config::SimConfig;
 use skinrig_sim::rig::simulated_rig;
 
@@ -125,4 +125,126 @@ fn a_search_that_makes_no_sense_never_moves() {
         assert!(matches!(end, RunEnd::Faulted(_)), "{end:?}");
         assert_eq!(outcomes.len(), 0);
     }
+}
+
+/// What the check of the surface told, with the skin `off_mm` above the frame's.
+fn checked(off_mm: f64, each_repetition: bool) -> (RunEnd, Vec<Record>) {
+    let mut plan = paced_plan();
+    plan.surface_check = Some(SurfaceCheck {
+        points: vec![Point2::new(9.0, 3.0), Point2::new(12.0, 2.0)],
+        tolerance_mm: 0.4,
+        each_repetition,
+        search: SEARCH,
+    });
+    let mut rig = simulated_rig(&SimConfig::new(5, SimLevel::Kinematic));
+    rig.robot_from_skin.translation_mm[2] -= off_mm;
+    let header = RunHeader {
+        robot_from_skin: rig.robot_from_skin,
+        ..header(&plan)
+    };
+    let mut sink = Sink::default();
+    let report = execute(&plan, header, rig, &ControlHandle::new(), &mut sink);
+    assert!(report.retracted && report.disarmed, "{report:?}");
+    (report.end, sink.records)
+}
+
+fn rows(records: &[Record]) -> Vec<&PreflightCheck> {
+    let surface = records.iter().filter_map(|r| match r {
+        Record::Preflight(rows) => Some(rows),
+        _ => None,
+    });
+    surface
+        .flatten()
+        .filter(|row| row.check.starts_with("surface at"))
+        .collect()
+}
+
+#[test]
+fn a_surface_that_moved_ends_the_run_before_any_press() {
+    // A touch lies 0.1 to 0.3 mm below this soft skin, tolerance 0.4 mm.
+    for (off_mm, found) in [
+        (-0.6, "-0."),
+        (0.8, "0.5"),
+        (-3.0, "found none"),
+        (1.5, "at once"),
+    ] {
+        let (end, records) = checked(off_mm, false);
+        let RunEnd::Faulted(reason) = &end else {
+            panic!("{off_mm}: {end:?}");
+        };
+        for words in [
+            "surface check",
+            "(9, 3) mm",
+            "(12, 2) mm",
+            "0 +- 0.4 mm",
+            "touch it off again",
+        ] {
+            assert!(reason.contains(words), "{off_mm}: {words} in {reason}");
+        }
+        let pressed = records.iter().any(|r| matches!(r, Record::Intent { .. }));
+        assert!(!pressed, "{off_mm}");
+        let rows = rows(&records);
+        assert_eq!(rows.len(), 2, "{off_mm}");
+        assert!(
+            rows.iter().all(|r| r.verdict == CheckVerdict::Failed),
+            "{rows:?}"
+        );
+        assert!(
+            rows.iter().all(|r| r.found.contains(found)),
+            "{off_mm}: {rows:?}"
+        );
+    }
+}
+
+#[test]
+fn a_surface_in_place_is_checked_and_pressed() {
+    for (each_repetition, times) in [(false, 1), (true, 2)] {
+        let (end, records) = checked(0.15, each_repetition);
+        assert_eq!(end, RunEnd::Completed);
+        let rows = rows(&records);
+        assert_eq!(rows.len(), 2 * times, "{rows:?}");
+        assert!(
+            rows.iter().all(|r| r.verdict == CheckVerdict::Passed),
+            "{rows:?}"
+        );
+        let valid = records
+            .iter()
+            .filter(|r| matches!(r, Record::Outcome(o) if o.verdict == PressVerdict::Valid));
+        assert_eq!(valid.count(), 3);
+    }
+}
+
+#[test]
+fn invalid_presses_in_a_row_end_the_run() {
+    let mut plan = touching_plan();
+    plan.max_consecutive_invalid = 2;
+    let (end, outcomes, _) = run(1.5, &plan);
+    let RunEnd::Faulted(reason) = end else {
+        panic!("{end:?}");
+    };
+    assert!(reason.contains("fewer than 2 in a row"), "{reason}");
+    assert!(reason.contains("found a touch at once"), "{reason}");
+    assert_eq!(outcomes.len(), 2);
+}
+
+#[test]
+fn a_robot_that_cannot_reach_the_deepest_touch_is_refused() {
+    let mut plan = touching_plan();
+    let (end, ..) = run(0.0, &plan);
+    assert_eq!(end, RunEnd::Completed);
+    // The presses alone would fit: 2 mm below a surface up to 1 mm below the frame's need 3 mm.
+    let mut rig = simulated_rig(&SimConfig::new(5, SimLevel::Kinematic));
+    let low_mm = rig.indenter.capabilities().workspace_min_mm[2];
+    plan.limits.max_depth_mm = 3.0;
+    rig.robot_from_skin.translation_mm[2] = low_mm + 2.5;
+    let header = RunHeader {
+        robot_from_skin: rig.robot_from_skin,
+        ..header(&plan)
+    };
+    let mut sink = Sink::default();
+    let report = execute(&plan, header, rig, &ControlHandle::new(), &mut sink);
+    let RunEnd::Faulted(reason) = report.end else {
+        panic!("{report:?}");
+    };
+    assert!(reason.contains("expected a target from"), "{reason}");
 }

@@ -217,6 +217,9 @@ fn assemble(
         band_fits(&surface, f, clearance, max_depth, out);
         Some(surface)
     });
+    let surface_check = root.get("surface_check").map(|f| {
+        crate::surface_check::surface_check(f, surface.as_ref().and_then(Option::as_ref), out)
+    });
     let marks = root.get("triggers").and_then(|f| marks(f, out));
     let between = repetitions.and_then(|r| r.get("between"));
     let cameras = root.get("cameras").map(|f| {
@@ -269,6 +272,8 @@ fn assemble(
         motion: motion_read?,
         limits: limits_read?,
         retakes: root.get("retakes").and_then(crate::retakes::retakes)?,
+        max_consecutive_invalid: limits?.count("max_consecutive_invalid")?,
+        surface_check: surface_check.map_or(Some(None), |s| s.map(Some))?,
         marks: marks?,
         surface: surface.map_or(Some(None), |s| s.map(Some))?,
         analysis: analysis?,

@@ -15,6 +15,7 @@ use crate::quantity::Dimension::{Length, Speed, Time};
 use crate::retakes::RETAKES;
 use crate::shape::{Key, Need, Range, Shape, Table, Word};
 use crate::surface::PRESS;
+use crate::surface_check::SURFACE_CHECK;
 use frame::{FRAME, SYNC};
 use path::{ORDER, ORDER_TABLE, PATH, REPETITIONS};
 use run::{CAMERAS, LIMITS, MOTION, TRIGGERS};
@@ -57,7 +58,7 @@ pub(crate) const fn default(
 /// A coordinate, mm.
 static COORDINATE: Shape = Shape::Quantity(&[Length], Range::between(-1000.0, 1000.0));
 pub(crate) const POINT: Shape = Shape::Tuple(&COORDINATE, &["x", "y"]);
-static POINT_ITEM: Shape = POINT;
+pub(crate) static POINT_ITEM: Shape = POINT;
 const POSITION: Shape = Shape::Tuple(&COORDINATE, &["x", "y", "z"]);
 const POSITIVE_LENGTH: Shape = Shape::Quantity(&[Length], Range::above_zero(1000.0));
 const LENGTH: Shape = Shape::Quantity(&[Length], Range::from_zero(1000.0));
@@ -164,6 +165,11 @@ pub(crate) static PROTOCOL: Table = Table {
             "press",
             Shape::Map(&PRESS),
             "How presses find the surface; absent: as the rig file says, at z = 0 of the frame when it says nothing.",
+        ),
+        optional(
+            "surface_check",
+            Shape::Map(&SURFACE_CHECK),
+            "Touches the surface at some points before the first press and ends the run when it is not where the frame says; no check when absent.",
         ),
         default(
             "retakes",

@@ -104,6 +104,12 @@ pub(crate) static LIMITS: Table = Table {
             "Largest acceleration of the robot's set point; what the robot is set up for when absent.",
         ),
         default(
+            "max_consecutive_invalid",
+            count(0, 100_000),
+            "5",
+            "So many invalid presses in a row end the run: something is wrong that more presses do not mend. 0: no limit.",
+        ),
+        default(
             "on_trip",
             Shape::Choice(ON_TRIP),
             "retract",

@@ -8,4 +8,5 @@ mod remaining;
 mod rig;
 mod schedules;
 mod shipped;
+mod surface_check;
 mod validate;

@@ -1,0 +1,59 @@
+//! The check of the surface: what it may ask for, and what of the plan it changes.
+
+use skinrig_protocol::{Surface, TouchSearch};
+
+use crate::common::{demo, parse, shipped};
+
+fn with(section: &str) -> Result<skinrig_protocol::Protocol, skinrig_protocol::Diagnostics> {
+    // Presses that touch take longer than the demo's.
+    let slow = ["sync.interval=10s", "motion.period=10s"];
+    parse(&format!("{}\n{section}\n", shipped("demo.yaml")), &slow)
+}
+
+#[test]
+fn a_plan_without_a_check_says_nothing_of_it() {
+    let text = serde_json::to_string(&demo(&[]).compile()).unwrap();
+    assert!(!text.contains("surface_check") && !text.contains("max_consecutive_invalid"));
+    let changed = demo(&["limits.max_consecutive_invalid=0"]).compile();
+    assert_eq!(changed.max_consecutive_invalid, 0);
+    assert_ne!(changed.digest(), demo(&[]).compile().digest());
+}
+
+#[test]
+fn a_check_touches_as_the_presses_do() {
+    let at = demo(&[]).locations[0];
+    let points = format!(
+        "surface_check: {{points: [[{} mm, {} mm]]}}",
+        at.x_mm, at.y_mm
+    );
+    let check = |protocol: skinrig_protocol::Protocol| {
+        protocol.check(&protocol.compile()).unwrap();
+        protocol.compile().surface_check.unwrap()
+    };
+    let plain = check(with(&points).unwrap());
+    assert_eq!((plain.points.len(), plain.tolerance_mm), (1, 0.3));
+    assert!(!plain.each_repetition);
+    // The defaults of `press`, as its own keys give them.
+    assert_eq!(plain.search, TouchSearch::default());
+    let touch = with(&format!("{points}\npress: {{surface: touch}}")).unwrap();
+    assert_eq!(touch.surface, Some(Surface::Touch(TouchSearch::default())));
+    let fast = with(&format!(
+        "{points}\npress: {{surface: touch, speed: 3 mm/s}}"
+    ))
+    .unwrap();
+    assert_eq!(check(fast).search.speed_mm_s, 3.0);
+}
+
+#[test]
+fn a_check_stays_on_the_skin_and_within_the_search() {
+    let off = with("surface_check: {points: [[500 mm, 0 mm]]}").unwrap();
+    let error = off.check(&off.compile()).unwrap_err().to_string();
+    assert!(error.contains("not on the skin"), "{error}");
+    assert!(error.contains("x leaves the workspace"), "{error}");
+    assert!(error.contains("surface_check.points"), "{error}");
+    let wide = with("surface_check: {points: [[0 mm, 0 mm]], tolerance: 1 mm}");
+    let error = wide.unwrap_err().to_string();
+    assert!(error.contains("would not be found"), "{error}");
+    let none = with("surface_check: {points: []}").unwrap_err().to_string();
+    assert!(none.contains("surface_check.points"), "{none}");
+}
