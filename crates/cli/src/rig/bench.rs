@@ -206,6 +206,7 @@ fn open_camera(
     }
     let config = Evk1Config {
         read_back_exceptions: setup.read_back_exceptions.clone(),
+        max_time_step_us: setup.max_time_high_gap_us,
         ..Evk1Config::default()
     };
     let evk1 = Evk1::open_serial(&setup.serial, camera, config, clock);
@@ -299,10 +300,11 @@ mod tests {
     #[cfg(not(feature = "evk4"))]
     #[test]
     fn a_camera_that_this_build_does_not_drive_is_refused_with_the_build_that_does() {
-        let text = EXAMPLE.replacen("model: evk1", "model: evk4", 1);
+        let second = "serial: \"00001754\"";
+        let text = EXAMPLE.replacen(second, &format!("{second}\n    model: evk4"), 1);
         let rig = RigFile::parse("rig.yaml", text.as_bytes(), &|_| None).ok();
-        let camera = rig.as_ref().map(|r| &r.cameras[0]);
-        let refused = camera.map(|c| open_camera(c, CameraId::One, RealClock::start()).err());
+        let camera = rig.as_ref().map(|r| &r.cameras[1]);
+        let refused = camera.map(|c| open_camera(c, CameraId::Two, RealClock::start()).err());
         let said = refused.flatten().map(|e| e.message).unwrap_or_default();
         assert!(said.contains("found `evk4`"), "{said}");
         assert!(

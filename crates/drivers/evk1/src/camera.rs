@@ -86,6 +86,7 @@ impl Evk1 {
         let mut registers = Registers::new(transport.as_mut(), &config.read_back_exceptions);
         registers.read(CHIP_ID)?;
         sequences::initialise(&mut registers, identity.fpga_version)?;
+        let chunker = Chunker::new(camera, config.max_time_step_us);
         Ok(Self {
             camera,
             identity,
@@ -94,7 +95,7 @@ impl Evk1 {
             clock,
             settings: None,
             stream: None,
-            chunker: Chunker::new(camera),
+            chunker,
             report: StreamReport::default(),
             notes: Vec::new(),
             used: false,

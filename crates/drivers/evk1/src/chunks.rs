@@ -1,9 +1,9 @@
 //! From blocks of arrived bytes to the chunks of a recording, with their facts.
 
 use skinrig_formats::Scanner;
-use skinrig_model::{CameraId, RawChunk, StreamFormat};
+use skinrig_model::{CameraId, HostTime, RawChunk, StreamFormat};
 
-use crate::inbox::Block;
+use crate::inbox::{Block, WORD};
 use crate::report::StreamReport;
 use crate::time_base::{Gate, Watch};
 
@@ -20,12 +20,14 @@ pub struct Chunker {
     /// Nothing of this stream has a time yet.
     fresh: bool,
     last_us: u64,
+    max_step_us: Option<u64>,
 }
 
 impl Chunker {
-    /// A chunker of a stream that has not begun.
+    /// A chunker of a stream that has not begun. A step of the time base above `max_step_us` counts as a loss of at least one
+    /// word.
     #[must_use]
-    pub fn new(camera: CameraId) -> Self {
+    pub fn new(camera: CameraId, max_step_us: Option<u64>) -> Self {
         Self {
             camera,
             seq: 0,
@@ -35,6 +37,7 @@ impl Chunker {
             watch: Watch::default(),
             fresh: true,
             last_us: 0,
+            max_step_us,
         }
     }
 
@@ -56,7 +59,7 @@ impl Chunker {
         self.gate == Gate::Open
     }
 
-    /// Takes the next block; at most one chunk comes out.
+    /// Takes the next block. One chunk comes out at most, and one more for each gap in its time base.
     pub fn take(&mut self, block: Block, report: &mut StreamReport, chunks: &mut Vec<RawChunk>) {
         let Block {
             mut bytes,
@@ -86,6 +89,34 @@ impl Chunker {
         if bytes.is_empty() && lost == 0 {
             return;
         }
+        while let Some(most_us) = self.max_step_us
+            && let Some(at) = self.watch.gap(&bytes, most_us)
+        {
+            let rest = bytes.split_off(at);
+            let before = std::mem::replace(&mut bytes, rest);
+            if !before.is_empty() || lost > 0 {
+                self.hand_over(before, arrived, lost, report, chunks);
+                lost = 0;
+            }
+            // How many words the camera lost nobody knows: one at least.
+            lost += WORD as u64;
+            report.lost_bytes += WORD as u64;
+            report.time_gaps += 1;
+            // The step is told once; what follows starts from its end.
+            let step = &bytes[..WORD];
+            self.watch.look(step, arrived, |jump| report.add_jump(jump));
+        }
+        self.hand_over(bytes, arrived, lost, report, chunks);
+    }
+
+    fn hand_over(
+        &mut self,
+        bytes: Vec<u8>,
+        arrived: HostTime,
+        lost: u64,
+        report: &mut StreamReport,
+        chunks: &mut Vec<RawChunk>,
+    ) {
         self.watch
             .look(&bytes, arrived, |jump| report.add_jump(jump));
         let (facts, triggers) = self.scanner.push(&bytes);

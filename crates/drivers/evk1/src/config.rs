@@ -21,6 +21,9 @@ pub struct Evk1Config {
     /// Addresses of registers whose writes need not read back. Empty unless a real camera has shown that a register
     /// reads differently: what each register of an EVK1 reads back is not public.
     pub read_back_exceptions: Vec<u32>,
+    /// Longest step of the time base, µs, that is no loss. `None`: steps are noted and nothing more, because how often
+    /// an EVK1 sends its time base is not public.
+    pub max_time_step_us: Option<u64>,
 }
 
 impl Default for Evk1Config {
@@ -32,6 +35,7 @@ impl Default for Evk1Config {
             transfer_bytes: 128 << 10,
             transfer_timeout: Duration::from_millis(100),
             read_back_exceptions: Vec::new(),
+            max_time_step_us: None,
         }
     }
 }
@@ -63,6 +67,11 @@ impl Evk1Config {
                 self.backlog_bytes >= 2 * self.chunk_bytes,
                 "backlog_bytes of two chunks or more",
                 self.backlog_bytes,
+            ),
+            (
+                self.max_time_step_us.is_none_or(|us| us >= 64),
+                "max_time_step_us of one count of the time base, 64 µs, or more",
+                self.max_time_step_us.unwrap_or_default() as usize,
             ),
             (
                 (1..=10_000).contains(&self.transfer_timeout.as_millis()),

@@ -23,6 +23,9 @@ pub struct StreamReport {
     pub lost_time: HostDuration,
     /// The first losses.
     pub losses: Vec<Loss>,
+    /// How often it made a step that counts as a loss, see [`crate::Evk1Config::max_time_step_us`]; each is a word in
+    /// `lost_bytes`, for how many it was is not known.
+    pub time_gaps: u64,
     /// How often the time base jumped by more than one count, or back: the camera itself has lost something.
     pub jump_count: u64,
     /// The first jumps.
@@ -71,6 +74,12 @@ impl StreamReport {
             notes.push(format!(
                 "{} bytes were lost on the host in {} gaps of {} together",
                 self.lost_bytes, self.loss_count, self.lost_time
+            ));
+        }
+        if self.time_gaps > 0 {
+            notes.push(format!(
+                "{} steps of the time base were longer than allowed: the camera lost events, how many is not known",
+                self.time_gaps
             ));
         }
         if let Some(first) = self.jumps.first() {

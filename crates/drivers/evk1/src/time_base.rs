@@ -92,6 +92,24 @@ impl Watch {
         self.last = None;
     }
 
+    /// Where in these whole words, in bytes, the time base makes a step of more than `most_us`, or back; the first such
+    /// place. Remembers nothing.
+    #[must_use]
+    pub fn gap(&self, bytes: &[u8], most_us: u64) -> Option<usize> {
+        let mut last = self.last;
+        for (n, word) in bytes.as_chunks::<WORD>().0.iter().enumerate() {
+            let Some(high) = time_high(*word) else {
+                continue;
+            };
+            let step = last.map_or(0, |last| high.wrapping_sub(last) % RANGE);
+            if step > 1 && u64::from(step) * COUNT_US > most_us {
+                return Some(n * WORD);
+            }
+            last = Some(high);
+        }
+        None
+    }
+
     /// Looks at whole words, which had arrived at `arrived`, and hands over the jumps.
     pub fn look(&mut self, bytes: &[u8], arrived: HostTime, mut on_jump: impl FnMut(TimeJump)) {
         let (words, _) = bytes.as_chunks::<WORD>();

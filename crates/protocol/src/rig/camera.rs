@@ -106,6 +106,15 @@ fn camera(f: &Field, places: &Places<'_>, out: &mut Collector) -> Option<CameraS
         .expected("0, the main trigger input")
         .found(trigger_channel.to_string());
     }
+    if let (Some(gap), true) = (f.get("max_time_high_gap"), model != "evk1") {
+        out.error(
+            gap.span,
+            gap.path.as_str(),
+            "the camera's time base is not watched",
+        )
+        .expected("`max_time_high_gap` with `model: evk1` only")
+        .found(format!("`model: {model}`"));
+    }
     let untriggered = matches!(model, "evk3_hd" | "silky_vga");
     if untriggered && sync != SyncRole::Standalone {
         let span = f.get("sync").map_or(f.span, |s| s.span);
@@ -139,6 +148,9 @@ fn camera(f: &Field, places: &Places<'_>, out: &mut Collector) -> Option<CameraS
         roi: roi.map_or(Some(None), |r| r.map(Some))?,
         noise_filter_ev_s: f.quantity("noise_filter").map(|r| r.round() as u32),
         read_back_exceptions: read_back_exceptions?,
+        max_time_high_gap_us: f
+            .quantity("max_time_high_gap")
+            .map(|s| (s * 1e6).round() as u64),
         sync,
         trigger_channel,
         geometry,

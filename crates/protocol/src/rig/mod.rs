@@ -207,6 +207,8 @@ pub struct CameraSetup {
     pub roi: Option<[u16; 4]>,
     /// Addresses of registers whose writes need not read back.
     pub read_back_exceptions: Vec<u32>,
+    /// Longest step of the time base that is no loss, µs; `None`: steps are only noted.
+    pub max_time_high_gap_us: Option<u64>,
     /// Threshold of the sensor's activity gate, events per second.
     pub noise_filter_ev_s: Option<u32>,
     /// Whose time base it follows.

@@ -243,8 +243,15 @@ fn what_cannot_be_is_named() {
         "7 and 0",
     );
     finding(
-        "model: evk1",
-        "model: silky_vga",
+        "serial: \"00001754\"",
+        "serial: \"00001754\"\n    model: evk4\n    max_time_high_gap: 1 ms",
+        "cameras.camera2.max_time_high_gap",
+        "the camera's time base is not watched",
+        "`model: evk4`",
+    );
+    finding(
+        "serial: \"00001754\"",
+        "serial: \"00001754\"\n    model: silky_vga",
         "trigger_box",
         "a camera cannot see the trigger box",
         "`model: silky_vga`",

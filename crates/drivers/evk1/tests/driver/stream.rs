@@ -167,6 +167,38 @@ fn jumps_of_the_time_base_are_reported() {
 }
 
 #[test]
+fn a_step_of_the_time_base_beyond_the_limit_is_a_loss_before_the_next_chunk() {
+    let bench = Bench::new();
+    let config = Evk1Config {
+        max_time_step_us: Some(640),
+        ..Evk1Config::default()
+    };
+    let mut camera = bench.open_with(config).unwrap();
+    camera.start().unwrap();
+    let mut before = Vec::new();
+    camera.flush(&mut before).unwrap();
+    let last = before.last().unwrap().facts.last_us.unwrap();
+    let high = 0x8000_0000 | (last / 64) as u32;
+    // Ten counts are 640 us and no loss; eleven are, and so is a step back.
+    bench
+        .model()
+        .send(&bytes(&[high + 10, high + 21, high + 22, high + 21]));
+    let mut chunks = Vec::new();
+    camera.flush(&mut chunks).unwrap();
+    let told: Vec<_> = chunks
+        .iter()
+        .map(|c| (c.lost_before, c.bytes.len()))
+        .collect();
+    assert_eq!(told, [(0, 4), (4, 8), (4, 4)]);
+    let seqs: Vec<u64> = chunks.iter().map(|c| c.seq).collect();
+    let first = before.last().unwrap().seq + 1;
+    assert_eq!(seqs, [first, first + 1, first + 2]);
+    let report = camera.report();
+    assert_eq!((report.time_gaps, report.lost_bytes), (2, 8));
+    assert_eq!(report.jump_count, 3, "each is noted once");
+}
+
+#[test]
 fn the_overflow_counter_is_read_around_the_stream() {
     let bench = Bench::new();
     let mut camera = bench.open().unwrap();

@@ -211,6 +211,11 @@ static CAMERA: Table = Table {
             Shape::Quantity(&[EventRate], Range::between(10_000.0, 10_000_000.0)),
             "The sensor's activity gate: nothing passes while its total rate is below this. Off when absent.",
         ),
+        optional(
+            "max_time_high_gap",
+            Shape::Quantity(&[Time], Range::between(0.000_064, 10.0)),
+            "EVK1: a longer step of the camera's time base counts as lost data, and spoils the press. Absent: steps are noted at the end, because how often a real camera sends its time base is not published.",
+        ),
         default(
             "read_back_exceptions",
             Shape::List {
