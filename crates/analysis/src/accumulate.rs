@@ -243,20 +243,21 @@ impl<'a> Accumulator<'a> {
             events.iter().for_each(|e| activity.add(e));
         }
         let (low, high) = self.crop;
-        let mut room = std::mem::take(&mut self.inside);
+        let mut inside = std::mem::take(&mut self.inside);
+        let room = &mut inside[..SLICE];
         // Stores every event and steps on for those in the crop: no branch to mispredict.
         let mut count = 0;
         for event in events {
-            room[count] = *event;
+            // Never beyond the room, which is as long as the longest slice: the mask only tells so.
+            room[count % SLICE] = *event;
             count += usize::from((low <= event.y) & (event.y <= high));
         }
-        let inside = &room[..count];
         if let Some(rates) = &mut self.rates {
-            rates.add_in_order(inside);
+            rates.add_in_order(&inside[..count]);
         }
-        self.held.take_if(|held| !held.add(inside));
-        self.take_inside(inside);
-        self.inside = room;
+        self.held.take_if(|held| !held.add(&inside[..count]));
+        self.take_inside(&inside[..count]);
+        self.inside = inside;
         if let Some(last) = events.last() {
             self.newest_us = self.newest_us.max(last.t_us);
         }

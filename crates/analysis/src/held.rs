@@ -65,10 +65,11 @@ impl Held {
     /// Calls `each` with consecutive slices of the events, all of them, once.
     pub fn for_each_slice(&self, mut each: impl FnMut(&[CdEvent])) {
         let mut events = Vec::with_capacity(SLICE);
+        let start_us = self.start_us;
         for slice in self.packed.chunks(SLICE) {
             events.clear();
             events.extend(slice.iter().map(|packed| CdEvent {
-                t_us: self.start_us + (packed >> TIME_SHIFT),
+                t_us: start_us + (packed >> TIME_SHIFT),
                 x: (packed & 0x3ff) as u16,
                 y: (packed >> ROW_SHIFT & 0x1ff) as u16,
                 polarity: Polarity::from_bit(packed >> POLARITY_SHIFT & 1 == 1),

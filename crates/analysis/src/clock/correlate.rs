@@ -71,29 +71,43 @@ impl Correlator {
         }
     }
 
-    /// The lag (in `1 - template.len()..series.len()`) at which `sum series[i + lag] * template[i]` is largest,
-    /// and that sum. Values outside the series count 0. Templates beyond the longest are cut.
-    pub fn best_lag(&self, template: &[f64]) -> (i64, f64) {
-        let size = self.transformed.len();
-        let template = &template[..template.len().min(self.longest_template)];
-        let mut work = vec![(0.0, 0.0); size];
-        for (to, from) in work.iter_mut().zip(template) {
+    /// For each of two templates the lag (in `1 - template.len()..series.len()`) at which
+    /// `sum series[i + lag] * template[i]` is largest, and that sum. Values outside the series count 0. Templates beyond
+    /// the longest are cut.
+    pub fn best_lags(&self, templates: [&[f64]; 2]) -> [(i64, f64); 2] {
+        let templates = templates.map(|t| &t[..t.len().min(self.longest_template)]);
+        // One transform does for both, as the parts of complex numbers: the series is real.
+        let mut work = vec![(0.0, 0.0); self.transformed.len()];
+        for (to, from) in work.iter_mut().zip(templates[0]) {
             to.0 = *from;
+        }
+        for (to, from) in work.iter_mut().zip(templates[1]) {
+            to.1 = *from;
         }
         transform(&mut work, &self.roots, false);
         for (w, s) in work.iter_mut().zip(&self.transformed) {
             *w = product(*s, (w.0, -w.1));
         }
         transform(&mut work, &self.roots, true);
-        let behind = template.len().saturating_sub(1) as i64;
+        [
+            self.largest(&work, templates[0].len(), |w| w.0),
+            self.largest(&work, templates[1].len(), |w| -w.1),
+        ]
+    }
+
+    /// The first largest of the unscaled sums for a template of this length, which `part` takes from the transform, and
+    /// its lag.
+    fn largest(&self, work: &[Complex], template: usize, part: fn(&Complex) -> f64) -> (i64, f64) {
+        let behind = template.saturating_sub(1);
+        // Negative lags stand at the end.
+        let (ahead, late) = (&work[..self.length], &work[work.len() - behind..]);
         let mut best = (0, f64::NEG_INFINITY);
-        for lag in -behind..self.length as i64 {
-            let sum = work[lag.rem_euclid(size as i64) as usize].0 / size as f64;
+        for (lag, sum) in (-(behind as i64)..).zip(late.iter().chain(ahead).map(part)) {
             if sum > best.1 {
                 best = (lag, sum);
             }
         }
-        best
+        (best.0, best.1 / work.len() as f64)
     }
 }
 
@@ -102,26 +116,34 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_best_lag_is_that_of_the_definition() {
+    fn the_best_lags_are_those_of_the_definition() {
         let value = |i: i64| ((i * i * 31 + i * 17) % 23) as f64 - 11.0;
         let series: Vec<f64> = (0..37).map(value).collect();
-        for length in [1, 5, 21] {
+        let correlator = Correlator::new(&series, 21);
+        let sum = |template: &[f64], lag: i64| -> f64 {
+            let at = |i: usize| {
+                usize::try_from(i as i64 + lag)
+                    .ok()
+                    .and_then(|k| series.get(k))
+            };
+            (0..template.len())
+                .filter_map(|i| Some(at(i)? * template[i]))
+                .sum()
+        };
+        for length in [0, 1, 5, 21] {
             for offset in [-3i64, 0, 9, 30] {
-                let template: Vec<f64> = (0..length).map(|i| value(i + offset)).collect();
-                let sum = |lag: i64| -> f64 {
-                    let at = |i: usize| {
-                        usize::try_from(i as i64 + lag)
-                            .ok()
-                            .and_then(|k| series.get(k))
-                    };
-                    (0..template.len())
-                        .filter_map(|i| Some(at(i)? * template[i]))
-                        .sum()
-                };
-                let (lag, found) = Correlator::new(&series, 21).best_lag(&template);
-                let wanted = (1 - length..37).map(sum).fold(f64::NEG_INFINITY, f64::max);
-                assert!((found - wanted).abs() < 1e-9);
-                assert!((sum(lag) - wanted).abs() < 1e-9);
+                let one: Vec<f64> = (0..length).map(|i| value(i + offset)).collect();
+                let other: Vec<f64> = (0..9).map(|i| value(3 * i - offset)).collect();
+                let found = correlator.best_lags([&one, &other]);
+                for (template, (lag, best)) in [(&one, found[0]), (&other, found[1])] {
+                    let behind = (template.len() as i64 - 1).max(0);
+                    let lags = -behind..37;
+                    let wanted = lags
+                        .map(|lag| sum(template, lag))
+                        .fold(f64::NEG_INFINITY, f64::max);
+                    assert!((best - wanted).abs() < 1e-9);
+                    assert!((sum(template, lag) - wanted).abs() < 1e-9);
+                }
             }
         }
     }

@@ -219,9 +219,24 @@ impl Activity {
         self.sum_before(to_us) - self.sum_before(from_us)
     }
 
-    /// Mean activity in the bin-wide interval about `t_us`.
-    fn at(&self, t_us: f64) -> f64 {
-        self.between(t_us - 0.5 * self.bin_us, t_us + 0.5 * self.bin_us)
+    /// Mean activity in each of `n` bin-wide intervals side by side, the first about `t_us`. All of them part the bins
+    /// that they meet in the same way; outside the recording nothing is active.
+    fn samples(&self, t_us: f64, n: usize) -> impl Iterator<Item = f64> {
+        let at = t_us / self.bin_us - 0.5;
+        let first = at.floor();
+        let part = at - first;
+        let first = first as i64;
+        let value = move |i: i64| {
+            let i = usize::try_from(i).ok();
+            i.and_then(|i| self.values.get(i)).copied().unwrap_or(0.0)
+        };
+        let mut left = value(first);
+        (1..=n as i64).map(move |k| {
+            let right = value(first.saturating_add(k));
+            let mean = left + part * (right - left);
+            left = right;
+            mean
+        })
     }
 }
 
@@ -246,13 +261,14 @@ fn first_map(activity: &Activity, presses: &[PressSpan], about: f64) -> Map {
         + 1;
     let correlator = Correlator::new(&merged, length);
     let steps = (MOST_DRIFT * half_us / DRIFT_STEP_US).ceil() as i32;
-    let mut best: Option<(f64, Map)> = None;
-    for step in -steps..=steps {
-        let drift = if steps == 0 {
+    let drifts = (-steps..=steps).map(|step| {
+        if steps == 0 {
             about
         } else {
             about + MOST_DRIFT * f64::from(step) / f64::from(steps)
-        };
+        }
+    });
+    let template = |drift: f64| {
         // Time within the template of a host time: the middle of the session stays where it is.
         let place = |host_us: f64| {
             let stretched = host_us + drift * (host_us - middle_us) - from_us;
@@ -265,10 +281,19 @@ fn first_map(activity: &Activity, presses: &[PressSpan], about: f64) -> Map {
         }
         let share = template.iter().sum::<f64>() / length as f64;
         template.iter_mut().for_each(|v| *v -= share);
-        let (lag, score) = correlator.best_lag(&template);
-        let offset_us = lag as f64 * bin_us - from_us - drift * middle_us;
-        if best.is_none_or(|(s, _)| score > s) {
-            best = Some((score, Map { offset_us, drift }));
+        template
+    };
+    let drifts: Vec<f64> = drifts.collect();
+    let mut best: Option<(f64, Map)> = None;
+    for pair in drifts.chunks(2) {
+        let templates: Vec<Vec<f64>> = pair.iter().map(|drift| template(*drift)).collect();
+        let other = templates.get(1).map_or(&[][..], Vec::as_slice);
+        let found = correlator.best_lags([&templates[0], other]);
+        for (&drift, (lag, score)) in pair.iter().zip(found) {
+            let offset_us = lag as f64 * bin_us - from_us - drift * middle_us;
+            if best.is_none_or(|(s, _)| score > s) {
+                best = Some((score, Map { offset_us, drift }));
+            }
         }
     }
     best.map_or(
@@ -398,9 +423,8 @@ impl Profile {
         let mut values = vec![0.0; samples];
         for press in presses {
             let start = map.camera(press.contact_us) - side;
-            for (k, v) in values.iter_mut().enumerate() {
-                *v += activity.at(start + k as f64 * activity.bin_us);
-            }
+            let found = activity.samples(start, samples);
+            values.iter_mut().zip(found).for_each(|(v, a)| *v += a);
         }
         let n = presses.len() as f64;
         values.iter_mut().for_each(|v| *v /= n);
@@ -463,15 +487,14 @@ fn lags(
     let mean = profile.values.iter().sum::<f64>() / profile.values.len() as f64;
     let template: Vec<f64> = profile.values.iter().map(|v| v - mean).collect();
     let strength: f64 = template.iter().map(|v| v * v).sum();
-    let steps = (most_us / activity.bin_us).round() as i64;
+    let steps = (most_us / activity.bin_us).round();
+    let count = 2 * (steps as usize + 1) + template.len();
     let mut pairs = Vec::new();
     for press in presses {
         let contact = map.camera(press.contact_us);
-        let start = contact + profile.from_us;
         // All samples that any lag needs, once.
-        let samples: Vec<f64> = (-steps - 1..=steps + profile.values.len() as i64)
-            .map(|k| activity.at(start + k as f64 * activity.bin_us))
-            .collect();
+        let start = contact + profile.from_us - (steps + 1.0) * activity.bin_us;
+        let samples: Vec<f64> = activity.samples(start, count).collect();
         let matches = products(&template, &samples);
         let inner = 1..matches.len() - 1;
         let Some(best) = inner.max_by(|a, b| matches[*a].total_cmp(&matches[*b])) else {
@@ -488,7 +511,7 @@ fn lags(
         } else {
             0.0
         };
-        let lag = (best as f64 - 1.0 - steps as f64 + part) * activity.bin_us;
+        let lag = (best as f64 - 1.0 - steps + part) * activity.bin_us;
         pairs.push(Pair {
             host_us: press.contact_us,
             camera_us: contact + lag,

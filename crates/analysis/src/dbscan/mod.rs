@@ -246,6 +246,9 @@ impl Dbscan {
         for (step, mask) in self.tiles.steps().iter().zip(self.tiles.masks(at)) {
             let near = &self.all[tile.wrapping_add(step.by)];
             let mut within = near.occupied & mask;
+            if within == 0 {
+                continue;
+            }
             if within == near.occupied {
                 events += near.events;
             } else {
