@@ -15,7 +15,7 @@
 
 mod tiles;
 
-use self::tiles::{SIDE, Tiles, ones};
+use self::tiles::{Part, SIDE, Tiles, ones};
 use crate::grid::PixelGrid;
 
 /// The label of events that belong to no cluster.
@@ -243,7 +243,7 @@ impl Dbscan {
     #[inline]
     fn is_core(&self, grid: &PixelGrid, tile: usize, corner: usize, at: usize) -> bool {
         let mut events = 0;
-        for (step, mask) in self.tiles.steps().iter().zip(self.tiles.masks(at)) {
+        for Part { step, mask } in self.tiles.parts(at) {
             let near = &self.all[tile.wrapping_add(step.by)];
             let mut within = near.occupied & mask;
             if within == 0 {
@@ -389,12 +389,15 @@ impl Dbscan {
     /// first by row, then column, counts.
     #[inline]
     fn border(&self, tile: usize, at: usize) -> Option<u32> {
-        let masks = self.tiles.steps().iter().zip(self.tiles.masks(at));
-        let met = masks.filter_map(|(step, mask)| {
-            let other = tile.wrapping_add(step.by);
-            let within = self.all[other].core & mask;
-            (within != 0).then_some((step, other, within))
-        });
+        let met = self
+            .tiles
+            .parts(at)
+            .iter()
+            .filter_map(|Part { step, mask }| {
+                let other = tile.wrapping_add(step.by);
+                let within = self.all[other].core & mask;
+                (within != 0).then_some((step, other, within))
+            });
         let mut labels = met.clone().flat_map(|(_, other, within)| {
             let groups = self.groups_of(other).iter();
             groups

@@ -39,6 +39,15 @@ impl Step {
     }
 }
 
+/// What a disc covers of one of the tiles that it meets.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Part {
+    /// The way to the tile.
+    pub step: Step,
+    /// The pixels covered, at least one.
+    pub mask: u64,
+}
+
 /// The tiles of a grid, in a frame of empty ones as wide as discs reach, and the steps between them.
 #[derive(Debug, Clone)]
 pub(super) struct Tiles {
@@ -50,6 +59,10 @@ pub(super) struct Tiles {
     steps: Vec<Step>,
     /// For each pixel of a tile, what the disc about it covers of the tile at each step.
     masks: Vec<u64>,
+    /// For each pixel of a tile the parts of the disc about it, near tiles first.
+    parts: Vec<Part>,
+    /// Where those of each pixel begin, and where those of the last one end.
+    starts: [usize; SIDE * SIDE + 1],
 }
 
 impl Tiles {
@@ -85,12 +98,24 @@ impl Tiles {
             .filter(|(step, _)| step.able != 0)
             .collect();
         steps.sort_by_key(|(s, _)| s.rows * s.rows + s.columns * s.columns);
+        let mut parts = Vec::new();
+        let mut starts = [0; SIDE * SIDE + 1];
+        for at in 0..SIDE * SIDE {
+            let all = steps.iter().map(|(step, masks)| Part {
+                step: *step,
+                mask: masks[at],
+            });
+            parts.extend(all.filter(|part| part.mask != 0));
+            starts[at + 1] = parts.len();
+        }
         Self {
             margin,
             stride,
             masks: (0..SIDE * SIDE)
                 .flat_map(|at| steps.iter().map(move |(_, masks)| masks[at]))
                 .collect(),
+            parts,
+            starts,
             steps: steps.into_iter().map(|(step, _)| step).collect(),
         }
     }
@@ -105,6 +130,13 @@ impl Tiles {
     pub fn masks(&self, at: usize) -> &[u64] {
         let n = self.steps.len();
         &self.masks[at * n..(at + 1) * n]
+    }
+
+    /// The parts of the disc about a pixel of a tile, by its place, in the tiles that it meets: half of the steps, on
+    /// average, when a disc is as large as a tile.
+    #[inline]
+    pub fn parts(&self, at: usize) -> &[Part] {
+        &self.parts[self.starts[at]..self.starts[at + 1]]
     }
 
     /// How many tiles there are for so many rows of pixels, with the frame.
@@ -177,6 +209,9 @@ mod tests {
                     }
                     covered += mask.count_ones();
                 }
+                let parts = tiles.parts(at).iter();
+                let in_parts: u32 = parts.map(|part| part.mask.count_ones()).sum();
+                assert_eq!(in_parts, covered, "eps {eps}: {at}");
                 let range = -41..=41_i32;
                 let all = range
                     .clone()
