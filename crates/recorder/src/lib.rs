@@ -28,6 +28,7 @@ mod prepare;
 mod query;
 mod queue;
 mod resume;
+mod salvage;
 mod schema;
 mod seal;
 mod worker;
@@ -41,6 +42,7 @@ pub use rows::{
     AttemptRow, ChunkMeta, CommandRow, DeviceRow, InterruptionRow, LegRow, NoteRow, PressTally,
     Seal, SessionTotals,
 };
+pub use salvage::{LostBytes, SalvageReport, SalvagedTable, salvage};
 pub use schema::SCHEMA_VERSION;
 pub use verify::{ChunkScanner, VerifyReport, verify};
 pub use writer::{Sealed, SessionWriter};

@@ -173,7 +173,7 @@ async fn check_schema_text(conn: &mut SqliteConnection) -> Result<(), Fault> {
 
 /// The file that SQLite keeps beside a session: `-wal`, the write-ahead log, or `-journal`, what a transaction in rollback mode
 /// would be undone with.
-fn beside(path: &Path, ending: &str) -> PathBuf {
+pub fn beside(path: &Path, ending: &str) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
     name.push(ending);
     PathBuf::from(name)

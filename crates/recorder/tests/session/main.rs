@@ -7,3 +7,4 @@ mod damage;
 mod legs;
 mod python;
 mod round_trip;
+mod salvage;
