@@ -88,6 +88,13 @@ pub enum Command {
     #[command(after_help = "Example:\n  skinrig verify sessions/NAME.session.sqlite")]
     Verify(SessionArg),
 
+    /// Copy what is whole of a damaged session into a new file; list what is lost.
+    #[command(
+        after_help = "Example:\n  skinrig salvage sessions/NAME.session.sqlite\n\n\
+        The damaged file is only read. Exit code 4 when something is known to be lost."
+    )]
+    Salvage(SalvageArgs),
+
     /// Make a session from the published dataset's files.
     #[command(
         after_help = "Example:\n  skinrig import --camera1 camera1.hdf5 --camera2 camera2.hdf5 \\\n    \
@@ -459,4 +466,15 @@ pub struct SchemaArgs {
     /// Which schema.
     #[arg(value_enum, default_value = "protocol")]
     pub kind: SchemaKind,
+}
+
+/// `salvage`.
+#[derive(Debug, Args)]
+pub struct SalvageArgs {
+    /// The damaged session file; its log (`-wal`) is read too when it lies beside it.
+    pub session: PathBuf,
+
+    /// The new file (default: NAME.salvaged.session.sqlite beside it).
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
 }

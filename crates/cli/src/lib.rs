@@ -20,7 +20,8 @@ pub mod recording;
 pub mod results;
 pub mod rig;
 pub mod run;
-pub mod schema;
+pub mod salvage;
+mod schema;
 pub mod sessions;
 pub mod show;
 pub mod signals;
@@ -80,6 +81,7 @@ fn dispatch(cli: &Cli, arguments: &[OsString]) -> Outcome {
         Command::Report(a) => results::report(a, json),
         Command::Tradeoff(a) => tradeoff::tradeoff(a, json),
         Command::Verify(a) => verify::verify(a, json),
+        Command::Salvage(a) => salvage::salvage(a, json),
         Command::Import(a) => import::import(a, &command_line(arguments), json),
         Command::Export(a) => export::export(a, json),
         Command::Inspect(a) => inspect::inspect(a, json),

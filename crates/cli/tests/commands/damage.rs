@@ -107,3 +107,32 @@ fn a_changed_row_is_found_and_its_table_named() {
     assert_eq!(json["sound"], false);
     assert!(!json["problems"].as_array().unwrap().is_empty());
 }
+
+#[test]
+fn what_is_whole_of_a_damaged_session_is_salvaged_and_analysed() {
+    let lab = Lab::new();
+    let (session, mut bytes) = sealed(&lab);
+    let file = lab.path("damaged.session.sqlite");
+    std::fs::write(&file, &bytes).unwrap();
+    let new = lab.path("damaged.salvaged.session.sqlite");
+    let said = skinrig(&["salvage", "--json", &text(&file)]).code(0).json();
+    assert_eq!(said["whole"], true);
+    assert_eq!(said["salvaged"], text(&new));
+    skinrig(&["verify", &text(&new)]).code(0);
+    skinrig(&["salvage", &text(&file)])
+        .code(2)
+        .complains(&["expected no file there"]);
+
+    // The end of the file is gone: SQLite will not have it, a salvage will.
+    bytes.truncate(bytes.len() * 2 / 3);
+    std::fs::write(&file, &bytes).unwrap();
+    let out = lab.text("cut.session.sqlite");
+    let said = skinrig(&["salvage", &text(&file), "--out", &out]);
+    let said = said
+        .code(4)
+        .complains(&["something of it is lost", "skinrig show"]);
+    assert!(said.out.contains("rows back"), "{said:#?}");
+    let shown = skinrig(&["show", &out]);
+    assert!(matches!(shown.code, Some(0 | 2)), "{shown:#?}");
+    assert_ne!(std::fs::read(&session).unwrap(), bytes);
+}

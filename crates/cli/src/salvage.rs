@@ -1,0 +1,71 @@
+//! `skinrig salvage`.
+
+use std::path::{Path, PathBuf};
+
+use skinrig_recorder::{SESSION_SUFFIX, SalvageReport, salvage as bring_back};
+
+use crate::args::SalvageArgs;
+use crate::exit::{Exit, Failure, Outcome};
+
+/// Copies what is whole of a damaged session into a new one, and tells what is not.
+///
+/// # Errors
+/// [`Failure::input`] when nothing of a session is found or the new file exists; [`Failure::limit`] when something is lost.
+pub fn salvage(args: &SalvageArgs, json: bool) -> Outcome {
+    let to = args.out.clone().unwrap_or_else(|| beside(&args.session));
+    let report = bring_back(&args.session, &to).map_err(Failure::input)?;
+    if json {
+        let mut value = serde_json::to_value(&report).map_err(Failure::internal)?;
+        value["whole"] = report.is_whole().into();
+        value["salvaged"] = serde_json::json!(to);
+        crate::print_json(&value);
+    } else {
+        print(&report);
+        outln!("\n{}", to.display());
+    }
+    if report.is_whole() {
+        Ok(Exit::Ok)
+    } else {
+        Err(Failure::limit(format!(
+            "{}: something of it is lost, as listed\n  next: `skinrig show {}` and `skinrig analyze` work on what came back; \
+             keep the damaged file",
+            args.session.display(),
+            to.display()
+        )))
+    }
+}
+
+/// `NAME.salvaged.session.sqlite` beside the damaged file.
+fn beside(session: &Path) -> PathBuf {
+    let name = session.file_name().unwrap_or_default().to_string_lossy();
+    let stem = name.strip_suffix(SESSION_SUFFIX).unwrap_or(&name);
+    session.with_file_name(format!("{stem}.salvaged{SESSION_SUFFIX}"))
+}
+
+fn print(report: &SalvageReport) {
+    outln!("{:<16}  {:>9}  {:>9}", "table", "rows back", "missing");
+    for table in &report.tables {
+        let missing = match table.missing {
+            0 => "-".to_owned(),
+            n => n.to_string(),
+        };
+        outln!("{:<16}  {:>9}  {missing:>9}", table.name, table.rows);
+    }
+    for lost in &report.lost {
+        let chunks = if lost.first_seq == lost.last_seq {
+            format!("chunk {}", lost.first_seq)
+        } else {
+            format!("chunks {} to {}", lost.first_seq, lost.last_seq)
+        };
+        let bytes = lost
+            .bytes
+            .map_or("an unknown number of".to_owned(), |n| n.to_string());
+        outln!(
+            "lost: {}: {chunks}, {bytes} bytes; kept as a gap in the stream",
+            lost.camera
+        );
+    }
+    for finding in &report.findings {
+        outln!("found: {finding}");
+    }
+}
