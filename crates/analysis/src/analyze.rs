@@ -21,7 +21,7 @@ use crate::result::{
 use crate::segment::{Window, windows};
 use crate::sets::ScoreSet;
 use crate::timebase::{Ties, TimeBase};
-use crate::{audit, bit_rates, caveats, check, cmre, coverage, latency, reduction, verdict};
+use crate::{audit, bit_rates, caveats, check, cmre, coverage, latency, legs, reduction, verdict};
 
 /// Windows that share less than this, µs, only touch: their ends are rounded.
 const OVERLAP_US: u64 = 100;
@@ -54,6 +54,7 @@ pub fn analyze_and_keep(
     check::input(input)?;
     let plan = Closeups::choose(input, keep);
     let base = time_base(input);
+    let legs = legs::clocks(input, base.as_ref());
     let base_clock = |k: usize| base.as_ref().and_then(|b| b.clocks[k]);
     let [one, two] = std::thread::scope(|scope| {
         let second =
@@ -142,6 +143,7 @@ pub fn analyze_and_keep(
             |base| base.alignment,
         ),
         clocks: [one.clock, two.clock],
+        legs,
         contact_timing: contact_timing(input, scheduled),
         calibration,
         scored,
@@ -168,7 +170,7 @@ pub fn analyze_and_keep(
 }
 
 /// The time base, when the trigger box told of its clock.
-fn time_base(input: &SessionInput) -> Option<TimeBase> {
+pub(crate) fn time_base(input: &SessionInput) -> Option<TimeBase> {
     let used_at_us: Vec<f64> = spans(input)
         .iter()
         .flat_map(|s| [s.contact_us, s.release_us])
@@ -177,6 +179,7 @@ fn time_base(input: &SessionInput) -> Option<TimeBase> {
         reports: &input.box_reports,
         edges: [&input.edges[0], &input.edges[1]],
         channel: input.rig.trigger_channel?,
+        legs: &input.legs,
         used_at_us: &used_at_us,
     };
     TimeBase::new(&ties, &input.settings.alignment)

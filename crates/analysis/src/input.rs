@@ -5,6 +5,8 @@ use skinrig_model::{
     SentMark, TriggerEdge,
 };
 
+use crate::legs::LegStart;
+
 /// Everything but the events.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SessionInput {
@@ -24,6 +26,8 @@ pub struct SessionInput {
     pub pose_interval_us: Option<f64>,
     /// RMS standard error of the instant at which the measured pose crossed the surface, µs; `None` when not known.
     pub crossing_se_us: Option<f64>,
+    /// Where further legs begin, in order; empty for a session in one.
+    pub legs: Vec<LegStart>,
     /// The rig.
     pub rig: RigGeometry,
     /// The settings.

@@ -3,11 +3,13 @@
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 use rayon::prelude::*;
+use skinrig_analysis::SessionInput;
+use skinrig_analysis::legs::{LegStart, align};
 use skinrig_analysis::result::{AlignmentStatus, MapName};
 use skinrig_analysis::timebase::{Ties, TimeBase};
 use skinrig_model::{
-    AlignmentSettings, BoxReport, BoxTime, HostTime, Label, Mark, MarkKind, PressId, PulseTrain,
-    TriggerEdge,
+    AlignmentSettings, AnalysisSettings, BoxReport, BoxTime, HostTime, Label, Mark, MarkKind,
+    PressId, PulseTrain, RigGeometry, SkinOutline, StereoGeometry, TriggerEdge,
 };
 
 /// SplitMix64 (public domain, S. Vigna).
@@ -89,6 +91,11 @@ fn bench(seed: u64, c: &Conditions) -> Bench {
     };
     let boxed = clock(1e9);
     let cameras = [clock(1e12), clock(1e12)];
+    run(r, boxed, cameras, c)
+}
+
+/// What a bench with these clocks records.
+fn run(mut r: Random, boxed: Clock, cameras: [Clock; 2], c: &Conditions) -> Bench {
     let mut trains = Vec::new();
     let mut presses = Vec::new();
     let mut free_us = 0.0;
@@ -182,6 +189,7 @@ impl Bench {
             reports: &self.reports,
             edges: [&self.edges[0], &self.edges[1]],
             channel: 0,
+            legs: &[],
             used_at_us: &self.presses,
         };
         TimeBase::new(&ties, limits).unwrap()
@@ -376,6 +384,7 @@ fn nothing_is_certified_without_a_press_and_nothing_is_said_without_a_box() {
         reports: &[],
         edges: [&[], &[]],
         channel: 0,
+        legs: &[],
         used_at_us: &[1.0],
     };
     assert_eq!(TimeBase::new(&ties, &AlignmentSettings::default()), None);
@@ -421,4 +430,167 @@ fn a_reset_of_the_box_in_the_middle_is_bridged() {
             assert!((found - camera.at(*at)).abs() <= half, "{at}");
         }
     }
+}
+
+/// Two benches joined as the recorder joins the legs of a session: the second with the same crystals, all its clocks begun anew, and
+/// the same labels.
+struct InLegs {
+    first: Bench,
+    second: Bench,
+    leg: LegStart,
+    joined: Bench,
+}
+
+fn in_legs(seed: u64) -> InLegs {
+    let first = bench(seed, &NOISY);
+    let anew = |clock: Clock, origin_us: f64| Clock { origin_us, ..clock };
+    let second = run(
+        Random(seed + 1000),
+        anew(first.boxed, 3e5),
+        [anew(first.cameras[0], 7e9), anew(first.cameras[1], 2e6)],
+        &NOISY,
+    );
+    let after = |k: usize| (first.edges[k].last().unwrap().t_us / 1_000_000 + 2) * 1_000_000;
+    let leg = LegStart::recorded(HostTime(43_000_000_000), [after(0), after(1)]);
+    let later = |t: HostTime| HostTime(t.0 + leg.origin.0);
+    let mut reports = first.reports.clone();
+    reports.push(BoxReport::Reset {
+        noticed: leg.origin,
+    });
+    reports.extend(second.reports.iter().map(|r| match *r {
+        BoxReport::Exchange { sent, received, at } => BoxReport::Exchange {
+            sent: later(sent),
+            received: later(received),
+            at,
+        },
+        other => other,
+    }));
+    let edges = [0, 1].map(|k| {
+        let moved = second.edges[k].iter().map(|e| TriggerEdge {
+            t_us: e.t_us + leg.camera_us[k],
+            ..*e
+        });
+        first.edges[k].iter().copied().chain(moved).collect()
+    });
+    let moved = second.presses.iter().map(|at| at + 43e6);
+    let presses = first.presses.iter().copied().chain(moved).collect();
+    let joined = Bench {
+        reports,
+        edges,
+        presses,
+        ..first
+    };
+    let first = bench(seed, &NOISY);
+    InLegs {
+        first,
+        second,
+        leg,
+        joined,
+    }
+}
+
+/// Where the zero of a camera's clock in the leg lies, µs.
+fn joint(leg: &LegStart, k: usize) -> f64 {
+    leg.recorded_us[k] as f64 + leg.moved_us[k] as f64
+}
+
+/// The session as it was recorded.
+fn input(s: &InLegs) -> SessionInput {
+    SessionInput {
+        planned: Vec::new(),
+        outcomes: Vec::new(),
+        edges: s.joined.edges.clone(),
+        marks: Vec::new(),
+        box_reports: s.joined.reports.clone(),
+        gaps: [
+            vec![
+                (5, s.leg.camera_us[0] + 5),
+                (s.leg.camera_us[0] + 9, u64::MAX),
+            ],
+            Vec::new(),
+        ],
+        pose_interval_us: None,
+        crossing_se_us: None,
+        legs: vec![s.leg],
+        rig: RigGeometry {
+            outline: SkinOutline::PAPER,
+            nominal: StereoGeometry::PAPER,
+            trigger_channel: Some(0),
+        },
+        settings: AnalysisSettings::default(),
+    }
+}
+
+#[test]
+fn trains_of_one_leg_are_never_looked_for_in_another() {
+    for seed in 20..30 {
+        let s = in_legs(seed);
+        let limits = AlignmentSettings::default();
+        let mut aligned = input(&s);
+        align(&mut aligned);
+        let base = TimeBase::new(
+            &Ties {
+                reports: &aligned.box_reports,
+                edges: [&aligned.edges[0], &aligned.edges[1]],
+                channel: 0,
+                legs: &aligned.legs,
+                used_at_us: &s.joined.presses,
+            },
+            &limits,
+        )
+        .unwrap();
+        let a = &base.alignment;
+        assert_eq!(a.status, AlignmentStatus::Valid, "seed {seed}: {a:#?}");
+        assert_eq!(a.resets, 0, "the box lost nothing");
+        assert!(a.lines.iter().all(|line| line.trains_seen > 180), "{a:#?}");
+        for k in 0..2 {
+            for at in &s.first.presses {
+                let (found, half) = base.camera_us(k, *at).unwrap();
+                let off = found - s.first.cameras[k].at(*at);
+                assert!(off.abs() <= half, "seed {seed}, first leg: {off} µs");
+            }
+            for at in &s.second.presses {
+                let (found, half) = base.camera_us(k, at + 43e6).unwrap();
+                let off = found - joint(&aligned.legs[0], k) - s.second.cameras[k].at(*at);
+                assert!(off.abs() <= half, "seed {seed}, second leg: {off} µs");
+            }
+        }
+        // Taken for one leg, every label is there twice.
+        let base = s.joined.align(&limits);
+        assert_eq!(base.alignment.status, AlignmentStatus::Invalid);
+    }
+}
+
+#[test]
+fn the_legs_are_laid_on_one_line() {
+    let s = in_legs(31);
+    let mut input = input(&s);
+    align(&mut input);
+    for k in 0..2 {
+        let (one, two) = (s.first.cameras[k], s.second.cameras[k]);
+        let moved = input.legs[0].moved_us[k] as f64;
+        for host_us in [0.0, 20e6, 40e6] {
+            let other = s.leg.camera_us[k] as f64 + two.at(host_us) + moved;
+            let off = other - one.at(43e6 + host_us);
+            assert!(off.abs() < 100.0, "camera {k}: {off} µs");
+        }
+    }
+    let by = input.legs[0].moved_us[0];
+    let after = |us: u64| (s.leg.recorded_us[0] + us).saturating_add_signed(by);
+    assert_eq!(input.gaps[0], [(5, after(5)), (after(9), u64::MAX)]);
+    let begins = input.legs[0].camera_us;
+    for (k, edges) in input.edges.iter().enumerate() {
+        assert!(edges.is_sorted_by_key(|e| e.t_us));
+        let before = edges.partition_point(|e| e.t_us < begins[k]);
+        assert_eq!(before, s.first.edges[k].len(), "camera {k}");
+    }
+    let last = s.joined.edges[1].last().unwrap().t_us;
+    let moved = last.saturating_add_signed(input.legs[0].moved_us[1]);
+    assert_eq!(input.edges[1].last().unwrap().t_us, moved);
+    assert_eq!(input.edges[1][0], s.joined.edges[1][0]);
+    // Again: they are on one line already.
+    let aligned = input.legs[0].moved_us;
+    align(&mut input);
+    let further = (input.legs[0].moved_us[1] - aligned[1]).abs();
+    assert!(further <= 20, "{further} µs");
 }

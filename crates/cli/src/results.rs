@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 use skinrig_analysis::reference_code::reference_code;
-use skinrig_analysis::{Analysis, Keep, SessionInput};
+use skinrig_analysis::{Analysis, Keep, LegStart, SessionInput};
 use skinrig_model::{AnalysisSettings, CameraId, RigGeometry, RunHeader};
 use skinrig_recorder::{RecorderError, SessionReader};
 use skinrig_report::{Provenance, ReportInput};
@@ -80,8 +80,9 @@ pub(crate) fn open(path: &Path, choices: Choices<'_>) -> Result<Opened, Failure>
         ))
     })?;
     let settings = settings(&header, document.analysis, choices)?;
-    let input = session_input(&reader, settings, document.geometry).map_err(unreadable)?;
-    let events = SessionEvents::new(path, header.stream_formats);
+    let mut input = session_input(&reader, settings, document.geometry).map_err(unreadable)?;
+    skinrig_analysis::legs::align(&mut input);
+    let events = SessionEvents::new(path, header.stream_formats, &input.legs);
     Ok(Opened {
         reader,
         header,
@@ -166,6 +167,9 @@ fn session_input(
     let outcomes = reader.last_outcomes()?;
     let (pose_interval_us, crossing_se_us) = crate::contacts::timing(reader, &outcomes)?;
     let [one, two] = CameraId::ALL;
+    let further = reader.legs()?.into_iter().skip(1);
+    let legs = further.map(|leg| LegStart::recorded(leg.origin, leg.camera_origin_us));
+    let legs = legs.collect();
     Ok(SessionInput {
         planned,
         outcomes,
@@ -179,6 +183,7 @@ fn session_input(
         gaps: [reader.gaps(one)?, reader.gaps(two)?],
         pose_interval_us,
         crossing_se_us,
+        legs,
         rig,
         settings,
     })

@@ -371,6 +371,15 @@ fn replay(
 ) -> Result<(PathBuf, RunReport), Failure> {
     let reader = SessionReader::open(recording).map_err(Failure::input)?;
     let header = reader.header().map_err(Failure::input)?;
+    // A replay repeats one run of the plan on the tape's own clocks; a further leg begins in the middle of the plan.
+    let legs = reader.legs().map_err(Failure::input)?.len();
+    if legs > 1 {
+        return Err(Failure::input(format!(
+            "{}: expected a session that was recorded in one go, found one in {legs} legs, which cannot be replayed\n  \
+             next: `skinrig analyze` analyses all of it",
+            recording.display()
+        )));
+    }
     let plan: Plan = serde_json::from_str(&header.plan_json).map_err(|e| {
         Failure::input(format!(
             "{}: expected a plan in the session, found: {e}",

@@ -1,8 +1,9 @@
 //! Events of a session for the analysis, and the decoder that the recorder's check borrows.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use skinrig_analysis::EventSource;
+use skinrig_analysis::{EventSource, LegStart};
 use skinrig_formats::{Decoder, Scanner};
 use skinrig_model::{CameraId, CdEvent, ChunkFacts, StreamFormat, TriggerEdge};
 use skinrig_recorder::{ChunkScanner, SessionReader};
@@ -12,15 +13,20 @@ use skinrig_recorder::{ChunkScanner, SessionReader};
 pub struct SessionEvents {
     path: PathBuf,
     formats: [StreamFormat; 2],
+    /// By how much the times of each further leg are moved, by where they were recorded.
+    moves: [BTreeMap<u64, i64>; 2],
 }
 
 impl SessionEvents {
-    /// The events of `path`, whose cameras send `formats`.
+    /// The events of `path`, whose cameras send `formats`, in the camera times of its aligned `legs`.
     #[must_use]
-    pub fn new(path: &Path, formats: [StreamFormat; 2]) -> Self {
+    pub fn new(path: &Path, formats: [StreamFormat; 2], legs: &[LegStart]) -> Self {
+        // Of legs that begin at the same camera time only the last has events.
+        let recorded = |leg: &LegStart, k: usize| (leg.recorded_us[k], leg.moved_us[k]);
         Self {
             path: path.to_owned(),
             formats,
+            moves: [0, 1].map(|k| legs.iter().map(|leg| recorded(leg, k)).collect()),
         }
     }
 }
@@ -32,11 +38,13 @@ impl EventSource for SessionEvents {
         each: &mut dyn FnMut(&[CdEvent]),
     ) -> Result<(), String> {
         let reader = SessionReader::open(&self.path).map_err(|e| e.to_string())?;
+        let moves = &self.moves[camera.index()];
         let mut decoder = Decoder::new(self.formats[camera.index()]);
         reader
             .for_each_chunk(camera, 0, |meta, bytes| {
                 if let Some(origin_us) = meta.restart_us {
-                    decoder.restart(origin_us);
+                    let by = moves.get(&origin_us).copied().unwrap_or_default();
+                    decoder.restart(origin_us.saturating_add_signed(by));
                 }
                 decoder.for_each_slice(bytes, &mut *each)
             })

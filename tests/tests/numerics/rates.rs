@@ -63,6 +63,7 @@ fn session() -> SessionInput {
         box_reports: Vec::new(),
         pose_interval_us: None,
         crossing_se_us: None,
+        legs: Vec::new(),
         rig: RigGeometry {
             outline: SkinOutline::PAPER,
             nominal: StereoGeometry::PAPER,

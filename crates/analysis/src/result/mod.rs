@@ -42,6 +42,9 @@ pub struct Analysis {
     pub counts: PressCounts,
     /// Clock fits, camera 1 and camera 2; `None` where no alignment was possible.
     pub clocks: [Option<ClockFit>; 2],
+    /// The clocks of each leg, for a session in several: `clocks` are one line through all of them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub legs: Vec<LegClock>,
     /// The alignment certificate: whether the clocks are known well enough for the numbers to be used.
     #[serde(default)]
     pub alignment: Alignment,
@@ -131,6 +134,18 @@ pub struct ClockFit {
     pub n: u32,
     /// Points left out as outliers or strays.
     pub rejected: u32,
+}
+
+/// The cameras' clocks in one leg of a session.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct LegClock {
+    /// 1, 2, 3, ...
+    pub number: u32,
+    /// Where it begins on the host's clock, s.
+    pub start_s: f64,
+    /// The fit to this leg alone, camera 1 and camera 2, in the camera times of the whole session; `None` where its own trains or
+    /// marks give none.
+    pub cameras: [Option<ClockFit>; 2],
 }
 
 /// How a clock fit was found.

@@ -4,6 +4,8 @@ use std::collections::BTreeMap;
 
 use skinrig_model::{BoxReport, Label, PulseTrain};
 
+use crate::legs::{LegStart, leg_at};
+
 /// An exchange of time: `sent <= box time <= received`, µs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tie {
@@ -20,13 +22,15 @@ pub struct Sent {
     pub train: PulseTrain,
     /// The first rising edge on the box's clock, relative to [`Epoch::reference_us`].
     pub box_us: f64,
-    /// No other train of the session has this label.
+    /// No other train of its leg has this label.
     pub unique: bool,
 }
 
 /// Reports between two resets.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Epoch {
+    /// The leg that it belongs to, 0 for the first.
+    pub leg: usize,
     /// Box time to which all others are relative, µs.
     pub reference_us: u64,
     /// In time order.
@@ -35,16 +39,27 @@ pub struct Epoch {
     pub trains: Vec<Sent>,
 }
 
-/// The epochs of a session in order; those without any train or exchange are left out.
-pub fn epochs(reports: &[BoxReport]) -> Vec<Epoch> {
-    let mut times: BTreeMap<Label, u32> = BTreeMap::new();
-    for report in reports {
-        if let Some((label, _)) = train_of(report) {
-            *times.entry(label).or_default() += 1;
+/// The epochs of a session in order; those without any train or exchange are left out. Every further leg begins with a reset at its
+/// origin.
+pub fn epochs(reports: &[BoxReport], legs: &[LegStart]) -> Vec<Epoch> {
+    let mut leg = 0;
+    let mut parts = Vec::new();
+    for part in reports.split_inclusive(|r| matches!(r, BoxReport::Reset { .. })) {
+        parts.push((leg, part));
+        if let Some(BoxReport::Reset { noticed }) = part.last() {
+            leg = leg_at(legs, *noticed);
         }
     }
-    let parts = reports.split(|r| matches!(r, BoxReport::Reset { .. }));
-    parts.filter_map(|part| epoch(part, &times)).collect()
+    // The same label may come in every leg: its trains are looked for among the edges of its own.
+    let mut times: BTreeMap<(usize, Label), u32> = BTreeMap::new();
+    for (leg, part) in &parts {
+        for (label, _) in part.iter().filter_map(train_of) {
+            *times.entry((*leg, label)).or_default() += 1;
+        }
+    }
+    let each = parts.into_iter();
+    each.filter_map(|(leg, part)| epoch(part, leg, &times))
+        .collect()
 }
 
 fn train_of(report: &BoxReport) -> Option<(Label, u64)> {
@@ -55,13 +70,14 @@ fn train_of(report: &BoxReport) -> Option<(Label, u64)> {
     }
 }
 
-fn epoch(part: &[BoxReport], times: &BTreeMap<Label, u32>) -> Option<Epoch> {
+fn epoch(part: &[BoxReport], leg: usize, times: &BTreeMap<(usize, Label), u32>) -> Option<Epoch> {
     let reference_us = part.iter().find_map(|r| match *r {
         BoxReport::Exchange { at, .. } => Some(at.us),
         _ => train_of(r).map(|(_, us)| us),
     })?;
     let relative = |us: u64| us.wrapping_sub(reference_us) as i64 as f64;
     let mut out = Epoch {
+        leg,
         reference_us,
         ..Epoch::default()
     };
@@ -79,7 +95,7 @@ fn epoch(part: &[BoxReport], times: &BTreeMap<Label, u32>) -> Option<Epoch> {
                 label,
                 train,
                 box_us: relative(us),
-                unique: times.get(&label) == Some(&1),
+                unique: times.get(&(leg, label)) == Some(&1),
             });
         }
     }

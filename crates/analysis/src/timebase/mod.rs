@@ -9,13 +9,14 @@ mod epochs;
 mod host;
 mod piecewise;
 
-use skinrig_model::{AlignmentSettings, BoxReport, TriggerEdge};
+use skinrig_model::{AlignmentSettings, BoxReport, HostTime, TriggerEdge};
 
 use self::edges::{CameraFromBox, Edges};
 use self::epochs::{Epoch, epochs};
 use self::host::HostFromBox;
 use self::piecewise::{Piecewise, Point};
 use crate::clock::line::{self, Pair};
+use crate::legs::{LegLine, LegStart, edges_of, leg_at};
 use crate::metrics::quantile;
 use crate::result::{
     Alignment, AlignmentStatus, ClockFit, ClockMap, ClockMethod, Knot, LineCounts, MapName,
@@ -37,6 +38,8 @@ pub struct Ties<'a> {
     pub edges: [&'a [TriggerEdge]; 2],
     /// The channel that carries the trains.
     pub channel: u8,
+    /// Where further legs of the session begin.
+    pub legs: &'a [LegStart],
     /// Host instants at which the time base is used, µs: contacts and releases.
     pub used_at_us: &'a [f64],
 }
@@ -54,6 +57,7 @@ pub struct TimeBase {
 /// The maps of one epoch.
 #[derive(Debug, Clone, PartialEq)]
 struct Piece {
+    leg: usize,
     reference_us: u64,
     span_us: (f64, f64),
     host: HostFromBox,
@@ -80,15 +84,31 @@ impl TimeBase {
             return None;
         }
         let resets = ties.reports.iter();
+        // A further leg is no fault of the box.
+        let begins_leg = |t: HostTime| ties.legs.iter().any(|leg| leg.origin == t);
         let resets = resets
-            .filter(|r| matches!(r, BoxReport::Reset { .. }))
+            .filter(|r| matches!(r, BoxReport::Reset { noticed } if !begins_leg(*noticed)))
             .count() as u32;
         let mut violations = Vec::new();
         let mut pieces = Vec::new();
-        let mut lines = [0, 1].map(|k| Edges::new(ties.edges[k], ties.channel));
-        for epoch in epochs(ties.reports) {
-            if let Some(piece) = piece(&epoch, &mut lines, &mut violations) {
+        let used = |leg: usize| {
+            let at = |us: &f64| leg_at(ties.legs, HostTime((us * 1e3) as i64)) == leg;
+            ties.legs.is_empty() || ties.used_at_us.iter().any(at)
+        };
+        let mut lines = Vec::new();
+        for leg in 0..=ties.legs.len() {
+            // Edges of one leg say nothing of trains of another.
+            let edges = |k: usize| edges_of(ties.edges[k], ties.legs, leg, k);
+            lines.push([0, 1].map(|k| Edges::new(edges(k), ties.channel)));
+        }
+        for epoch in epochs(ties.reports, ties.legs) {
+            let mut found = Vec::new();
+            if let Some(piece) = piece(&epoch, &mut lines[epoch.leg], &mut found) {
                 pieces.push(piece);
+            }
+            // A leg that was cut off before its first press has no trains, and needs no clock.
+            if used(epoch.leg) {
+                violations.extend(found);
             }
         }
         pieces.sort_by(|a, b| a.span_us.0.total_cmp(&b.span_us.0));
@@ -97,7 +117,7 @@ impl TimeBase {
         }
         let mut base = Self {
             alignment: Alignment::default(),
-            clocks: [0, 1].map(|k| clock(&pieces, k)),
+            clocks: [0, 1].map(|k| Some(clock(pieces.iter(), k)?.fit)),
             pieces,
         };
         let mut alignment = Alignment {
@@ -139,6 +159,11 @@ impl TimeBase {
     #[must_use]
     pub fn camera_us(&self, camera: usize, host_us: f64) -> Option<(f64, f64)> {
         self.at(host_us)?.camera_us(camera, host_us)
+    }
+
+    /// One line through camera over host time at the trains of one leg, 0 for the first.
+    pub(crate) fn leg_line(&self, leg: usize, camera: usize) -> Option<LegLine> {
+        clock(self.pieces.iter().filter(|p| p.leg == leg), camera)
     }
 
     /// Camera time of an instant on the box's clock in its first epoch, and the half width of its 95 % interval, µs.
@@ -300,6 +325,7 @@ fn piece(epoch: &Epoch, lines: &mut [Edges; 2], violations: &mut Vec<String>) ->
             .ok()
     });
     Some(Piece {
+        leg: epoch.leg,
         reference_us: epoch.reference_us,
         span_us: (first.sent_us, last.received_us),
         host,
@@ -308,9 +334,9 @@ fn piece(epoch: &Epoch, lines: &mut [Edges; 2], violations: &mut Vec<String>) ->
 }
 
 /// One line through camera over host time at all trains.
-fn clock(pieces: &[Piece], k: usize) -> Option<ClockFit> {
+fn clock<'a>(pieces: impl Iterator<Item = &'a Piece> + Clone, k: usize) -> Option<LegLine> {
     let reference_us = pieces
-        .iter()
+        .clone()
         .find_map(|p| p.cameras[k].as_ref())?
         .reference_us;
     let mut trains = Vec::new();
@@ -331,7 +357,7 @@ fn clock(pieces: &[Piece], k: usize) -> Option<ClockFit> {
         }
     }
     let line = line::fit(&trains, 1.0)?;
-    Some(ClockFit {
+    let fit = ClockFit {
         method: ClockMethod::TimeBase,
         offset_us: reference_us as f64 + line.offset_us,
         drift_ppm: line.drift * 1e6,
@@ -340,6 +366,11 @@ fn clock(pieces: &[Piece], k: usize) -> Option<ClockFit> {
         residual_max_us: line.max_us,
         n: line.n() as u32,
         rejected: (trains.len() - line.n()) as u32 + contradicted,
+    };
+    let sum: f64 = trains.iter().map(|t| t.host_us).sum();
+    Some(LegLine {
+        fit,
+        middle_us: sum / trains.len() as f64,
     })
 }
 

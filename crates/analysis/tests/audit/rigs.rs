@@ -210,6 +210,7 @@ pub fn session(seed: u64, wishes: Wishes) -> Session {
         box_reports: Vec::new(),
         pose_interval_us: None,
         crossing_se_us: None,
+        legs: Vec::new(),
         rig: RigGeometry {
             outline: SkinOutline::PAPER,
             nominal,

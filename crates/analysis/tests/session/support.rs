@@ -85,6 +85,7 @@ pub fn session() -> (SessionInput, Memory) {
         box_reports: Vec::new(),
         pose_interval_us: None,
         crossing_se_us: None,
+        legs: Vec::new(),
         rig: RigGeometry {
             outline: SkinOutline::PAPER,
             nominal: StereoGeometry::PAPER,

@@ -127,6 +127,7 @@ pub fn analysis(side: u32, repetitions: u32) -> Analysis {
     Analysis {
         version: ANALYSIS_VERSION,
         alignment: alignment(),
+        legs: Vec::new(),
         contact_timing: Default::default(),
         settings: AnalysisSettings::default(),
         rig: RigGeometry { outline, nominal: geometry, trigger_channel: Some(0) },

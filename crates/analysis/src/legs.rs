@@ -1,0 +1,179 @@
+//! Owns the legs of a session: the camera clocks of all of them laid on one line.
+//!
+//! In each leg a camera's clock began anew, and where is not known: the recorder only put the legs behind one another. Once each
+//! leg's clock is fitted on its own, its times are moved by whole µs so that one line through camera over host time holds for all.
+//! From there on a session in legs is as any other.
+
+use skinrig_model::{HostTime, TriggerEdge};
+
+use crate::clock::fit_marks;
+use crate::input::SessionInput;
+use crate::result::{ClockFit, LegClock};
+use crate::timebase::TimeBase;
+
+/// Where a further leg of the session begins.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct LegStart {
+    /// On the host's clock; all times of the leg are at or after it, all earlier ones before.
+    pub origin: HostTime,
+    /// Where the recorder put each camera's zero of the leg, µs.
+    pub recorded_us: [u64; 2],
+    /// On each camera's clock: all events of the leg are at or after it, all earlier ones before, µs.
+    pub camera_us: [u64; 2],
+    /// By how much [`align`] moved each camera's times of the leg, µs; 0 before it.
+    pub moved_us: [i64; 2],
+}
+
+impl LegStart {
+    /// A leg as it was recorded.
+    #[must_use]
+    pub const fn recorded(origin: HostTime, recorded_us: [u64; 2]) -> Self {
+        Self {
+            origin,
+            recorded_us,
+            camera_us: recorded_us,
+            moved_us: [0; 2],
+        }
+    }
+}
+
+/// A leg's events may come this long before its host time, µs: half of the least pause between two legs.
+const BEFORE_US: f64 = 0.5e6;
+
+/// A leg's line, and a host time in the middle of what it was fitted to, µs.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct LegLine {
+    pub fit: ClockFit,
+    pub middle_us: f64,
+}
+
+/// The edges of one leg, 0 for the first, out of all edges of a camera in stream order.
+pub(crate) fn edges_of<'a>(
+    edges: &'a [TriggerEdge],
+    legs: &[LegStart],
+    leg: usize,
+    camera: usize,
+) -> &'a [TriggerEdge] {
+    let from = leg.checked_sub(1).map_or(0, |i| legs[i].camera_us[camera]);
+    let to = legs
+        .get(leg)
+        .map_or(u64::MAX, |next| next.camera_us[camera]);
+    // In order but for a broken time base, whose edges are nowhere anyway.
+    let start = edges.partition_point(|e| e.t_us < from);
+    let end = edges.partition_point(|e| e.t_us < to).max(start);
+    &edges[start..end]
+}
+
+/// The leg that a host time belongs to, 0 for the first.
+pub(crate) fn leg_at(legs: &[LegStart], t: HostTime) -> usize {
+    legs.partition_point(|leg| leg.origin <= t)
+}
+
+/// Moves the camera times of all further legs, those of edges and of gaps, onto the line of the first, and says in
+/// [`SessionInput::legs`] by how much: whoever hands over the events moves them too. A session in one leg stays as it is.
+pub fn align(input: &mut SessionInput) {
+    if input.legs.is_empty() {
+        return;
+    }
+    let base = crate::analyze::time_base(input);
+    for k in 0..2 {
+        let lines: Vec<Option<LegLine>> = (0..=input.legs.len())
+            .map(|leg| {
+                let trains = base.as_ref().and_then(|b| b.leg_line(leg, k));
+                trains.or_else(|| marks(input, leg, k))
+            })
+            .collect();
+        let moves = moves(&input.legs, &lines, k);
+        move_camera(input, k, &moves);
+        // A camera's zero may be long before its first event; what is recorded of a leg begins with its host time.
+        for ((leg, line), by) in input.legs.iter_mut().zip(&lines[1..]).zip(&moves[1..]) {
+            if let Some(line) = line {
+                let begins_us = line.fit.camera_us(leg.origin.0 as f64 * 1e-3) + *by as f64;
+                leg.camera_us[k] = (begins_us - BEFORE_US).max(0.0) as u64;
+            }
+        }
+    }
+}
+
+/// By how much each leg, the first included, has to be moved, µs.
+fn moves(legs: &[LegStart], lines: &[Option<LegLine>], k: usize) -> Vec<i64> {
+    let known = lines.iter().enumerate();
+    let known = known.filter_map(|(leg, line)| Some((leg, (*line)?)));
+    let steadiest = known.min_by(|a, b| a.1.fit.drift_se_ppm.total_cmp(&b.1.fit.drift_se_ppm));
+    // How far a leg's camera clock is ahead of the host's, would both have begun at the same instant.
+    let start = |leg: usize| {
+        let begun = leg.checked_sub(1).map(|i| &legs[i]);
+        begun.map_or(0.0, |b| b.origin.0 as f64 * 1e-3 - b.recorded_us[k] as f64)
+    };
+    let wanted = |leg: usize| match (steadiest, &lines[leg]) {
+        (Some((_, best)), Some(line)) => {
+            let host_us = line.middle_us;
+            let rate = 1.0 + best.fit.drift_ppm * 1e-6;
+            best.fit.camera_us(best.middle_us) + (host_us - best.middle_us) * rate
+                - line.fit.camera_us(host_us)
+        }
+        // Nothing ties its clocks: as if they had begun together as those of the leg that is known best.
+        (best, _) => start(leg) - start(best.map_or(0, |(leg, _)| leg)),
+    };
+    let first = wanted(0);
+    (0..lines.len())
+        .map(|leg| (wanted(leg) - first).round() as i64)
+        .collect()
+}
+
+fn move_camera(input: &mut SessionInput, k: usize, moves: &[i64]) {
+    let begins: Vec<u64> = input.legs.iter().map(|leg| leg.camera_us[k]).collect();
+    let moved = |t_us: u64| {
+        let leg = begins.partition_point(|from| *from <= t_us);
+        // The end of a gap without an end.
+        if t_us == u64::MAX {
+            t_us
+        } else {
+            t_us.saturating_add_signed(moves[leg])
+        }
+    };
+    for edge in &mut input.edges[k] {
+        edge.t_us = moved(edge.t_us);
+    }
+    for (from, to) in &mut input.gaps[k] {
+        (*from, *to) = (moved(*from), moved(*to));
+    }
+    for (leg, by) in input.legs.iter_mut().zip(&moves[1..]) {
+        leg.camera_us[k] = moved(leg.camera_us[k]);
+        leg.moved_us[k] += *by;
+    }
+}
+
+/// Without reports of the box: the marks that the host sent.
+fn marks(input: &SessionInput, leg: usize, k: usize) -> Option<LegLine> {
+    let channel = input.rig.trigger_channel?;
+    let sent = input.marks.iter().copied();
+    let sent: Vec<_> = sent.filter(|m| leg_at(&input.legs, m.t) == leg).collect();
+    let edges = edges_of(&input.edges[k], &input.legs, leg, k);
+    let fit = fit_marks(edges, channel, &sent)?.fit;
+    let sum: f64 = sent.iter().map(|m| m.t.0 as f64 * 1e-3).sum();
+    Some(LegLine {
+        fit,
+        middle_us: sum / sent.len() as f64,
+    })
+}
+
+/// What is known of the clocks in each leg; empty for a session in one leg.
+pub(crate) fn clocks(input: &SessionInput, base: Option<&TimeBase>) -> Vec<LegClock> {
+    if input.legs.is_empty() {
+        return Vec::new();
+    }
+    (0..=input.legs.len())
+        .map(|leg| LegClock {
+            number: leg as u32 + 1,
+            start_s: leg
+                .checked_sub(1)
+                .map_or(0.0, |i| input.legs[i].origin.as_secs_f64()),
+            cameras: [0, 1].map(|k| {
+                let trains = base.and_then(|b| b.leg_line(leg, k));
+                let line = trains.or_else(|| marks(input, leg, k));
+                line.map(|line| line.fit)
+            }),
+        })
+        .collect()
+}
