@@ -69,6 +69,9 @@ pub fn record(
     let (path, writer) = new_session(intent, started, folder)?;
     let view = ProgressView::new(plan.presses.len(), intent.expected);
     let mut sink = SessionSink::new(writer, view, intent.known.clone());
+    if preflight.is_some() {
+        sink = sink.on_disk_of(folder);
+    }
 
     let control = operator.control();
     if let Some((at, kind)) = intent.known.interruption {

@@ -1,6 +1,7 @@
 //! The consumer of a run's records: the session file first, then the terminal.
 
 use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 
 use skinrig_controller::{RecordSink, SinkFault};
 use skinrig_model::{HostTime, InterruptionKind, PressId, PressVerdict, Record};
@@ -25,6 +26,8 @@ pub struct SessionSink {
     writer: SessionWriter,
     view: ProgressView,
     known: Foreknowledge,
+    /// Where the session lies, when its free space matters.
+    folder: Option<PathBuf>,
 }
 
 impl SessionSink {
@@ -35,7 +38,15 @@ impl SessionSink {
             writer,
             view,
             known,
+            folder: None,
         }
+    }
+
+    /// Tells the free space of `folder` when it is asked for.
+    #[must_use]
+    pub fn on_disk_of(mut self, folder: &Path) -> Self {
+        self.folder = Some(folder.to_owned());
+        self
     }
 
     /// Seals the session.
@@ -49,6 +60,11 @@ impl SessionSink {
 }
 
 impl RecordSink for SessionSink {
+    fn free_bytes(&mut self) -> Option<u64> {
+        let free_b = gates::free_bytes(self.folder.as_deref()?).ok()?;
+        Some(free_b as u64)
+    }
+
     fn accept(&mut self, mut record: Record) -> Result<(), SinkFault> {
         if let Record::Outcome(outcome) = &mut record {
             outcome.scheduled |= self.known.scheduled;

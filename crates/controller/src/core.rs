@@ -20,6 +20,7 @@ use crate::run::{Resume, RunReport};
 use crate::settings::ControllerSettings;
 use crate::sink::RecordSink;
 use crate::states::{Event, Machine, State};
+use crate::suspend::Suspender;
 use crate::touch::TouchDetector;
 
 /// A press under way.
@@ -62,6 +63,7 @@ pub(crate) struct Core<'a> {
     pub(crate) checks: Vec<PreflightCheck>,
     /// While the cameras are checked: what they deliver.
     pub(crate) watch: Option<Watch>,
+    pub(crate) suspender: Suspender,
     /// While ending: cameras and the trigger box no longer stop anything.
     pub(crate) ending: bool,
     /// A motion is under way that the operator's `pause_now` breaks off.
@@ -120,6 +122,7 @@ impl<'a> Core<'a> {
             preflight: None,
             checks: Vec::new(),
             watch: None,
+            suspender: Suspender::new(plan.suspend),
             ending: false,
             breakable: false,
             halted_at: None,
@@ -170,6 +173,7 @@ impl<'a> Core<'a> {
         }
         self.clock.wait_until(until);
         self.observe()?;
+        self.suspend()?;
         self.hear()
     }
 
@@ -301,6 +305,7 @@ impl<'a> Core<'a> {
                 open.lost[i] += chunk.lost_before;
                 open.bytes[i] += chunk.bytes.len() as u64;
             }
+            self.suspender.count(&chunk);
             if let Some(watch) = &mut self.watch {
                 watch.see(&chunk);
             }
@@ -390,6 +395,7 @@ impl<'a> Core<'a> {
                 Request::Pause => (Event::Pause, InterruptionKind::Pause, "operator: pause"),
                 Request::Resume => (Event::Resume, InterruptionKind::Resume, "operator: resume"),
             };
+            self.suspender.let_go();
             self.machine.fire(event);
             // A request without effect is not told.
             if self.machine.state() != before {

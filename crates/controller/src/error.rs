@@ -185,6 +185,14 @@ pub enum ControllerError {
         /// The number that came.
         found: u64,
     },
+    /// What suspended the run went on for too long.
+    #[error("{reason}; expected it to be over within {limit}")]
+    Suspended {
+        /// What suspended it.
+        reason: String,
+        /// Longest suspension.
+        limit: HostDuration,
+    },
     /// The code itself failed, or the run was dropped before its end.
     #[error("internal error: {0}")]
     Internal(String),

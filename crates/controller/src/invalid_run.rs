@@ -1,5 +1,6 @@
 //! Invalid presses in a row: past a limit something is wrong that more presses do not mend.
 
+use crate::suspend::SUSPENDED;
 use skinrig_model::PressVerdict;
 
 use crate::error::ControllerError;
@@ -36,7 +37,8 @@ impl InvalidRun {
     /// [`ControllerError::InvalidInARow`] at the limit.
     pub(crate) fn press_ended(&mut self) -> Result<(), ControllerError> {
         match self.last.take() {
-            Some(PressVerdict::Invalid(reason)) if reason.starts_with(PAUSED) => {}
+            Some(PressVerdict::Invalid(reason))
+                if reason.starts_with(PAUSED) || reason.starts_with(SUSPENDED) => {}
             Some(PressVerdict::Invalid(reason)) => self.reasons.push(reason),
             _ => self.reasons.clear(),
         }

@@ -63,6 +63,11 @@ impl<'a> Journal<'a> {
         }
     }
 
+    /// Bytes that the sink still has room for, when it knows.
+    pub(crate) fn free_bytes(&mut self) -> Option<u64> {
+        self.sink.free_bytes()
+    }
+
     /// From now on nothing that the sink does stops the run's end.
     pub(crate) const fn ending(&mut self) {
         self.lenient = true;

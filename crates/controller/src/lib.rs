@@ -49,6 +49,7 @@ pub mod sink;
 pub mod states;
 mod steps;
 mod surface;
+pub mod suspend;
 mod touch;
 mod verdict;
 pub mod watchdog;

@@ -116,7 +116,10 @@ impl Core<'_> {
     ) -> Result<Option<Trouble>, Halt> {
         self.breakable = false;
         match part {
-            Err(Halt::PausedNow) => Ok(Some(Trouble::passing(PAUSED.to_owned()))),
+            Err(Halt::PausedNow) => {
+                let why = self.suspender.reason().unwrap_or(PAUSED);
+                Ok(Some(Trouble::passing(why.to_owned())))
+            }
             other => other,
         }
     }

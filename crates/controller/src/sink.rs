@@ -15,4 +15,9 @@ pub trait RecordSink {
     /// # Errors
     /// [`SinkFault`] when the record cannot be kept; the controller then retracts, disarms and ends the run.
     fn accept(&mut self, record: Record) -> Result<(), SinkFault>;
+
+    /// Bytes that there is still room for; `None` when it does not know.
+    fn free_bytes(&mut self) -> Option<u64> {
+        None
+    }
 }

@@ -104,6 +104,7 @@ pub(crate) fn compile(protocol: &Protocol) -> Plan {
             },
             ..check
         }),
+        suspend: protocol.suspend,
         presses: writer.presses,
         steps: writer.steps,
     }

@@ -10,6 +10,7 @@ use crate::area::Surroundings;
 use crate::retakes::Retakes;
 use crate::surface::Surface;
 use crate::surface_check::SurfaceCheck;
+use crate::suspend::Suspend;
 
 /// Everything a run does, in order.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -37,6 +38,9 @@ pub struct Plan {
     /// Where the surface is touched before the first press; `None`: nowhere.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub surface_check: Option<SurfaceCheck>,
+    /// When the run waits by itself. Not written when it never does.
+    #[serde(default, skip_serializing_if = "Suspend::is_default")]
+    pub suspend: Suspend,
     /// Every planned press; `presses[i].id == PressId(i)`.
     pub presses: Vec<PlannedPress>,
     /// What to do, in order.

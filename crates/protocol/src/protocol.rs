@@ -14,6 +14,7 @@ use crate::plan::{Plan, RunLimits};
 use crate::retakes::Retakes;
 use crate::surface::Surface;
 use crate::surface_check::SurfaceCheck;
+use crate::suspend::Suspend;
 
 /// Reads a file that a protocol names. The path is the protocol's folder joined with the name in the protocol.
 pub type Loader<'a> = &'a dyn Fn(&Path) -> std::io::Result<Vec<u8>>;
@@ -69,6 +70,8 @@ pub struct Protocol {
     pub max_consecutive_invalid: u32,
     /// Where the surface is touched before the first press.
     pub surface_check: Option<SurfaceCheck>,
+    /// When the run waits by itself.
+    pub suspend: Suspend,
     /// Moments that emit a mark on the trigger line.
     pub marks: Vec<MarkKind>,
     /// How presses find the surface; `None`: as the rig says, at z = 0 when it says nothing.

@@ -1,7 +1,9 @@
 //! A schedule as a plan: the same presses at the same times, executed by the same controller.
 
 use skinrig_model::{HostDuration, HostTime, PlannedPress, Point3, Robot};
-use skinrig_protocol::{OnTrip, Plan, PressStep, Retakes, RunLimits, Schedule, Step, Surface};
+use skinrig_protocol::{
+    OnTrip, Plan, PressStep, Retakes, RunLimits, Schedule, Step, Surface, Suspend,
+};
 
 /// Height of the scheduled tip before the first press, mm. Nothing moves.
 const START_MM: f64 = 5.0;
@@ -66,6 +68,7 @@ pub fn compile(schedule: &Schedule, presses: Vec<PlannedPress>, times: &[HostTim
         retakes: Retakes::NONE,
         max_consecutive_invalid: 0,
         surface_check: None,
+        suspend: Suspend::default(),
         presses,
         steps,
     }

@@ -141,13 +141,21 @@ fn disk(folder: &Path, session_b: f64, reserve_b: f64) -> PreflightCheck {
 }
 
 #[cfg(unix)]
-fn free_bytes(folder: &Path) -> Result<f64, String> {
+/// Free bytes in `folder`, for whoever may write there.
+///
+/// # Errors
+/// What the system answers.
+pub fn free_bytes(folder: &Path) -> Result<f64, String> {
     let room = rustix::fs::statvfs(folder).map_err(|e| e.to_string())?;
     Ok(room.f_bavail as f64 * room.f_frsize as f64)
 }
 
 #[cfg(not(unix))]
-fn free_bytes(_folder: &Path) -> Result<f64, String> {
+/// Free bytes cannot be asked for here.
+///
+/// # Errors
+/// Always.
+pub fn free_bytes(_folder: &Path) -> Result<f64, String> {
     Err("free space cannot be asked for on this system".to_owned())
 }
 

@@ -57,7 +57,7 @@ fn act() -> impl Strategy<Value = Act> {
         3 => Just(Act::Arm),
         1 => Just(Act::Disarm),
         1 => Just(Act::Hold),
-        10 => (1u8..120).prop_map(Act::Good),
+        10 => (1u8..60).prop_map(Act::Good),
         1 => (0u16..300).prop_map(Act::Blind),
         1 => Just(Act::Nothing),
         1 => (0usize..6, number(-80.0, 80.0)).prop_map(|(i, v)| Act::Coordinate(i, v)),
@@ -122,14 +122,14 @@ impl Books {
         }
     }
 
-    /// Ideal motion, a sample every 4 ms.
+    /// Ideal motion, a sample every 8 ms.
     fn advance(&mut self, ms: i64, sampled: bool) {
         let end = self.now + ms * MS;
-        while self.moved_to + 4 * MS <= end {
-            self.moved_to += 4 * MS;
+        while self.moved_to + 8 * MS <= end {
+            self.moved_to += 8 * MS;
             let way: [f64; 3] = std::array::from_fn(|i| self.target[i] - self.tip[i]);
             let left = way.iter().map(|v| v * v).sum::<f64>().sqrt();
-            let step = (self.speed * 4e-3).min(left);
+            let step = (self.speed * 8e-3).min(left);
             if self.armed && left > 0.0 {
                 self.tip = std::array::from_fn(|i| self.tip[i] + way[i] / left * step);
             }
@@ -331,7 +331,7 @@ fn step(
         Act::Nothing => lock(books).advance(7, false),
         Act::Coordinate(i, v) => {
             let mut b = lock(books);
-            b.advance(5, true);
+            b.advance(9, true);
             let mut s = b.sample(b.now, b.tip, 0.0);
             let wrong = if i < 3 {
                 &mut s.measured
@@ -345,13 +345,13 @@ fn step(
         }
         Act::Force(force_n) => {
             let mut b = lock(books);
-            b.advance(5, true);
+            b.advance(9, true);
             let s = b.sample(b.now, b.tip, force_n);
             b.waiting.push(s);
         }
         Act::Shifted(ms) => {
             let mut b = lock(books);
-            b.advance(5, true);
+            b.advance(9, true);
             let s = b.sample(b.now + i64::from(ms) * MS, b.tip, 0.0);
             b.waiting.push(s);
         }
@@ -420,7 +420,7 @@ fn cases(count: u32) {
         ..ProptestConfig::default()
     };
     let moved = std::cell::Cell::new(0u64);
-    let acts = (prop::collection::vec(act(), 1..60), any::<bool>());
+    let acts = (prop::collection::vec(act(), 1..40), any::<bool>());
     let mut runner = proptest::test_runner::TestRunner::new(config);
     let answer = runner.run(&acts, |(acts, brake)| {
         let on_trip = if brake {

@@ -10,5 +10,6 @@ mod progress;
 mod resumed;
 mod rig_faults;
 mod simulated;
+mod suspend;
 mod touch;
 mod watchdog;

@@ -10,7 +10,7 @@ use skinrig_device::{
 use skinrig_model::*;
 use skinrig_protocol::area::Surroundings;
 use skinrig_protocol::plan::{OnTrip, Plan, PressStep, RunLimits, Step};
-use skinrig_protocol::{Retakes, Surface};
+use skinrig_protocol::{Retakes, Surface, Suspend};
 
 pub const MS: i64 = 1_000_000;
 
@@ -597,6 +597,7 @@ pub fn plan() -> Plan {
         retakes: Retakes::NONE,
         max_consecutive_invalid: 0,
         surface_check: None,
+        suspend: Suspend::default(),
         presses,
         steps,
     }

@@ -187,6 +187,9 @@ fn assemble(
             out,
         )
     });
+    let suspend = root
+        .get("suspend")
+        .and_then(|s| crate::suspend::suspend(s, out));
     let limits_read = limits.and_then(|l| read_limits(l, motion, out));
     let path = root.get("path").and_then(|f| {
         path::locations(
@@ -274,6 +277,7 @@ fn assemble(
         retakes: root.get("retakes").and_then(crate::retakes::retakes)?,
         max_consecutive_invalid: limits?.count("max_consecutive_invalid")?,
         surface_check: surface_check.map_or(Some(None), |s| s.map(Some))?,
+        suspend: suspend?,
         marks: marks?,
         surface: surface.map_or(Some(None), |s| s.map(Some))?,
         analysis: analysis?,

@@ -16,6 +16,7 @@ use crate::retakes::RETAKES;
 use crate::shape::{Key, Need, Range, Shape, Table, Word};
 use crate::surface::PRESS;
 use crate::surface_check::SURFACE_CHECK;
+use crate::suspend::SUSPEND;
 use frame::{FRAME, SYNC};
 use path::{ORDER, ORDER_TABLE, PATH, REPETITIONS};
 use run::{CAMERAS, LIMITS, MOTION, TRIGGERS};
@@ -176,6 +177,12 @@ pub(crate) static PROTOCOL: Table = Table {
             Shape::Map(&RETAKES),
             "{}",
             "How often a press is taken again because its data were lost or it came too late.",
+        ),
+        default(
+            "suspend",
+            Shape::Map(&SUSPEND),
+            "{}",
+            "When the run waits by itself until a disturbance is over.",
         ),
         default(
             "triggers",

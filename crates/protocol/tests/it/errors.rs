@@ -346,6 +346,28 @@ fn a_broken_limit_is_one_finding_at_its_key() {
 }
 
 #[test]
+fn a_suspension_needs_room_between_its_levels() {
+    let with = |levels: &str| {
+        let text = shipped("demo.yaml");
+        parse(&format!("{text}\nsuspend: {{disk_free: {levels}}}\n"), &[])
+    };
+    let suspend = with("{below: 5 GB, resume_above: 6 GB}").map(|p| p.suspend);
+    let disk = suspend.as_ref().ok().and_then(|s| s.disk_free);
+    assert!(
+        disk.is_some_and(|d| d.is_beyond(4.9e9) && d.is_calm(6e9) && !d.is_calm(5.9e9)),
+        "{suspend:?}"
+    );
+    for turned in [
+        "{below: 6 GB, resume_above: 5 GB}",
+        "{below: 5 GB, resume_above: 5 GB}",
+    ] {
+        let error = with(turned).unwrap_err();
+        assert_eq!(error.list().len(), 1, "{error}");
+        assert_eq!(error.list()[0].path, "suspend.disk_free", "{error}");
+    }
+}
+
+#[test]
 fn the_other_language_and_anchors_are_named_once() {
     let error = parse(&shipped("ten-presses.schedule.yaml"), &[]).unwrap_err();
     assert_eq!(error.list().len(), 1, "{error}");

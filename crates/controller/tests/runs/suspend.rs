@@ -1,0 +1,164 @@
+//! Suspensions: no chatter, one row each way, and an end to the waiting.
+
+use proptest::prelude::*;
+use skinrig_controller::suspend::{Hysteresis, Turn};
+use skinrig_controller::{RecordSink, SinkFault, execute};
+use skinrig_model::{HostDuration, HostTime, InterruptionKind, Record, RunEnd};
+use skinrig_protocol::{Suspend, Threshold, UnderWay};
+
+use crate::course::{START, faults};
+use crate::mock::*;
+
+const STORM: Threshold = Threshold {
+    trip: 100.0,
+    resume: 60.0,
+    lasting: HostDuration::from_millis(300),
+};
+const RESUME_AFTER: HostDuration = HostDuration::from_millis(500);
+
+proptest! {
+    /// Whatever the value does: turns alternate, a trip needs `lasting` beyond the one level and a clearing `resume_after`
+    /// on the calm side of the other, both without a break.
+    #[test]
+    fn turns_alternate_and_last(values in prop::collection::vec(
+        prop_oneof![4 => 0.0..200.0f64, 1 => Just(f64::NAN), 4 => 90.0..110.0f64, 4 => 50.0..70.0f64], 1..200,
+    ), hold in 1usize..12) {
+        let mut follow = Hysteresis::new(STORM, RESUME_AFTER);
+        let values: Vec<f64> = values.into_iter().flat_map(|v| std::iter::repeat_n(v, hold)).collect();
+        let mut last: Option<(usize, Turn)> = None;
+        for (i, value) in values.iter().enumerate() {
+            let t = HostTime(i as i64 * 100 * MS);
+            let Some(turn) = follow.feed(t, *value) else { continue };
+            let (span, side): (usize, fn(f64) -> bool) = match turn {
+                Turn::Tripped => (3, |v| v > 100.0),
+                Turn::Cleared => (5, |v| v <= 60.0),
+            };
+            prop_assert!(i >= span && values[i - span..=i].iter().all(|v| side(*v)), "{turn:?} at {i}");
+            prop_assert_eq!(follow.is_tripped(), turn == Turn::Tripped);
+            let expected = last.is_none_or(|(_, before)| before != turn);
+            prop_assert!(expected && (last.is_some() || turn == Turn::Tripped));
+            prop_assert!(last.is_none_or(|(before, _)| i - before > span), "chatter");
+            last = Some((i, turn));
+        }
+    }
+
+    /// Between the two levels nothing changes, however long.
+    #[test]
+    fn the_band_is_quiet(values in prop::collection::vec(60.01..=100.0f64, 1..200), begin in any::<bool>()) {
+        let mut follow = Hysteresis::new(STORM, RESUME_AFTER);
+        let mut t = 0;
+        while begin && !follow.is_tripped() {
+            follow.feed(HostTime(t), 1000.0);
+            t += 100 * MS;
+        }
+        for value in values {
+            prop_assert_eq!(follow.feed(HostTime(t), value), None);
+            t += 100 * MS;
+        }
+    }
+}
+
+#[test]
+fn small_values_may_be_the_bad_ones() {
+    let dark = Threshold {
+        trip: 5.0,
+        resume: 6.0,
+        lasting: HostDuration::ZERO,
+    };
+    let mut follow = Hysteresis::new(dark, HostDuration::ZERO);
+    let turns = [7.0, 5.0, 4.9, 5.5, 6.0].map(|v| follow.feed(HostTime(0), v));
+    assert_eq!(
+        turns,
+        [None, None, Some(Turn::Tripped), None, Some(Turn::Cleared)]
+    );
+}
+
+/// A sink on a disk whose free space is scripted, by the rig's time in ms.
+struct Disk {
+    sink: Sink,
+    world: Shared,
+    low: std::ops::Range<i64>,
+}
+
+impl RecordSink for Disk {
+    fn accept(&mut self, record: Record) -> Result<(), SinkFault> {
+        self.sink.accept(record)
+    }
+    fn free_bytes(&mut self) -> Option<u64> {
+        let ms = lock(&self.world).t / MS;
+        Some(if self.low.contains(&ms) {
+            4_000_000_000
+        } else {
+            7_000_000_000
+        })
+    }
+}
+
+/// A run whose disk is full for some time: rows of interruptions, how it ended, valid presses.
+fn run(
+    low_ms: std::ops::Range<i64>,
+    press: UnderWay,
+) -> (Vec<(InterruptionKind, i64, String)>, RunEnd, usize) {
+    let mut plan = plan();
+    plan.suspend = Suspend {
+        disk_free: Some(Threshold {
+            trip: 5e9,
+            resume: 6e9,
+            lasting: HostDuration::ZERO,
+        }),
+        press,
+        resume_after: HostDuration::from_millis(2_000),
+        give_up_after: HostDuration::from_millis(20_000),
+        ..Suspend::default()
+    };
+    let world = World::shared(faults(), START);
+    let control = lock(&world).control.clone();
+    let mut disk = Disk {
+        sink: Sink::default(),
+        world: world.clone(),
+        low: low_ms,
+    };
+    let report = execute(&plan, header(&plan), rig(&world), &control, &mut disk);
+    let rows = disk.sink.records.into_iter().filter_map(|r| match r {
+        Record::Interruption { kind, t, reason } => Some((kind, t.0 / MS, reason)),
+        _ => None,
+    });
+    (rows.collect(), report.end, report.valid)
+}
+
+#[test]
+fn a_full_disk_suspends_and_the_run_goes_on() {
+    let (rows, end, valid) = run(500..5_000, UnderWay::Finish);
+    assert_eq!((end, valid), (RunEnd::Completed, 3), "{rows:?}");
+    let [(pause, at, why), (resume, then, because)] = rows.as_slice() else {
+        panic!("{rows:?}");
+    };
+    assert_eq!(
+        (*pause, *resume),
+        (InterruptionKind::Pause, InterruptionKind::Resume)
+    );
+    assert_eq!(
+        why,
+        "suspended: free space: expected at least 5000000000 B, found 4000000000 B"
+    );
+    assert!(
+        because.starts_with("no longer suspended: free space"),
+        "{because}"
+    );
+    assert!(
+        (1_000..2_600).contains(at) && (7_000..9_000).contains(then),
+        "{rows:?}"
+    );
+}
+
+#[test]
+fn a_disk_that_stays_full_ends_the_run() {
+    let (rows, end, valid) = run(500..i64::MAX, UnderWay::BreakOff);
+    let RunEnd::Faulted(reason) = end else {
+        panic!("{end:?}");
+    };
+    assert!(reason.starts_with("suspended: free space"), "{reason}");
+    assert!(reason.contains("20.000000 s"), "{reason}");
+    assert_eq!(rows[0].0, InterruptionKind::PauseNow);
+    assert!(valid < 3);
+}
