@@ -40,7 +40,8 @@ pub enum Command {
         skinrig run protocols/demo.yaml --level optical --seed 7\n  \
         skinrig run protocols/quick-check.yaml --rig hil/rigs/NAME.yaml\n  \
         skinrig run --replay sessions/NAME.session.sqlite\n\n\
-        ctrl-C once stops after the current press, twice retracts and stops now. The session stays readable.")]
+        ctrl-C once stops after the current press, twice retracts and stops now,\n\
+        three times switches the motors off where the tip is. The session is closed and stays readable.")]
     Run(RunArgs),
 
     /// List what is connected: robot, cameras, trigger box; and what keeps it from being used.
@@ -218,6 +219,10 @@ pub struct JogArgs {
     /// Where everything is logged; a new file in `sessions/` when absent.
     #[arg(long, value_name = "FILE")]
     pub log: Option<PathBuf>,
+
+    /// Hold, rise, disarm and end after this long without a typed line.
+    #[arg(long, value_name = "TIME", default_value = "5 min", value_parser = time_s)]
+    pub idle: f64,
 }
 
 /// Arguments of `sessions`.

@@ -9,7 +9,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use chrono::Utc;
 use skinrig_controller::{ControllerError, ControllerSettings, GuardError, Jog, Moved, Touched};
@@ -135,7 +135,8 @@ fn limits(bench: &Bench) -> (RunLimits, MotionLimits) {
 pub fn jog(args: &JogArgs) -> Outcome {
     let path = args.log.clone().unwrap_or_else(default_log);
     let mut log = Log::create(&path)?;
-    let bench = open(args)?;
+    let idle = Duration::try_from_secs_f64(args.idle)
+        .map_err(|e| Failure::input(format!("--idle: {e}")))?;
     let stop = Arc::new(AtomicBool::new(false));
     let pressed = Arc::clone(&stop);
     signals::on_ctrl_c(move |times| {
@@ -146,6 +147,8 @@ pub fn jog(args: &JogArgs) -> Outcome {
     })
     .map_err(Failure::internal)?;
 
+    // Opened with the hand on ctrl-C: from here on the arm may be live.
+    let bench = open(args)?;
     let (run, robot) = limits(&bench);
     let skin_from_robot = bench.robot_from_skin.inverse();
     let (jog, _) = Jog::start(
@@ -165,16 +168,19 @@ pub fn jog(args: &JogArgs) -> Outcome {
         stop,
         search: bench.search,
         speed_mm_s: FIRST_SPEED_MM_S.min(run.max_speed_mm_s),
+        idle,
         skin_from_robot,
         last_touch: None,
         points: Vec::new(),
     };
     let identity = table.jog.identity();
     outln!(
-        "{}: {} {}; coordinates of the robot; `help` tells what can be typed, ctrl-C holds, rises and disarms\nlog       {}",
+        "{}: {} {}; coordinates of the robot; `help` tells what can be typed, ctrl-C holds, rises and disarms,\n\
+         as do {} s without a typed line (--idle)\nlog       {}",
         bench.name,
         identity.model,
         identity.serial,
+        args.idle,
         log.path().display()
     );
     let started = format!("{}: {} {}", bench.name, identity.model, identity.serial);
@@ -222,16 +228,19 @@ struct Table {
     stop: Arc<AtomicBool>,
     search: TouchSearch,
     speed_mm_s: f64,
+    /// Nobody typed for so long: nobody is there, and a live arm is left alone no longer.
+    idle: Duration,
     skin_from_robot: RigidTransform<Skin, Robot>,
     last_touch: Option<Point3<Robot>>,
     points: Vec<NamedPoint>,
 }
 
 impl Table {
-    /// Follows orders until the end of input, `quit`, ctrl-C or a fault.
+    /// Follows orders until the end of input, `quit`, ctrl-C, an idle time or a fault.
     fn listen(&mut self, log: &mut Log) -> Outcome {
         let interactive = std::io::stdin().is_terminal();
         let lines = read_lines()?;
+        let mut heard = Instant::now();
         loop {
             if self.stop.load(Ordering::SeqCst) {
                 log.line(self.jog.now(), "ctrl-C", "");
@@ -244,7 +253,13 @@ impl Table {
                     let looked = self.jog.look();
                     log.path_of_tip(&self.jog.take_trace());
                     looked.map_err(Failure::rig)?;
-                    continue;
+                    if heard.elapsed() < self.idle {
+                        continue;
+                    }
+                    let why = format!("nothing typed for {} s", self.idle.as_secs_f64());
+                    log.line(self.jog.now(), "idle", &why);
+                    outln!("{why}: holds, rises and disarms; start `skinrig jog` again to go on");
+                    return Ok(Exit::Ok);
                 }
             };
             log.line(self.jog.now(), "order", &line);
@@ -255,6 +270,7 @@ impl Table {
                 Err(e) => Err(Refusal::Input(e)),
             };
             log.path_of_tip(&self.jog.take_trace());
+            heard = Instant::now(); // a long motion is no idle time
             match answer {
                 Ok(text) => {
                     log.line(self.jog.now(), "answer", &text);

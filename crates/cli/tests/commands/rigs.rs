@@ -1,6 +1,6 @@
 //! Benches: rig files, what is connected, the preflight in sessions, jogging, and presses that touch.
 
-use std::io::Write;
+use std::io::{Read, Write};
 use std::process::Stdio;
 
 use serde_json::Value;
@@ -306,4 +306,40 @@ fn ctrl_c_holds_rises_and_disarms() {
         .parse()
         .unwrap();
     assert!((z - 5.0).abs() < 0.2, "{out}");
+}
+
+#[test]
+fn a_jog_that_nobody_uses_disarms() {
+    let lab = Lab::new();
+    let log = lab.text("jog.log");
+    let mut child = program(&["jog", "--idle", "200 ms", "--log", &log])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    // Standard input stays open: a terminal that was left alone.
+    let mut input = child.stdin.take().unwrap();
+    input.write_all(b"where\n").unwrap();
+    let mut said = String::new();
+    child
+        .stdout
+        .take()
+        .unwrap()
+        .read_to_string(&mut said)
+        .unwrap();
+    assert_eq!(child.wait().unwrap().code(), Some(0), "{said}");
+    drop(input);
+    for words in [
+        "0.2 s without a typed line",
+        "nothing typed for 0.2 s",
+        "disarmed at",
+    ] {
+        assert!(said.contains(words), "{words}: {said}");
+    }
+    let logged = std::fs::read_to_string(&log).unwrap();
+    assert!(
+        logged.contains("idle") && logged.contains("disarmed at"),
+        "{logged}"
+    );
 }
