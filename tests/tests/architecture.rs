@@ -224,6 +224,36 @@ fn unsafe_code_lives_at_named_borders_and_gives_its_reason() {
     assert!(without_reason(&with).is_empty());
 }
 
+/// Who may name a boxed robot: its contract, the rig that carries it, the guard that owns it, and those who hand it to the guard.
+const ROBOT_HOMES: [&str; 6] = [
+    "crates/cli/src/jog/mod.rs",
+    "crates/cli/src/rig/bench.rs",
+    "crates/controller/src/guard.rs",
+    "crates/controller/src/jog.rs",
+    "crates/device/src/contract/indenter.rs",
+    "crates/device/src/rig.rs",
+];
+
+#[test]
+fn the_guard_alone_holds_the_robot() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
+    let mut files = Vec::new();
+    rust_files(&root.join("crates"), root, &mut files);
+    let named: Vec<&str> = files
+        .iter()
+        .filter(|(name, source)| {
+            name.contains("/src/") && source.lines().any(|l| code(l).contains("dyn Indenter"))
+        })
+        .map(|(name, _)| name.as_str())
+        .collect();
+    let named: BTreeSet<&str> = named.into_iter().collect();
+    assert_eq!(
+        named,
+        BTreeSet::from(ROBOT_HOMES),
+        "whoever moves the robot goes through `GuardedIndenter`"
+    );
+}
+
 fn metadata() -> Value {
     let output = Command::new(env!("CARGO"))
         .args(["metadata", "--format-version", "1", "--locked"])
