@@ -7,6 +7,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use skinrig_protocol::quantity::{self, Dimension};
 
 use crate::exit::Exit;
+use crate::fault::Fault;
 
 /// Runs tactile-skin experiments: protocol, robot, event cameras, session, analysis, report.
 #[derive(Debug, Parser)]
@@ -43,6 +44,15 @@ pub enum Command {
         ctrl-C once stops after the current press, twice retracts and stops now,\n\
         three times switches the motors off where the tip is. The session is closed and stays readable.")]
     Run(RunArgs),
+
+    /// Go on with a session that was cut off, stopped or broken off by a fault.
+    #[command(
+        after_help = "Examples:\n  skinrig resume sessions/NAME.session.sqlite\n  \
+        skinrig resume sessions/NAME.session.sqlite --rig hil/rigs/NAME.yaml\n\n\
+        The rig is checked and the sync presses are made again; then every press without an outcome is taken, one that was\n\
+        cut off as a new attempt. A valid press is never pressed again."
+    )]
+    Resume(ResumeArgs),
 
     /// List what is connected: robot, cameras, trigger box; and what keeps it from being used.
     #[command(
@@ -188,6 +198,10 @@ pub struct RunArgs {
     #[arg(long, conflicts_with = "replay")]
     pub real_time: bool,
 
+    /// Make this fault on purpose, for tests: killed@record:N, killed@journal:N, killed@seal. Can be given several times.
+    #[arg(long = "fault", value_name = "FAULT", conflicts_with = "replay")]
+    pub faults: Vec<Fault>,
+
     /// Folder for the session file, its results and its report.
     #[arg(long, value_name = "DIR", default_value = "sessions")]
     pub sessions: PathBuf,
@@ -199,6 +213,33 @@ pub struct RunArgs {
     /// Fail (exit code 4) when the scored RMSE is above this, in mm.
     #[arg(long, value_name = "MM", value_parser = limit_mm)]
     pub max_rmse: Option<f64>,
+}
+
+/// Arguments of `resume`.
+#[derive(Debug, Args)]
+pub struct ResumeArgs {
+    /// The session file.
+    pub session: PathBuf,
+
+    /// The rig file of the bench; that of the session, where it was, when absent.
+    #[arg(long, value_name = "FILE")]
+    pub rig: Option<PathBuf>,
+
+    /// Run the simulated rig at the speed of a real one.
+    #[arg(long, conflicts_with = "rig")]
+    pub real_time: bool,
+
+    /// Record only.
+    #[arg(long)]
+    pub no_analysis: bool,
+
+    /// Accept a robot or camera with another serial number than the session's; it is recorded.
+    #[arg(long)]
+    pub allow_other_device: bool,
+
+    /// Make this fault on purpose, for tests: killed@record:N, killed@journal:N, killed@seal. Can be given several times.
+    #[arg(long = "fault", value_name = "FAULT")]
+    pub faults: Vec<Fault>,
 }
 
 /// Arguments of `devices`.

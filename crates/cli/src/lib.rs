@@ -10,6 +10,7 @@ pub mod contacts;
 pub mod devices;
 pub mod exit;
 pub mod export;
+pub mod fault;
 pub mod import;
 pub mod inspect;
 pub mod jog;
@@ -18,6 +19,7 @@ pub mod progress;
 pub mod provenance;
 pub mod recording;
 pub mod results;
+pub mod resume;
 pub mod rig;
 pub mod run;
 pub mod salvage;
@@ -73,6 +75,7 @@ fn dispatch(cli: &Cli, arguments: &[OsString]) -> Outcome {
         Command::Check(a) => check::check(a, json),
         Command::Plan(a) => check::plan(a, json),
         Command::Run(a) => run::run(a, &command_line(arguments), json),
+        Command::Resume(a) => resume::resume(a, &command_line(arguments), json),
         Command::Devices(a) => devices::devices(a, json),
         Command::Jog(a) => jog::jog(a),
         Command::Sessions(a) => sessions::sessions(a, json),

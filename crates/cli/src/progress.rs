@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use skinrig_controller::{Progress, ProgressTracker};
-use skinrig_model::{CameraId, HostDuration, PressRole, Record};
+use skinrig_model::{CameraId, HostDuration, PlannedPress, PressHistory, PressRole, Record};
 
 /// A bar is redrawn at most this often.
 const REDRAW_EVERY: Duration = Duration::from_millis(100);
@@ -50,6 +50,22 @@ impl ProgressView {
             drawn: None,
             began: Instant::now(),
         }
+    }
+
+    /// A view for a further leg of a session, as [`new`](Self::new).
+    #[must_use]
+    pub fn resumed(
+        presses: &[PlannedPress],
+        histories: &[PressHistory],
+        wanted: &[bool],
+        expected: HostDuration,
+    ) -> Self {
+        let mut view = Self::new(presses.len(), expected);
+        view.tracker = view.tracker.resumed(presses, histories, wanted);
+        if let Display::Lines { tenths } = &mut view.display {
+            *tenths = view.tracker.progress().done * 10 / presses.len().max(1);
+        }
+        view
     }
 
     /// The run as of the last record.
@@ -149,13 +165,18 @@ fn streams(tracker: &ProgressTracker) -> String {
     } else {
         String::new()
     };
+    let retaken = if p.retaken > 0 {
+        format!("  {} taken again", p.retaken)
+    } else {
+        String::new()
+    };
     let invalid = if p.invalid > 0 {
         format!("  {} invalid", p.invalid)
     } else {
         String::new()
     };
     format!(
-        "camera 1 {}, camera 2 {} kev/s  trigger {} sent, {}+{} seen{invalid}{lost}",
+        "camera 1 {}, camera 2 {} kev/s  trigger {} sent, {}+{} seen{invalid}{retaken}{lost}",
         rate(CameraId::One),
         rate(CameraId::Two),
         p.marks_sent,

@@ -15,6 +15,7 @@ use skinrig_recorder::{RecorderError, SessionReader, SessionWriter};
 use crate::args::RunArgs;
 use crate::check;
 use crate::exit::{Exit, Failure, Outcome};
+use crate::fault::{Fault, Saboteur};
 use crate::paths;
 use crate::progress::ProgressView;
 use crate::results::{self, RigDocument};
@@ -48,6 +49,8 @@ pub struct Intent<'a> {
     pub expected: HostDuration,
     /// What is known of the presses beforehand.
     pub known: Foreknowledge,
+    /// Faults on purpose.
+    pub faults: &'a [Fault],
 }
 
 /// Records `plan` on `rig` into a new session in `folder`, after the `preflight` when there is one: an import and a
@@ -68,7 +71,8 @@ pub fn record(
     let header = header(intent, plan, &rig, &started_at)?;
     let (path, writer) = new_session(intent, started, folder)?;
     let view = ProgressView::new(plan.presses.len(), intent.expected);
-    let mut sink = SessionSink::new(writer, view, intent.known.clone());
+    let mut sink = SessionSink::new(writer, view, intent.known.clone())
+        .with_faults(Saboteur::new(intent.faults));
     if preflight.is_some() {
         sink = sink.on_disk_of(folder);
     }
@@ -83,7 +87,7 @@ pub fn record(
         });
     }
 
-    let mut report = match preflight {
+    let report = match preflight {
         Some(mut preflight) => {
             preflight.made.insert(0, gates::recorder(&path));
             let settings = bench::settings(&rig.kind);
@@ -91,6 +95,11 @@ pub fn record(
         }
         None => execute(plan, header, rig, control, &mut sink),
     };
+    Ok((path, close(sink, report, operator)))
+}
+
+/// Seals the session, and tells what went wrong besides.
+pub(crate) fn close(sink: SessionSink, mut report: RunReport, operator: &Operator) -> RunReport {
     if let Err(error) = sink.seal() {
         let error = error.to_string();
         match &report.end {
@@ -105,7 +114,7 @@ pub fn record(
             errln!("warning: {problem}");
         }
     }
-    Ok((path, report))
+    report
 }
 
 /// A new session file under a name that nobody else took meanwhile.
@@ -174,7 +183,7 @@ fn header(
 }
 
 /// The machine's name as the system gives it; `unknown` where it gives none.
-fn host_name() -> String {
+pub(crate) fn host_name() -> String {
     std::fs::read_to_string("/etc/hostname")
         .ok()
         .or_else(|| std::env::var("HOSTNAME").ok())
@@ -234,16 +243,28 @@ pub fn conclude(
         RunEnd::Completed => analysed,
         RunEnd::Stopped(reason) => {
             also(analysed);
-            errln!("stopped: {reason}; {kept}");
+            errln!("stopped: {reason}; {kept}\n  next: {}", go_on(session));
             Ok(Exit::Stopped)
         }
         RunEnd::Faulted(reason) => Err(Failure::rig({
             also(analysed);
             format!(
-                "{reason}\n  {kept}\n  next: put right what is named above (device, cable, file, disk space) and run \
-             again; `skinrig show` lists what was kept"
+                "{reason}\n  {kept}\n  next: put right what is named above (device, cable, file, disk space), then {}; \
+                 `skinrig show` lists what was kept",
+                go_on(session)
             )
         })),
+    }
+}
+
+/// The next step of a session that was not finished: a rig can go on, an import or a replay begins anew.
+fn go_on(session: &Path) -> String {
+    let header = SessionReader::open(session).and_then(|reader| reader.header());
+    match header {
+        Ok(header) if !matches!(header.rig_kind.as_str(), "imported" | "replayed") => {
+            format!("go on with `skinrig resume {}`", session.display())
+        }
+        _ => "run again".to_owned(),
     }
 }
 
@@ -292,7 +313,10 @@ fn fresh(
         );
     }
     let preflight = gates::of_simulated(&rig, &args.sessions, summary.expected_bytes);
-    let intent = intent_of(&protocol, seed, summary.duration_s, command_line);
+    let intent = Intent {
+        faults: &args.faults,
+        ..intent_of(&protocol, seed, summary.duration_s, command_line)
+    };
     record(
         &intent,
         &plan,
@@ -333,7 +357,10 @@ fn on_bench(
     }
     let rig = bench::open(&file, &protocol)?;
     let preflight = gates::of_bench(&file, &rig, &args.sessions, summary.duration_s);
-    let intent = intent_of(&protocol, seed, summary.duration_s, command_line);
+    let intent = Intent {
+        faults: &args.faults,
+        ..intent_of(&protocol, seed, summary.duration_s, command_line)
+    };
     record(
         &intent,
         &plan,
@@ -363,6 +390,7 @@ fn intent_of<'a>(
         command_line,
         expected: HostDuration::from_secs_f64(duration_s),
         known: Foreknowledge::default(),
+        faults: &[],
     }
 }
 
@@ -414,6 +442,7 @@ fn replay(
         command_line,
         expected,
         known: foreknowledge(&reader).map_err(Failure::input)?,
+        faults: &[],
     };
     let rig = rig::replayed(recording, &header, &document)?;
     record(&intent, &plan, rig, folder, None, operator)

@@ -7,6 +7,7 @@ use skinrig_controller::{RecordSink, SinkFault};
 use skinrig_model::{HostTime, InterruptionKind, PressId, PressVerdict, Record};
 use skinrig_recorder::{RecorderError, Sealed, SessionWriter};
 
+use crate::fault::Saboteur;
 use crate::progress::ProgressView;
 use crate::rig::gates;
 
@@ -28,6 +29,9 @@ pub struct SessionSink {
     known: Foreknowledge,
     /// Where the session lies, when its free space matters.
     folder: Option<PathBuf>,
+    /// Remarks to be written once the leg has begun.
+    notes: Vec<String>,
+    saboteur: Saboteur,
 }
 
 impl SessionSink {
@@ -39,6 +43,8 @@ impl SessionSink {
             view,
             known,
             folder: None,
+            notes: Vec::new(),
+            saboteur: Saboteur::none(),
         }
     }
 
@@ -49,12 +55,27 @@ impl SessionSink {
         self
     }
 
+    /// Writes these remarks right after the first record.
+    #[must_use]
+    pub fn with_notes(mut self, notes: Vec<String>) -> Self {
+        self.notes = notes;
+        self
+    }
+
+    /// With faults on purpose.
+    #[must_use]
+    pub fn with_faults(mut self, saboteur: Saboteur) -> Self {
+        self.saboteur = saboteur;
+        self
+    }
+
     /// Seals the session.
     ///
     /// # Errors
     /// [`RecorderError`]; the session stays readable.
     pub fn seal(mut self) -> Result<Sealed, RecorderError> {
         self.view.finish();
+        self.saboteur.before_the_seal();
         self.writer.finish()
     }
 }
@@ -76,6 +97,7 @@ impl RecordSink for SessionSink {
         if let Record::Preflight(checks) = &record {
             self.view.say(&gates::table(checks));
         }
+        self.saboteur.before(&record);
         // What is shown as done is on the disk. Bulk data, whose copy would cost, are only counted.
         let shown = match &record {
             Record::Chunk(_) | Record::Poses(_) => {
@@ -89,6 +111,12 @@ impl RecordSink for SessionSink {
             .map_err(|e| SinkFault(e.to_string()))?;
         if let Some(record) = shown {
             self.view.update(&record);
+        }
+        for text in std::mem::take(&mut self.notes) {
+            self.view.say(&format!("note: {text}"));
+            let t = HostTime::ZERO;
+            let note = self.writer.accept(Record::Note { t, text });
+            note.map_err(|e| SinkFault(e.to_string()))?;
         }
         Ok(())
     }

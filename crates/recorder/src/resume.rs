@@ -22,6 +22,40 @@ pub struct Begun {
 
 /// Locks a session that can go on, and looks whether it can; nothing changes.
 pub fn lock_unfinished(path: &Path) -> Result<WriterLock, RecorderError> {
+    let (lock, reader) = lock(path)?;
+    match reader.end()? {
+        Some((_, skinrig_model::RunEnd::Completed)) => Err(RecorderError::Completed {
+            path: path.to_owned(),
+        }),
+        _ => Ok(lock),
+    }
+}
+
+/// Locks a session that has its end and no seal; nothing changes.
+pub fn lock_unsealed(path: &Path) -> Result<WriterLock, RecorderError> {
+    let (lock, reader) = lock(path)?;
+    let path = path.to_owned();
+    if reader.seal()?.is_some() {
+        return Err(RecorderError::Completed { path });
+    }
+    match reader.end()? {
+        Some(_) => Ok(lock),
+        None => Err(RecorderError::NotThere {
+            path,
+            wanted: "the end of its run".into(),
+        }),
+    }
+}
+
+/// Opens an unsealed session for writing.
+pub async fn open_again(path: &Path) -> Result<SqliteConnection, RecorderError> {
+    let mut conn = schema::open_again(path).await?;
+    let ready = schema::log_ahead(&mut conn).await;
+    ready.map_err(|fault| fault.at(path, "opening it again"))?;
+    Ok(conn)
+}
+
+fn lock(path: &Path) -> Result<(WriterLock, SessionReader), RecorderError> {
     // A lock beside a file that is not there would be all that is left.
     File::open(path).map_err(|source| match source.kind() {
         std::io::ErrorKind::NotFound => RecorderError::Missing {
@@ -36,12 +70,7 @@ pub fn lock_unfinished(path: &Path) -> Result<WriterLock, RecorderError> {
     let lock = WriterLock::take(path)?;
     let reader = SessionReader::open(path)?;
     reader.header()?;
-    match reader.end()? {
-        Some((_, skinrig_model::RunEnd::Completed)) => Err(RecorderError::Completed {
-            path: path.to_owned(),
-        }),
-        _ => Ok(lock),
-    }
+    Ok((lock, reader))
 }
 
 /// Begins the leg: durable on return, all of it or nothing.

@@ -105,6 +105,28 @@ impl SessionWriter {
         })
     }
 
+    /// Opens a session whose end is recorded and whose seal is not: [`finish`](Self::finish) is all that is left to it.
+    ///
+    /// # Errors
+    /// [`RecorderError::InUse`] while another process writes the session; [`RecorderError::Completed`] when it is sealed;
+    /// [`RecorderError::NotThere`] without an end; or why it cannot be read.
+    pub fn ended(path: impl AsRef<Path>) -> Result<Self, RecorderError> {
+        let path = path.as_ref().to_owned();
+        let lock = resume::lock_unsealed(&path)?;
+        let runtime = runtime(&path)?;
+        let conn = runtime.block_on(resume::open_again(&path))?;
+        let mut writer = Self {
+            lock,
+            path,
+            shared: Arc::new(Shared::default()),
+            threads: None,
+            phase: Phase::Ended,
+            joint: Joint::default(),
+        };
+        writer.start(runtime, conn, Preparer::default())?;
+        Ok(writer)
+    }
+
     /// Starts the two threads on an open file.
     fn start(
         &mut self,

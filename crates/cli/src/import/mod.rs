@@ -99,6 +99,7 @@ pub fn import(args: &ImportArgs, command_line: &str, json: bool) -> Outcome {
         command_line,
         expected: HostDuration(last),
         known,
+        faults: &[],
     };
     let operator = Operator::listen().map_err(Failure::internal)?;
     let (session, report) = record(&intent, &plan, rig, &args.sessions, None, &operator)?;

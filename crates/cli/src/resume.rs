@@ -1,0 +1,418 @@
+//! `skinrig resume`: a session that was cut off or not finished goes on in a further leg.
+
+use std::path::Path;
+
+use chrono::{SecondsFormat, Utc};
+use sha2::{Digest, Sha256};
+use skinrig_controller::{Preflight, Resume, Run, RunReport};
+use skinrig_device::Rig;
+use skinrig_model::{
+    DeviceRole, HostTime, PlannedPress, PressHistory, PressRole, PressVerdict, Record,
+    ResumeHeader, RunEnd, RunHeader, SimLevel,
+};
+use skinrig_protocol::rig::RigFile;
+use skinrig_protocol::{Plan, Protocol, Route};
+use skinrig_recorder::{DeviceRow, RecorderError, SessionReader, SessionWriter};
+
+use crate::args::ResumeArgs;
+use crate::exit::{Exit, Failure, Outcome};
+use crate::fault::Saboteur;
+use crate::progress::ProgressView;
+use crate::results::RigDocument;
+use crate::rig::{self, bench, gates};
+use crate::run::{close, conclude, host_name};
+use crate::signals::Operator;
+use crate::sink::{Foreknowledge, SessionSink};
+
+/// An unfinished session as it lies there.
+struct Unfinished {
+    header: RunHeader,
+    document: RigDocument,
+    plan: Plan,
+    histories: Vec<PressHistory>,
+    devices: Vec<DeviceRow>,
+    end: Option<RunEnd>,
+    legs: usize,
+}
+
+/// `skinrig resume`.
+///
+/// # Errors
+/// [`Failure`] with the code that says what kind.
+pub fn resume(args: &ResumeArgs, command_line: &str, json: bool) -> Outcome {
+    let operator = Operator::listen().map_err(Failure::internal)?;
+    let session = &args.session;
+    let found = read(session)?;
+    if found.end == Some(RunEnd::Completed) {
+        return only_seal(session);
+    }
+    // From here on nobody else writes it.
+    let writer = SessionWriter::resume(session).map_err(Failure::input)?;
+    let wanted = found.plan.wanted(&found.histories);
+    if !json {
+        outln!("{}", describe(session, &found, &wanted));
+    }
+    let header = ResumeHeader {
+        operator: found.header.operator.clone(),
+        started_at: Utc::now().to_rfc3339_opts(SecondsFormat::Secs, true),
+        host: host_name(),
+        software: format!("skinrig {}", env!("CARGO_PKG_VERSION")),
+        command_line: command_line.to_owned(),
+    };
+    let report = if wanted.contains(&true) {
+        go_on(args, &found, &wanted, header, writer, &operator)?
+    } else {
+        end_only(&found, header, writer)?
+    };
+    conclude(session, &report, args.no_analysis, None, json)
+}
+
+/// Reads what a further leg needs, and refuses what none can have.
+fn read(session: &Path) -> Result<Unfinished, Failure> {
+    let refused = |expected: &str, found: String, next: &str| {
+        let session = session.display();
+        Failure::input(format!(
+            "{session}: expected {expected}, found {found}\n  next: {next}"
+        ))
+    };
+    let reader = SessionReader::open(session).map_err(Failure::input)?;
+    let header = reader.header().map_err(Failure::input)?;
+    if matches!(header.rig_kind.as_str(), "imported" | "replayed") {
+        return Err(refused(
+            "a session that a rig recorded",
+            format!(
+                "one that was {}: there is nothing to press",
+                header.rig_kind
+            ),
+            "import or replay the recording again",
+        ));
+    }
+    let verify = "`skinrig verify` says what is damaged";
+    for (what, text, digest) in [
+        ("protocol", &header.protocol_text, &header.protocol_sha256),
+        ("plan", &header.plan_json, &header.plan_sha256),
+    ] {
+        let found: String = Sha256::digest(text.as_bytes())
+            .iter()
+            .map(|b| format!("{b:02x}"))
+            .collect();
+        if found != *digest {
+            let expected = format!("a {what} with SHA-256 {digest}");
+            return Err(refused(&expected, found, verify));
+        }
+    }
+    let document = serde_json::from_str(&header.rig_json)
+        .map_err(|e| refused("the description of the rig", e.to_string(), verify))?;
+    let plan: Plan = serde_json::from_str(&header.plan_json)
+        .map_err(|e| refused("a plan", e.to_string(), verify))?;
+    if plan.presses != header.presses {
+        let found = format!("{} that differ", header.presses.len());
+        return Err(refused("the presses of the plan", found, verify));
+    }
+    let all = || -> Result<_, RecorderError> {
+        let end = reader.end()?.map(|(_, end)| end);
+        Ok((
+            reader.history()?,
+            reader.devices()?,
+            end,
+            reader.legs()?.len(),
+        ))
+    };
+    let (histories, devices, end, legs) = all().map_err(Failure::input)?;
+    if end == Some(RunEnd::Completed) && reader.seal().map_err(Failure::input)?.is_some() {
+        let session = session.to_owned();
+        return Err(Failure::input(RecorderError::Completed { path: session }));
+    }
+    Ok(Unfinished {
+        header,
+        document,
+        plan,
+        histories,
+        devices,
+        end,
+        legs,
+    })
+}
+
+/// What is there and what will be done, for people.
+fn describe(session: &Path, found: &Unfinished, wanted: &[bool]) -> String {
+    let ended = match &found.end {
+        None => "cut off".to_owned(),
+        Some(RunEnd::Stopped(reason)) => format!("stopped: {reason}"),
+        Some(RunEnd::Faulted(reason)) => format!("faulted: {reason}"),
+        Some(RunEnd::Completed) => "completed".to_owned(),
+    };
+    let all = || found.plan.presses.iter().zip(&found.histories).zip(wanted);
+    let valid = all().filter(|((_, h), _)| h.verdict == Some(PressVerdict::Valid));
+    let interrupted: Vec<_> = all()
+        .filter(|((_, h), _)| h.attempts > 0 && h.verdict.is_none())
+        .map(|((p, _), _)| p)
+        .collect();
+    let cut_off = match interrupted.as_slice() {
+        [] => String::new(),
+        presses => format!("; {} cut off", names(presses)),
+    };
+    let of = |role: fn(PressRole) -> bool| -> Vec<&PlannedPress> {
+        all()
+            .filter(|((p, _), wanted)| **wanted && role(p.role))
+            .map(|((p, _), _)| p)
+            .collect()
+    };
+    let sync = of(|role| role == PressRole::Sync);
+    let rest = of(|role| role != PressRole::Sync);
+    let next = match (rest.as_slice(), sync.len()) {
+        ([], _) => "no press: only the end of the session is missing".to_owned(),
+        (rest, 0) => names(rest),
+        (rest, n) => format!("{n} sync presses, {}", names(rest)),
+    };
+    format!(
+        "session   {}\nleg {:<6}{ended}\ndone      {} of {} presses valid{cut_off}\nto do     {next}\n",
+        session.display(),
+        found.legs,
+        valid.count(),
+        wanted.len(),
+    )
+}
+
+/// `press 5` or `187 presses from press 59 to press 245`.
+fn names(presses: &[&PlannedPress]) -> String {
+    match presses {
+        [one] => one.id.to_string(),
+        [first, .., last] => format!("{} presses from {} to {}", presses.len(), first.id, last.id),
+        [] => "none".to_owned(),
+    }
+}
+
+/// Opens the rig of the session and presses what is left.
+fn go_on(
+    args: &ResumeArgs,
+    found: &Unfinished,
+    wanted: &[bool],
+    header: ResumeHeader,
+    writer: SessionWriter,
+    operator: &Operator,
+) -> Result<RunReport, Failure> {
+    let protocol = protocol_of(found)?;
+    let rest = rest_of(&protocol, &found.plan, wanted)?;
+    let (rig, preflight, notes) = open_rig(args, found, protocol, &rest)?;
+    let expected = skinrig_model::HostDuration::from_secs_f64(rest.summary().duration_s);
+    let view = ProgressView::resumed(&found.plan.presses, &found.histories, wanted, expected);
+    let folder = folder_of(&args.session);
+    let sink = SessionSink::new(writer, view, Foreknowledge::default());
+    let mut sink = sink
+        .on_disk_of(folder)
+        .with_notes(notes)
+        .with_faults(Saboteur::new(&args.faults));
+    let settings = bench::settings(&rig.kind);
+    let run = Run::with_settings(
+        &rest,
+        found.header.clone(),
+        rig,
+        operator.control(),
+        &mut sink,
+        settings,
+    );
+    let report = run
+        .checked(preflight)
+        .resumed(Resume {
+            header,
+            histories: found.histories.clone(),
+        })
+        .execute();
+    Ok(close(sink, report, operator))
+}
+
+/// The session's own protocol, read again: its text is in the session, files that it names are where they were.
+fn protocol_of(found: &Unfinished) -> Result<Protocol, Failure> {
+    let header = &found.header;
+    let loader = |p: &Path| std::fs::read(p);
+    Protocol::parse(
+        &header.protocol_name,
+        header.protocol_text.as_bytes(),
+        &header.overrides,
+        &loader,
+    )
+    .map_err(|found| Failure::findings(&found))
+}
+
+/// What is left of the plan: straight ways where nothing is in them, else those of the plan.
+fn rest_of(protocol: &Protocol, plan: &Plan, wanted: &[bool]) -> Result<Plan, Failure> {
+    let is_wanted = |id: skinrig_model::PressId| wanted.get(id.0 as usize) == Some(&true);
+    let straight = plan.remaining(is_wanted, Route::Straight);
+    if protocol.check(&straight).is_ok() {
+        return Ok(straight);
+    }
+    let planned = plan.remaining(is_wanted, Route::AsPlanned);
+    let held = protocol.check(&planned);
+    held.map_err(|found| Failure::findings(&found))?;
+    Ok(planned)
+}
+
+/// The rig of the session, opened; its preflight; and what is to be remarked about it.
+fn open_rig(
+    args: &ResumeArgs,
+    found: &Unfinished,
+    protocol: Protocol,
+    rest: &Plan,
+) -> Result<(Rig, Preflight, Vec<String>), Failure> {
+    let folder = folder_of(&args.session);
+    let header = &found.header;
+    let summary = rest.summary();
+    if header.rig_kind == "simulated" {
+        if let Some(file) = &args.rig {
+            return Err(Failure::input(format!(
+                "{}: expected no --rig, because the session is of the simulated rig, found {}",
+                args.session.display(),
+                file.display()
+            )));
+        }
+        let level = found.document.rig["level"].as_str().unwrap_or_default();
+        let level: SimLevel = level
+            .parse()
+            .map_err(|e| Failure::input(format!("{}: rig: {e}", args.session.display())))?;
+        let rig = rig::simulated(&protocol, level, header.seed, args.real_time);
+        let mut preflight = gates::of_simulated(&rig, folder, summary.expected_bytes);
+        preflight.made.insert(0, gates::recorder(&args.session));
+        return Ok((rig, preflight, Vec::new()));
+    }
+    let path = match (&args.rig, found.document.rig["file_name"].as_str()) {
+        (Some(file), _) => file.clone(),
+        (None, Some(file)) => file.into(),
+        (None, None) => {
+            return Err(Failure::input(format!(
+                "{}: expected the rig file of the session with --rig, found none",
+                args.session.display()
+            )));
+        }
+    };
+    let file = bench::load(&path)?;
+    same_bench(&file, found)?;
+    let rig = bench::open(&file, &protocol)?;
+    let notes = same_devices(&rig, found, args.allow_other_device)?;
+    let mut preflight = gates::of_bench(&file, &rig, folder, summary.duration_s);
+    preflight.made.insert(0, gates::recorder(&args.session));
+    Ok((rig, preflight, notes))
+}
+
+/// The folder of a session; the present one for a bare name.
+fn folder_of(session: &Path) -> &Path {
+    let folder = session.parent().filter(|p| !p.as_os_str().is_empty());
+    folder.unwrap_or(Path::new("."))
+}
+
+/// The rig file must be of the session's bench: its kind, its place of the skin, and limits that bear the plan.
+fn same_bench(file: &RigFile, found: &Unfinished) -> Result<(), Failure> {
+    let differs = |what: &str, expected: String, found: String| {
+        Failure::input(format!(
+            "{}: {what}: expected {expected}, as in the session, found {found}\n  \
+             next: resume on the bench as it was, or begin a new session with `skinrig run`",
+            file.file_name
+        ))
+    };
+    let (header, limits) = (&found.header, &found.plan.limits);
+    if file.kind.name() != header.rig_kind {
+        let kind = file.kind.name().to_owned();
+        return Err(differs("kind", header.rig_kind.clone(), kind));
+    }
+    if file.frame.robot_from_skin != header.robot_from_skin {
+        let place = |t: &skinrig_model::RigidTransform<_, _>| format!("{:?} mm", t.translation_mm);
+        let (was, is) = (&header.robot_from_skin, &file.frame.robot_from_skin);
+        return Err(differs("frame", place(was), place(is)));
+    }
+    for (what, was, is) in [
+        (
+            "limits.max_speed",
+            limits.max_speed_mm_s,
+            file.limits.max_speed_mm_s,
+        ),
+        (
+            "limits.max_force",
+            limits.max_force_n,
+            file.limits.max_force_n,
+        ),
+        (
+            "limits.max_depth",
+            limits.max_depth_mm,
+            file.limits.max_depth_mm,
+        ),
+    ] {
+        if is < was {
+            return Err(differs(what, format!("{was} or more"), is.to_string()));
+        }
+    }
+    Ok(())
+}
+
+/// The devices must be those that the session was begun with; with leave, what differs is remarked.
+fn same_devices(rig: &Rig, found: &Unfinished, others: bool) -> Result<Vec<String>, Failure> {
+    let [one, two] = &rig.cameras;
+    let mut notes = Vec::new();
+    for (role, now) in [
+        (DeviceRole::Indenter, rig.indenter.identity()),
+        (DeviceRole::Camera1, one.identity()),
+        (DeviceRole::Camera2, two.identity()),
+    ] {
+        let before = found.devices.iter().rev().find(|d| d.role == role);
+        if let Some(before) = before
+            && before.identity.serial != now.serial
+        {
+            notes.push(format!(
+                "{role}: expected serial {}, as in the session, found {}",
+                before.identity.serial, now.serial
+            ));
+        }
+    }
+    if notes.is_empty() || others {
+        return Ok(notes);
+    }
+    Err(Failure::input(format!(
+        "{}\n  next: connect the device of the session, or accept the other one with --allow-other-device, which is recorded",
+        notes.join("\n")
+    )))
+}
+
+/// Every press has its outcome and only the end is missing: it is written, and no device is touched.
+fn end_only(
+    found: &Unfinished,
+    header: ResumeHeader,
+    mut writer: SessionWriter,
+) -> Result<RunReport, Failure> {
+    let end = || -> Result<(), RecorderError> {
+        writer.accept(Record::Resumed(Box::new(header)))?;
+        writer.accept(Record::Ended {
+            t: HostTime::ZERO,
+            end: RunEnd::Completed,
+        })?;
+        writer.finish().map(drop)
+    };
+    end().map_err(Failure::internal)?;
+    let count = |verdict: fn(&PressVerdict) -> bool| {
+        let last = found.histories.iter().filter_map(|h| h.verdict.as_ref());
+        last.filter(|v| verdict(v)).count()
+    };
+    let planned = found.histories.len();
+    let valid = count(|v| matches!(v, PressVerdict::Valid | PressVerdict::Excluded(_)));
+    let missed = count(|v| matches!(v, PressVerdict::Missed(_)));
+    Ok(RunReport {
+        end: RunEnd::Completed,
+        ended_at: HostTime::ZERO,
+        planned,
+        valid,
+        invalid: planned - valid - missed,
+        missed,
+        retracted: true,
+        disarmed: true,
+        problems: Vec::new(),
+    })
+}
+
+/// The session has its end and lacks only its seal.
+fn only_seal(session: &Path) -> Outcome {
+    let writer = SessionWriter::ended(session).map_err(Failure::input)?;
+    writer.finish().map_err(Failure::internal)?;
+    outln!(
+        "{}: completed; only its seal was missing, and is there now\n  next: skinrig analyze {0}",
+        session.display()
+    );
+    Ok(Exit::Ok)
+}
