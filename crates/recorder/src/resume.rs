@@ -1,9 +1,8 @@
 //! How a session goes on that was cut off, stopped or broken off by a fault: the one transaction that begins a further leg.
 
-use std::fs::File;
 use std::path::Path;
 
-use skinrig_model::{PressVerdict, ResumeHeader, StreamFormat};
+use skinrig_model::{PressVerdict, ResumeHeader, RunEnd, StreamFormat};
 use sqlx::sqlite::{SqliteConnection, SqliteRow};
 use sqlx::{Connection, Sqlite, Transaction};
 
@@ -12,7 +11,7 @@ use crate::leg::{Joint, next_second};
 use crate::lock::WriterLock;
 use crate::query::{Fault, blob, int, opt_int, opt_text, text};
 use crate::reader::SessionReader;
-use crate::schema;
+use crate::{schema, seal};
 
 /// What the writer of a leg needs to know.
 pub struct Begun {
@@ -24,18 +23,19 @@ pub struct Begun {
 pub fn lock_unfinished(path: &Path) -> Result<WriterLock, RecorderError> {
     let (lock, reader) = lock(path)?;
     match reader.end()? {
-        Some((_, skinrig_model::RunEnd::Completed)) => Err(RecorderError::Completed {
+        Some((_, RunEnd::Completed)) => Err(RecorderError::Completed {
             path: path.to_owned(),
         }),
         _ => Ok(lock),
     }
 }
 
-/// Locks a session that has its end and no seal; nothing changes.
+/// Locks a session that has its end and no seal, or half a one; nothing changes.
 pub fn lock_unsealed(path: &Path) -> Result<WriterLock, RecorderError> {
     let (lock, reader) = lock(path)?;
     let path = path.to_owned();
-    if reader.seal()?.is_some() {
+    let seal = reader.seal()?;
+    if seal.is_some_and(|seal| seal.file_sha256 != seal::placeholder_of(&seal.tree_sha256)) {
         return Err(RecorderError::Completed { path });
     }
     match reader.end()? {
@@ -50,23 +50,24 @@ pub fn lock_unsealed(path: &Path) -> Result<WriterLock, RecorderError> {
 /// Opens an unsealed session for writing.
 pub async fn open_again(path: &Path) -> Result<SqliteConnection, RecorderError> {
     let mut conn = schema::open_again(path).await?;
-    let ready = schema::log_ahead(&mut conn).await;
-    ready.map_err(|fault| fault.at(path, "opening it again"))?;
+    let fault = |fault: Fault| fault.at(path, "opening it again");
+    clear_seal(&mut conn).await.map_err(fault)?;
+    schema::log_ahead(&mut conn).await.map_err(fault)?;
     Ok(conn)
 }
 
+/// Takes off a seal whose last bytes were never written.
+async fn clear_seal(conn: &mut SqliteConnection) -> Result<(), Fault> {
+    let mut all = conn.begin_with("BEGIN IMMEDIATE").await?;
+    for delete in ["DELETE FROM seal", "DELETE FROM table_digest"] {
+        sqlx::query(delete).execute(&mut *all).await?;
+    }
+    Ok(all.commit().await?)
+}
+
 fn lock(path: &Path) -> Result<(WriterLock, SessionReader), RecorderError> {
-    // A lock beside a file that is not there would be all that is left.
-    File::open(path).map_err(|source| match source.kind() {
-        std::io::ErrorKind::NotFound => RecorderError::Missing {
-            path: path.to_owned(),
-        },
-        _ => RecorderError::Io {
-            path: path.to_owned(),
-            doing: "opening it",
-            source,
-        },
-    })?;
+    // Before the lock: it would lie beside a file that is no session, and a write that was cut off is undone only without one.
+    SessionReader::open(path)?;
     let lock = WriterLock::take(path)?;
     let reader = SessionReader::open(path)?;
     reader.header()?;
@@ -105,10 +106,12 @@ async fn write(conn: &mut SqliteConnection, header: &ResumeHeader) -> Result<Beg
         .bind(joint.origin_ns)
         .execute(&mut *all)
         .await?;
-    for table in ["run_end", "seal", "table_digest"] {
-        sqlx::query(sqlx::AssertSqlSafe(format!("DELETE FROM {table}")))
-            .execute(&mut *all)
-            .await?;
+    for delete in [
+        "DELETE FROM run_end",
+        "DELETE FROM seal",
+        "DELETE FROM table_digest",
+    ] {
+        sqlx::query(delete).execute(&mut *all).await?;
     }
     all.commit().await?;
     Ok(Begun { joint, formats })

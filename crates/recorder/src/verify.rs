@@ -416,7 +416,7 @@ fn check_seal(reader: &SessionReader, report: &mut VerifyReport) {
         }
     }
     if seal.file_sha256 == seal::placeholder_of(&seal.tree_sha256) {
-        report.add("seal: sealing was broken off before the file hash was written");
+        report.add("seal: sealing was broken off before the file hash was written; `skinrig resume` finishes it");
     }
     let ends = reader.ask("counting ends", async |conn| {
         let row = sqlx::query("SELECT count(*) AS n FROM run_end")

@@ -256,6 +256,7 @@ impl Drop for SessionWriter {
     }
 }
 
+/// What the connections of a session run on.
 fn runtime(path: &Path) -> Result<Runtime, RecorderError> {
     tokio::runtime::Builder::new_current_thread()
         .build()

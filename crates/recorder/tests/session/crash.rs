@@ -7,7 +7,7 @@ use std::process::{Command, Stdio};
 use skinrig_model::*;
 use skinrig_recorder::{ChunkScanner, RecorderError, SessionReader, SessionWriter, verify};
 
-use crate::common::{ALIGNMENT_US, Evt2, records, stream};
+use crate::common::{ALIGNMENT_US, Evt2, further_leg, records, stream};
 
 const PRESSES: u32 = 8;
 /// Set in the child: how many records it writes with acknowledgement, and the session file.
@@ -152,5 +152,15 @@ fn a_killed_writer_leaves_what_it_acknowledged() {
                 .unwrap();
             assert!(acknowledged.next().is_none(), "{place}");
         }
+        let known = reader.history().unwrap();
+        drop(reader);
+        let mut writer = SessionWriter::resume(&path).unwrap();
+        for record in further_leg(&known) {
+            writer.accept(record).unwrap();
+        }
+        let totals = writer.finish().unwrap().totals;
+        assert_eq!(totals.presses.valid, u64::from(PRESSES) - 1, "{place}");
+        let report = verify(&path, &mut Evt2::default()).unwrap();
+        assert_eq!((report.problems, report.sealed), (vec![], true), "{place}");
     }
 }

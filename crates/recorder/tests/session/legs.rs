@@ -3,6 +3,8 @@
 use proptest::prelude::*;
 use skinrig_model::*;
 use skinrig_recorder::{LegRow, RecorderError, SessionReader, SessionWriter, verify};
+use sqlx::ConnectOptions;
+use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection};
 
 use crate::common::{Evt2, further_leg, header, records, sealed};
 
@@ -211,6 +213,119 @@ fn one_writer_at_a_time_and_the_header_of_a_leg_first() {
         Err(RecorderError::Unsealable { .. })
     ));
     sound(&path, false);
+}
+
+/// Runs statements on the file as it is.
+fn with_file<T>(path: &std::path::Path, work: impl AsyncFnOnce(&mut SqliteConnection) -> T) -> T {
+    let runtime = tokio::runtime::Builder::new_current_thread()
+        .build()
+        .unwrap();
+    runtime.block_on(async {
+        let mut conn = SqliteConnectOptions::new()
+            .filename(path)
+            .connect()
+            .await
+            .unwrap();
+        work(&mut conn).await
+    })
+}
+
+async fn execute(conn: &mut SqliteConnection, statements: &[&'static str]) {
+    for statement in statements {
+        sqlx::query(*statement).execute(&mut *conn).await.unwrap();
+    }
+}
+
+#[test]
+fn a_session_that_ended_without_its_seal_is_sealed() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.session.sqlite");
+    let mut writer = SessionWriter::create(&path).unwrap();
+    for record in records(PRESSES) {
+        writer.accept(record).unwrap();
+    }
+    assert!(matches!(
+        SessionWriter::ended(&path),
+        Err(RecorderError::InUse { .. })
+    ));
+    drop(writer);
+    sound(&path, false);
+    SessionWriter::ended(&path).unwrap().finish().unwrap();
+    sound(&path, true);
+    assert!(matches!(
+        SessionWriter::ended(&path),
+        Err(RecorderError::Completed { .. })
+    ));
+}
+
+/// A process that ends in the middle of the step that takes the seal off leaves a file with pages of both states, and beside it what
+/// undoes them.
+#[test]
+fn a_leg_that_was_half_begun_is_undone() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.session.sqlite");
+    sealed(&path, 40);
+    let before = std::fs::read(&path).unwrap();
+    let (work, left) = (
+        folder.path().join("w.sqlite"),
+        folder.path().join("b.session.sqlite"),
+    );
+    std::fs::write(&work, &before).unwrap();
+    with_file(&work, async |conn| {
+        // A cache of one page: changed pages reach the file before the end.
+        execute(
+            conn,
+            &[
+                "PRAGMA cache_size = 1",
+                "BEGIN IMMEDIATE",
+                "DELETE FROM seal",
+                "UPDATE chunk SET stored = zeroblob(length(stored) + 65536)",
+            ],
+        )
+        .await;
+        std::fs::copy(&work, &left).unwrap();
+        let journal = |path: &std::path::Path| format!("{}-journal", path.display());
+        std::fs::copy(journal(&work), journal(&left)).unwrap();
+    });
+    assert_ne!(
+        std::fs::read(&left).unwrap(),
+        before,
+        "the file is changed already"
+    );
+    sound(&left, true);
+    assert_eq!(std::fs::read(&left).unwrap(), before);
+}
+
+#[test]
+fn a_session_of_an_older_schema_goes_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.session.sqlite");
+    let mut writer = SessionWriter::create(&path).unwrap();
+    for record in records(PRESSES).into_iter().take(20) {
+        writer.accept(record).unwrap();
+    }
+    drop(writer);
+    // As schema 2 had it: preflight and legs came later.
+    with_file(&path, async |conn| {
+        execute(
+            conn,
+            &[
+                "DROP TABLE preflight",
+                "DROP TABLE leg",
+                "ALTER TABLE attempt DROP COLUMN touched_mm",
+                "DELETE FROM _sqlx_migrations WHERE version > 20261121120000",
+                "PRAGMA user_version = 2",
+            ],
+        )
+        .await;
+    });
+    sound(&path, false);
+    assert_eq!(SessionReader::open(&path).unwrap().legs().unwrap().len(), 1);
+    go_on(&path);
+    sound(&path, true);
+    let reader = SessionReader::open(&path).unwrap();
+    assert_eq!(reader.legs().unwrap().len(), 2);
+    assert_eq!(reader.header().unwrap(), header(PRESSES));
 }
 
 proptest! {
