@@ -27,7 +27,10 @@ pub fn provenance(
     let (run_end, run_end_reason) = match reader.end()? {
         None => (
             "not ended".to_owned(),
-            Some("the run is under way, or was cut off".to_owned()),
+            Some(match skinrig_recorder::writer_of(reader.path()) {
+                Some(writer) => format!("the run is under way, {writer} writes it"),
+                None => "the run was cut off; `skinrig resume` goes on with it".to_owned(),
+            }),
         ),
         Some((_, end)) => {
             let reason = match &end {

@@ -61,7 +61,10 @@ fn line(session: &SessionSummary) -> String {
                 (Some("completed"), true) => String::new(),
                 (Some(end), true) => format!("  ({end})"),
                 (Some(end), false) => format!("  ({end}, not sealed)"),
-                (None, _) => "  (under way or cut off)".to_owned(),
+                (None, _) if skinrig_recorder::writer_of(&session.path).is_some() => {
+                    "  (under way)".to_owned()
+                }
+                (None, _) => "  (cut off)".to_owned(),
             };
             format!(
                 "{:<19}  {:<14}  {:<22}  {:<24}  {:>13}  {:>8.1}  {file}{state}",

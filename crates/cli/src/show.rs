@@ -1,7 +1,7 @@
 //! `skinrig show`: one session described.
 
 use skinrig_model::{CameraId, PreflightCheck, RunEnd};
-use skinrig_recorder::{RecorderError, SessionReader};
+use skinrig_recorder::{AttemptRow, RecorderError, SessionReader};
 
 use crate::args::ShowArgs;
 use crate::exit::{Exit, Failure, Outcome};
@@ -66,7 +66,10 @@ fn describe(args: &ShowArgs) -> Result<serde_json::Value, RecorderError> {
         .iter()
         .map(|n| serde_json::json!([n.t.as_secs_f64(), n.text]))
         .collect();
+    let legs = leg_rows(&reader)?;
+    let writer = skinrig_recorder::writer_of(&args.session);
     let mut document = serde_json::json!({
+        "legs": legs, "written_by": writer,
         "session": args.session, "id": reader.session_id()?, "sealed": reader.seal()?.is_some(),
         "started_at": header.started_at, "prototype": header.prototype,
         "operator": header.operator, "protocol": header.protocol_name,
@@ -92,13 +95,85 @@ fn describe(args: &ShowArgs) -> Result<serde_json::Value, RecorderError> {
     Ok(document)
 }
 
+/// Each leg: when it began, by whom, how it ended, and how many attempts it cut off.
+fn leg_rows(reader: &SessionReader) -> Result<Vec<serde_json::Value>, RecorderError> {
+    let legs = reader.legs()?;
+    let attempts: Vec<AttemptRow> = reader.presses()?.into_iter().flat_map(|p| p.1).collect();
+    let rows = legs.iter().enumerate().map(|(i, leg)| {
+        let next = legs.get(i + 1).map(|next| next.origin);
+        let within = |a: &&AttemptRow| {
+            a.intent.is_some_and(|t| t >= leg.origin && next.is_none_or(|next| t < next))
+        };
+        let own = || attempts.iter().filter(within);
+        let cut_off = own().filter(|a| a.outcome.as_ref().is_none_or(|o| o.verdict.is_cut_off()));
+        let reason = leg.end.as_ref().and_then(|(_, end)| match end {
+            RunEnd::Completed => None,
+            RunEnd::Stopped(why) | RunEnd::Faulted(why) => Some(why.clone()),
+        });
+        serde_json::json!({
+            "leg": leg.number, "started_at": leg.began.started_at, "operator": leg.began.operator,
+            "host": leg.began.host, "software": leg.began.software,
+            "command_line": leg.began.command_line, "from_s": leg.origin.as_secs_f64(),
+            "end": leg.end.as_ref().map(|(_, end)| end.name()), "end_reason": reason,
+            "attempts": own().count(), "cut_off": cut_off.map(|a| a.id.to_string()).collect::<Vec<_>>(),
+        })
+    });
+    Ok(rows.collect())
+}
+
+fn print_legs(d: &serde_json::Value) {
+    let legs = d["legs"].as_array().map_or(&[][..], Vec::as_slice);
+    let last = legs.len().saturating_sub(1);
+    for (i, leg) in legs.iter().enumerate() {
+        let text = |key: &str| leg[key].as_str().unwrap_or("-").to_owned();
+        let cut_off: Vec<&str> = leg["cut_off"]
+            .as_array()
+            .into_iter()
+            .flatten()
+            .filter_map(|a| a.as_str())
+            .collect();
+        if legs.len() == 1 && cut_off.is_empty() {
+            return;
+        }
+        let under_way = i == last && d["written_by"].is_string();
+        let end = match (leg["end"].as_str(), under_way) {
+            (Some(end), _) => end,
+            (None, true) => "under way",
+            (None, false) => "cut off",
+        };
+        let why = leg["end_reason"].as_str().map(|why| format!(": {why}"));
+        outln!(
+            "leg {:<6} {}  by {}  from {:.0} s  {} attempts  {end}{}",
+            leg["leg"],
+            text("started_at"),
+            text("operator"),
+            leg["from_s"].as_f64().unwrap_or(0.0),
+            leg["attempts"],
+            why.unwrap_or_default(),
+        );
+        if !cut_off.is_empty() {
+            let what = if under_way { "open" } else { "cut off" };
+            outln!("           {what}: {}", cut_off.join(", "));
+        }
+    }
+}
+
 fn press_rows(reader: &SessionReader) -> Result<Vec<serde_json::Value>, RecorderError> {
     let rows = reader.presses()?.into_iter().map(|(planned, attempts)| {
-        let outcome = attempts.iter().rev().find_map(|a| a.outcome.as_ref());
+        let outcome = attempts.last().and_then(|a| a.outcome.as_ref());
+        let earlier = attempts.iter().rev().skip(1).rev().map(|a| {
+            let verdict = a.outcome.as_ref().map(|o| &o.verdict);
+            serde_json::json!([
+                a.id.number,
+                verdict.map_or("open", |v| v.name()),
+                verdict.and_then(|v| v.reason())
+            ])
+        });
+        let earlier: Vec<_> = earlier.collect();
         serde_json::json!({
             "press": planned.id.0, "role": planned.role, "repetition": planned.repetition + 1,
             "location": planned.location + 1, "x_mm": planned.at.x_mm, "y_mm": planned.at.y_mm,
-            "depth_mm": planned.depth_mm, "attempts": attempts.len(),
+            "depth_mm": planned.depth_mm, "attempts": attempts.len(), "earlier": earlier,
             "verdict": outcome.map_or("open", |o| o.verdict.name()),
             "reason": outcome.and_then(|o| o.verdict.reason()),
             "contact_s": outcome.and_then(|o| o.timing).map(|t| t.contact.as_secs_f64()),
@@ -144,13 +219,16 @@ fn print(d: &serde_json::Value) {
         || "-".into(),
         |s| clock_text(skinrig_model::HostDuration::from_secs_f64(s)),
     );
-    outln!(
-        "end        {}  after {duration}",
-        d["end"].as_str().unwrap_or("not ended")
-    );
+    let end = match (d["end"].as_str(), d["written_by"].as_str()) {
+        (Some(end), _) => end.to_owned(),
+        (None, Some(writer)) => format!("under way, {writer} writes it"),
+        (None, None) => "cut off; `skinrig resume` goes on with it".to_owned(),
+    };
+    outln!("end        {end}  after {duration}");
     if let Some(reason) = d["end_reason"].as_str() {
         outln!("           {reason}");
     }
+    print_legs(d);
     let p = &d["totals"]["presses"];
     let open = ["valid", "missed", "invalid", "excluded"]
         .iter()
@@ -239,6 +317,16 @@ fn print(d: &serde_json::Value) {
                     .map(|t| format!(": {t}"))
                     .unwrap_or_default(),
             );
+            for row in r["earlier"].as_array().into_iter().flatten() {
+                let why = row[2].as_str().map(|why| format!(": {why}"));
+                outln!(
+                    "{:>51}attempt {} {}{}",
+                    "",
+                    row[0],
+                    row[1].as_str().unwrap_or("-"),
+                    why.unwrap_or_default()
+                );
+            }
         }
     }
     if let Some(protocol) = d["protocol_text"].as_str() {

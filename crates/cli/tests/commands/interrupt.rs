@@ -215,7 +215,7 @@ fn a_killed_run_leaves_a_session_that_opens() {
     assert!(shown["totals"]["cd_events"].as_u64().unwrap() > 0);
     let words = skinrig(&["show", &text(&session)]).code(0).out;
     assert!(
-        words.contains("not ended") && words.contains("NOT SEALED"),
+        words.contains("cut off; `skinrig resume` goes on") && words.contains("NOT SEALED"),
         "{words}"
     );
     let verified = skinrig(&["verify", &text(&session)]).code(0).out;
