@@ -32,9 +32,10 @@ pub fn bit_rates(analysis: &Analysis) -> Option<BitRates> {
         .collect();
     let press_events_per_s = estimate(&press);
     let idle_events_per_s = estimate(&idle);
-    let lengths = presses.iter().filter_map(|(p, _)| p.timing);
-    let mut lengths: Vec<f64> = lengths
-        .map(|t| (t.release.0 - t.contact.0) as f64 * 1e-9)
+    let length_s = |p: &PressResult| Some(p.timing?.release.0 - p.timing?.contact.0);
+    let lengths: Vec<(u32, f64)> = presses
+        .iter()
+        .filter_map(|(p, _)| Some((p.location, length_s(p)? as f64 * 1e-9)))
         .collect();
     Some(BitRates {
         bits_per_event: settings.bits_per_event,
@@ -42,7 +43,7 @@ pub fn bit_rates(analysis: &Analysis) -> Option<BitRates> {
         idle_bytes_per_s: in_bytes(&idle_events_per_s, settings.bits_per_event),
         press_events_per_s,
         idle_events_per_s,
-        press_s: mean(&mut lengths),
+        press_s: estimate(&lengths),
     })
 }
 
@@ -52,7 +53,8 @@ fn idle_rate_per_s(views: &[PressView; 2]) -> Option<f64> {
     known.then(|| views.iter().map(|v| v.idle_rate_per_s).sum())
 }
 
-fn in_bytes(events_per_s: &Estimate, bits_per_event: f64) -> Estimate {
+/// Events per second as bytes per second.
+pub(crate) fn in_bytes(events_per_s: &Estimate, bits_per_event: f64) -> Estimate {
     let bytes = |rate: Option<f64>| rate.map(|r| r * bits_per_event / 8.0);
     Estimate {
         value: bytes(events_per_s.value),

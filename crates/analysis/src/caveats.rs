@@ -130,8 +130,8 @@ mod tests {
             pass_rate: estimate(1.0, 0.0),
             within_rate: estimate(1.0, 0.0),
             located_rate: estimate(located, 0.0),
-            press_bytes_per_s: 1.0,
-            idle_bytes_per_s: None,
+            press_bytes_per_s: estimate(1.0, 0.0),
+            idle_bytes_per_s: estimate(1.0, 0.0),
         };
         let say = |rows| {
             let curves = vec![ReductionCurve {

@@ -75,10 +75,16 @@ fn without_thinning_the_study_is_the_analysis() {
             (mean_events(0) + mean_events(1)) / 2.0
         ));
         assert!(
-            (row.press_bytes_per_s / rates.press_bytes_per_s.value.unwrap() - 1.0).abs() < 1e-6
+            (row.press_bytes_per_s.value.unwrap() / rates.press_bytes_per_s.value.unwrap() - 1.0)
+                .abs()
+                < 1e-6
         );
+        for rate in [row.press_bytes_per_s, row.idle_bytes_per_s] {
+            let (low, value, high) = (rate.low.unwrap(), rate.value.unwrap(), rate.high.unwrap());
+            assert!(low <= value && value <= high && rate.n > 0, "{rate:?}");
+        }
         assert!(near(
-            row.idle_bytes_per_s.unwrap(),
+            row.idle_bytes_per_s.value.unwrap(),
             rates.idle_bytes_per_s.value.unwrap()
         ));
     }
@@ -198,7 +204,7 @@ fn data_rates_are_means_over_the_presses_that_count() {
         idle.low.unwrap() * 21.0 / 8.0
     ));
     assert_eq!((press.n, idle.n), (25, 25));
-    assert!((rates.press_s.unwrap() - 0.45).abs() < 1e-9);
+    assert!((rates.press_s.value.unwrap() - 0.45).abs() < 1e-9);
 }
 
 #[test]

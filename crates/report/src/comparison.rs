@@ -122,7 +122,7 @@ fn whole(a: &Analysis, metric: Metric) -> Cell {
             )
         }
         Metric::Bits => plain(Some(a.settings.bits_per_event), 0),
-        Metric::PressDuration => plain(rates.and_then(|r| r.press_s), 0),
+        Metric::PressDuration => of(rates.map(|r| &r.press_s), 1.0),
         Metric::PressRate => of(rates.map(|r| &r.press_bytes_per_s), 1e-3),
         Metric::IdleRate => of(rates.map(|r| &r.idle_bytes_per_s), 1e-3),
         Metric::LatencyWidth => of(latency.map(|l| &l.width_ms), 1.0),
@@ -131,7 +131,7 @@ fn whole(a: &Analysis, metric: Metric) -> Cell {
             of(measured.map(|c| &c.median_ms), 1.0)
         }
         Metric::GlobalError => of(a.cmre.as_ref().map(|c| &c.percent), 1.0),
-        Metric::DiagonalError => plain(a.scored.rmse_diagonal_percent, a.scored.rmse_mm.n),
+        Metric::DiagonalError => scaled(&a.scored.rmse_mm, 100.0 / a.rig.outline.diagonal_mm()),
         Metric::Rmse => scaled(&a.scored.rmse_mm, 1.0),
         Metric::PassRate => {
             let first = a
@@ -171,8 +171,8 @@ fn reduced(a: &Analysis, row: &ReductionRow, metric: Metric) -> Cell {
         | Metric::Bits
         | Metric::PressDuration => whole(a, metric),
         Metric::Samples => plain(Some(row.events_per_view), row.located_rate.n),
-        Metric::PressRate => plain(Some(row.press_bytes_per_s * 1e-3), row.located_rate.n),
-        Metric::IdleRate => plain(row.idle_bytes_per_s.map(|b| b * 1e-3), row.located_rate.n),
+        Metric::PressRate => scaled(&row.press_bytes_per_s, 1e-3),
+        Metric::IdleRate => scaled(&row.idle_bytes_per_s, 1e-3),
         Metric::LatencyWidth => latency.map_or(Cell::Missing, |l| scaled(&l.width_ms, 1.0)),
         Metric::LatencyFromContact | Metric::GlobalError => Cell::Missing,
         Metric::DiagonalError => {

@@ -4,6 +4,7 @@ use rayon::prelude::*;
 use skinrig_model::AnalysisSettings;
 
 use super::trials::{Outcome, Trial};
+use crate::bit_rates::in_bytes;
 use crate::exact;
 use crate::metrics::quantile;
 use crate::result::{Estimate, ReductionRow};
@@ -18,7 +19,7 @@ pub(super) struct Course<'a> {
     /// An error below this passes, mm.
     pub pass_threshold_mm: Option<f64>,
     /// Mean idle rate of both cameras before the presses.
-    pub idle_events_per_s: Option<f64>,
+    pub idle_events_per_s: Estimate,
 }
 
 /// Counts and squares of some presses at one factor.
@@ -30,12 +31,15 @@ struct Sums {
     /// Passed and within, summed over seeds.
     passed: f64,
     within: f64,
+    /// Events per second of both cameras, summed over seeds.
+    events_per_s: f64,
 }
 
-/// RMSE, pass rate, within rate and located rate: means over seeds.
-type Values = [Option<f64>; 4];
-/// Where the RMSE is among them; the others are shares.
+/// RMSE, pass rate, within rate, located rate and events per second: means over seeds.
+type Values = [Option<f64>; 5];
+/// Where the RMSE and the events per second are among them; the others are shares.
 const RMSE: usize = 0;
+const RATE: usize = 4;
 
 impl Sums {
     fn new(seeds: usize) -> Self {
@@ -44,6 +48,7 @@ impl Sums {
             seeds: vec![[0.0; 2]; seeds],
             passed: 0.0,
             within: 0.0,
+            events_per_s: 0.0,
         }
     }
 
@@ -51,6 +56,7 @@ impl Sums {
         self.presses += other.presses;
         self.passed += other.passed;
         self.within += other.within;
+        self.events_per_s += other.events_per_s;
         for (sum, term) in self.seeds.iter_mut().zip(&other.seeds) {
             sum[0] += term[0];
             sum[1] += term[1];
@@ -78,6 +84,7 @@ impl Sums {
             share(self.passed).filter(|_| passes),
             share(self.within),
             share(located),
+            share(self.events_per_s),
         ]
     }
 }
@@ -110,9 +117,9 @@ impl Course<'_> {
             .filter(|o| (0..seeds).any(|s| o.trial(s, kind, power).error_mm.is_some()))
             .count();
         let mean = |of: fn(&Trial) -> f64| trials().map(of).sum::<f64>() / trials().count() as f64;
-        let bytes = |events: f64| events * self.settings.bits_per_event / 8.0;
+        let bits = self.settings.bits_per_event;
         let factor = 1u32 << power;
-        let [rmse, pass_rate, within_rate, located_rate] = estimates;
+        let [rmse, pass_rate, within_rate, located_rate, rate] = estimates;
         ReductionRow {
             factor,
             events_per_view: mean(|t| f64::from(t.events)) / 2.0,
@@ -130,10 +137,8 @@ impl Course<'_> {
             pass_rate,
             within_rate,
             located_rate,
-            press_bytes_per_s: bytes(mean(|t| t.events_per_s)),
-            idle_bytes_per_s: self
-                .idle_events_per_s
-                .map(|rate| bytes(rate / f64::from(factor))),
+            press_bytes_per_s: in_bytes(&rate, bits),
+            idle_bytes_per_s: in_bytes(&self.idle_events_per_s, bits / f64::from(factor)),
         }
     }
 
@@ -142,6 +147,7 @@ impl Course<'_> {
         sums.presses = place.len() as f64;
         for outcome in place {
             for (seed, of_seed) in sums.seeds.iter_mut().enumerate() {
+                sums.events_per_s += outcome.trial(seed, kind, power).events_per_s;
                 let Some(error) = outcome.trial(seed, kind, power).error_mm else {
                     continue;
                 };
@@ -154,7 +160,7 @@ impl Course<'_> {
         sums
     }
 
-    fn estimates(&self, places: &[Sums], total: &Sums) -> [Estimate; 4] {
+    fn estimates(&self, places: &[Sums], total: &Sums) -> [Estimate; 5] {
         let resamples = self.settings.bootstrap_resamples;
         let passes = self.pass_threshold_mm.is_some();
         let values = total.values(passes);
@@ -177,7 +183,7 @@ impl Course<'_> {
             let mut end = |q: f64| quantile(&mut sampled, q);
             let bootstrap = end(TAIL).zip(end(1.0 - TAIL));
             let ends = values[k].zip(bootstrap).map(|(value, ends)| match k {
-                RMSE => ends,
+                RMSE | RATE => ends,
                 _ => exact::share(value, places.len(), ends),
             });
             Estimate {

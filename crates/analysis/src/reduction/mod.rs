@@ -17,7 +17,7 @@ mod trials;
 use skinrig_model::PressRole;
 
 use crate::kept::Kept;
-use crate::metrics::quantile;
+use crate::metrics::{bootstrap_over_locations, mean, quantile};
 use crate::result::{Analysis, Reduction, ReductionCurve, Thinning};
 use crate::verdict;
 
@@ -48,14 +48,19 @@ pub fn study(analysis: &Analysis, kept: &Kept) -> Option<Reduction> {
     });
     let mut errors: Vec<f64> = outcomes.iter().filter_map(|o| o.full.error_mm).collect();
     let pass_threshold_mm = quantile(&mut errors, 0.95);
-    let mut idle: Vec<f64> = attempts
+    let idle: Vec<(u32, f64)> = attempts
         .iter()
-        .filter_map(Attempt::idle_events_per_s)
+        .filter_map(|a| Some((a.location, a.idle_events_per_s()?)))
         .collect();
     let course = curve::Course {
         settings,
         pass_threshold_mm,
-        idle_events_per_s: crate::metrics::mean(&mut idle),
+        idle_events_per_s: bootstrap_over_locations(
+            &idle,
+            settings.bootstrap_resamples,
+            settings.seed,
+            mean,
+        ),
     };
     Some(Reduction {
         eps_px: settings.eps_px,

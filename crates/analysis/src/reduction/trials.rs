@@ -15,7 +15,7 @@ const STREAMS: u64 = 1 << 63;
 /// A press to be thinned.
 pub(crate) struct Attempt<'a> {
     press: PressId,
-    location: u32,
+    pub(super) location: u32,
     truth: Point2,
     views: &'a [KeptView; 2],
 }

@@ -59,7 +59,7 @@ pub struct BitRates {
     /// Bytes per second while idle.
     pub idle_bytes_per_s: Estimate,
     /// Mean length of a press, contact to release, s.
-    pub press_s: Option<f64>,
+    pub press_s: Estimate,
 }
 
 /// Events of a camera per pixel over the whole recording, whole sensor.

@@ -25,7 +25,7 @@ use skinrig_model::{
 };
 
 /// Version of this layout and of the algorithms behind it; part of every result.
-pub const ANALYSIS_VERSION: u32 = 3;
+pub const ANALYSIS_VERSION: u32 = 4;
 
 /// The result of analysing one session.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

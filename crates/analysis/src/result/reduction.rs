@@ -62,7 +62,7 @@ pub struct ReductionRow {
     /// Share of all presses that are located: an estimate that no location rule of the settings excludes.
     pub located_rate: Estimate,
     /// Bytes per second of both cameras during a press, at the stated bits per event.
-    pub press_bytes_per_s: f64,
-    /// And while idle; `None` when no press has idle time before it.
-    pub idle_bytes_per_s: Option<f64>,
+    pub press_bytes_per_s: Estimate,
+    /// And while idle, over the presses with idle time before them; without a value when there is none.
+    pub idle_bytes_per_s: Estimate,
 }

@@ -93,8 +93,8 @@ pub fn reduction(input: &ReportInput<'_>) -> Option<Figure> {
 fn caption(study: &Reduction) -> String {
     let mut caption = format!(
         "Data reduction: what is left of the localisation when only one event in k is kept. One clustering setting at \
-         all factors (radius {} px, core threshold {} events). Values are means over {} seeds, bands 95 % bootstrap \
-         intervals over locations, {} presses. A press without an estimate fails in B, C and D. The pass threshold is \
+         all factors (radius {} px, core threshold {} events). Values are means over {} seeds, bands 95 % \
+         intervals over locations (bootstrap; exact where a share is 0 or 100 %), {} presses. A press without an estimate fails in B, C and D. The pass threshold is \
          the 95th percentile of the errors at factor 1 ({} mm), so B begins at about 95 % by construction; C asks for an error \
          of at most {} mm. Small figures above the plots: kB/s of both cameras during a press.",
         number(Some(study.eps_px), 1),
@@ -257,7 +257,9 @@ fn bytes(svg: &mut Svg, study: &Reduction, axes: &Axes, top: f64) {
     {
         let x = axes.x.at(power(row));
         svg.line("axis", (x, top - 4.0), (x, top));
-        let kilo = row.press_bytes_per_s / 1e3;
+        let Some(kilo) = row.press_bytes_per_s.value.map(|b| b / 1e3) else {
+            continue;
+        };
         let digits = if kilo >= 10.0 { 0 } else { 2 };
         let unit = if row.factor == 1 { " kB/s" } else { "" };
         let text = format!("{}{unit}", number(Some(kilo), digits));

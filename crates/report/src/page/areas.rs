@@ -98,7 +98,7 @@ pub(super) fn cmre(a: &Analysis) -> Option<Grid> {
     grid.row([
         "RMSE, share of the skin's diagonal (%)".to_owned(),
         number(a.scored.rmse_diagonal_percent, 2),
-        NONE.to_owned(),
+        interval(&a.scored.rmse_mm, percent_per_mm(a), 2),
         a.scored.rmse_mm.n.to_string(),
     ]);
     if c.percent.value.is_some_and(|v| v < 0.0) {
@@ -124,6 +124,11 @@ pub(super) fn cmre(a: &Analysis) -> Option<Grid> {
     }
     grid.download("cmre");
     Some(grid)
+}
+
+/// What one millimetre is of the skin's diagonal, %.
+fn percent_per_mm(a: &Analysis) -> f64 {
+    100.0 / a.rig.outline.diagonal_mm()
 }
 
 /// Data rates during presses and while idle.
@@ -153,13 +158,13 @@ pub(super) fn bit_rates(a: &Analysis) -> Option<Grid> {
     grid.row(row("idle (kev/s)", &r.idle_events_per_s, 1e-3, 2, "9.1"));
     grid.row(row("press (kB/s)", &r.press_bytes_per_s, 1e-3, 2, "~75"));
     grid.row(row("idle (kB/s)", &r.idle_bytes_per_s, 1e-3, 2, "~24"));
-    grid.row([
-        "press, contact to release (s)".to_owned(),
-        number(r.press_s, 2),
-        NONE.to_owned(),
-        NONE.to_owned(),
-        "0.55".to_owned(),
-    ]);
+    grid.row(row(
+        "press, contact to release (s)",
+        &r.press_s,
+        1.0,
+        2,
+        "0.55",
+    ));
     grid.note(format!(
         "Events in the rows of the crop; bytes at {} bits per event. The published event rates follow from the published \
          bytes at 21 bits.",

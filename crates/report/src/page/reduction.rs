@@ -45,13 +45,9 @@ pub(super) fn reduction(a: &Analysis) -> Option<Grid> {
     };
     for curve in &study.curves {
         for row in &curve.rows {
-            let kilo = |bytes: Option<f64>| {
-                let digits = if bytes.is_some_and(|b| b >= 1e4) {
-                    1
-                } else {
-                    3
-                };
-                number(bytes.map(|b| b / 1e3), digits)
+            let kilo = |bytes: &Estimate| {
+                let large = bytes.value.is_some_and(|b| b >= 1e4);
+                with(bytes, 1e-3, if large { 1 } else { 3 })
             };
             let seeds = row.rmse_of_seeds_mm.map_or_else(
                 || NONE.to_owned(),
@@ -70,15 +66,16 @@ pub(super) fn reduction(a: &Analysis) -> Option<Grid> {
                     with(&row.pass_rate, 100.0, 1),
                     with(&row.within_rate, 100.0, 1),
                     with(&row.located_rate, 100.0, 1),
-                    kilo(Some(row.press_bytes_per_s)),
-                    kilo(row.idle_bytes_per_s),
+                    kilo(&row.press_bytes_per_s),
+                    kilo(&row.idle_bytes_per_s),
                 ],
                 row.factor == crate::comparison::FACTOR,
             );
         }
     }
     grid.note(format!(
-        "n = {} presses, means over {} seeds, in brackets 95 % intervals over locations. Events: per press and camera. Marked: \
+        "n = {} presses, means over {} seeds, in brackets 95 % intervals: from a bootstrap over locations, \
+         exact ones where a share is 0 or 100 %. Events: per press and camera. Marked: \
          the published factor.",
         study.presses, study.seeds
     ));

@@ -65,7 +65,7 @@ fn reduction(study: &Reduction) -> Table {
         .column("thinning", rows.iter().map(|(c, _)| json!(c.thinning)))
         .column("factor", rows.iter().map(|(_, r)| json!(r.factor)))
         .column("events_per_view", of(|r| Some(r.events_per_view), 3));
-    let parts: [([&'static str; 3], Part); 4] = [
+    let parts: [([&'static str; 3], Part); 6] = [
         (["rmse_mm", "rmse_low_mm", "rmse_high_mm"], |r| &r.rmse_mm),
         (["pass_rate", "pass_rate_low", "pass_rate_high"], |r| {
             &r.pass_rate
@@ -77,6 +77,22 @@ fn reduction(study: &Reduction) -> Table {
         (
             ["located_rate", "located_rate_low", "located_rate_high"],
             |r| &r.located_rate,
+        ),
+        (
+            [
+                "press_bytes_per_s",
+                "press_bytes_per_s_low",
+                "press_bytes_per_s_high",
+            ],
+            |r| &r.press_bytes_per_s,
+        ),
+        (
+            [
+                "idle_bytes_per_s",
+                "idle_bytes_per_s_low",
+                "idle_bytes_per_s_high",
+            ],
+            |r| &r.idle_bytes_per_s,
         ),
     ];
     for (names, part) in parts {
@@ -91,8 +107,6 @@ fn reduction(study: &Reduction) -> Table {
             "rmse_highest_seed_mm",
             of(|r| r.rmse_of_seeds_mm.map(|s| s.1), 5),
         )
-        .column("press_bytes_per_s", of(|r| Some(r.press_bytes_per_s), 3))
-        .column("idle_bytes_per_s", of(|r| r.idle_bytes_per_s, 3))
 }
 
 fn sweep(l: &Latency) -> Table {
@@ -260,7 +274,7 @@ fn bit_rates(r: &skinrig_analysis::result::BitRates) -> Table {
         ("press_bytes_per_s", r.press_bytes_per_s),
         ("idle_bytes_per_s", r.idle_bytes_per_s),
         ("bits_per_event", plain(Some(r.bits_per_event), 0)),
-        ("press_s", plain(r.press_s, 0)),
+        ("press_s", r.press_s),
     ])
 }
 

@@ -228,9 +228,11 @@ pub(crate) fn table(input: &ReportInput<'_>, color: bool) -> String {
     if let Some(share) = a.scored.rmse_diagonal_percent.filter(|_| usable) {
         let _ = writeln!(
             out,
-            "{:<24}{:>8} %   of the skin's diagonal",
-            "RMSE",
-            number(Some(share), 2)
+            "{:<24}{:>8} %   {:^20}{:>7} presses",
+            "RMSE, share of diagonal",
+            number(Some(share), 2),
+            interval(&a.scored.rmse_mm, 100.0 / a.rig.outline.diagonal_mm(), 2),
+            a.scored.rmse_mm.n
         );
     }
     if usable && a.scored_without_exclusions != a.scored {

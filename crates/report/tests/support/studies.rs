@@ -39,8 +39,8 @@ pub fn reduction() -> Reduction {
                     pass_rate: share(0.95 - loss * (x / 12.0).powi(5), 0.02),
                     within_rate: share(0.93 - 1.3 * loss * (x / 12.0).powi(4), 0.025),
                     located_rate: share(0.99 - 0.4 * loss * (x / 12.0).powi(7), 0.008),
-                    press_bytes_per_s: 75_000.0 * kept,
-                    idle_bytes_per_s: Some(24_000.0 * kept),
+                    press_bytes_per_s: estimate(75_000.0 * kept, 1_600.0 * kept, 300),
+                    idle_bytes_per_s: estimate(24_000.0 * kept, 240.0 * kept, 300),
                 }
             })
             .collect(),
@@ -264,7 +264,7 @@ pub fn bit_rates() -> BitRates {
         idle_events_per_s: estimate(9_140.0, 90.0, 2294),
         press_bytes_per_s: estimate(74_996.0, 1_575.0, 2294),
         idle_bytes_per_s: estimate(23_992.0, 236.0, 2294),
-        press_s: Some(1.2),
+        press_s: estimate(1.2, 0.01, 2294),
     }
 }
 
