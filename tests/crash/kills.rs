@@ -1,0 +1,163 @@
+//! The process is gone: at every journal write, at random instants, and again while the session goes on.
+
+use std::io::{BufRead, BufReader};
+use std::process::Stdio;
+
+use crate::lab::{Dice, Uninterrupted, campaign, expect, goes_on, journal, resume, session_in};
+
+/// How many random instants.
+fn crashes() -> u64 {
+    let asked = std::env::var("SKINRIG_CRASHES").ok();
+    asked.and_then(|n| n.parse().ok()).unwrap_or(16)
+}
+
+/// The campaign with a fault; false when it came to its end before.
+fn killed(folder: &std::path::Path, fault: &str) -> bool {
+    let output = campaign(folder).args(["--fault", fault]).output().unwrap();
+    match output.status.code() {
+        None => true,
+        code => {
+            assert_eq!(code, Some(0), "{}", crate::lab::words(&output));
+            false
+        }
+    }
+}
+
+/// Kills at journal writes `first`, `first + 2`, ... until the campaign gets through; how many.
+fn killed_at_every_other_write(first: usize) -> usize {
+    for n in (first..).step_by(2) {
+        let folder = tempfile::tempdir().unwrap();
+        let fault = format!("killed@journal:{n}");
+        if !killed(folder.path(), &fault) {
+            return n / 2;
+        }
+        let session = session_in(folder.path()).unwrap();
+        goes_on(&session, 1, &fault);
+    }
+    0
+}
+
+// Two tests, so that two processors share the work.
+#[test]
+fn killed_before_every_odd_journal_write() {
+    let kills = killed_at_every_other_write(1);
+    assert!(
+        kills > 16,
+        "{kills}: an intent and an outcome for each of 14 presses"
+    );
+}
+
+#[test]
+fn killed_before_every_even_journal_write() {
+    let kills = killed_at_every_other_write(2);
+    assert!(
+        kills > 16,
+        "{kills}: an intent and an outcome for each of 14 presses"
+    );
+}
+
+#[test]
+fn killed_at_random_instants() {
+    let took = Uninterrupted::get().took;
+    let mut under_way = 0;
+    for seed in 0..crashes() {
+        let mut dice = Dice(seed);
+        let folder = tempfile::tempdir().unwrap();
+        let mut command = campaign(folder.path());
+        let command = command.stdout(Stdio::null()).stderr(Stdio::piped());
+        let mut child = command.spawn().unwrap();
+        let wait = took.mul_f64(dice.below(1_000) as f64 / 1_000.0);
+        // Not a wait for anything: the instant of the crash.
+        std::thread::sleep(wait);
+        child.kill().unwrap();
+        let said = BufReader::new(child.stderr.take().unwrap());
+        let ended = child.wait().unwrap().success();
+        let case = format!("seed {seed}, killed after {wait:?}");
+        // `press 4/12` is said when the outcome of the fourth press is on the disk.
+        let told = said.lines().map_while(Result::ok).filter_map(|line| {
+            let (n, _) = line.strip_prefix("press ")?.split_once('/')?;
+            n.parse::<usize>().ok()
+        });
+        let told = told.last().unwrap_or(0);
+        let Some(session) = session_in(folder.path()) else {
+            assert_eq!(told, 0, "{case}");
+            continue;
+        };
+        let before = journal(&session).unwrap_or_default();
+        let outcomes = before.iter().flat_map(|(_, attempts)| attempts);
+        let outcomes = outcomes.filter(|a| a.outcome.is_some()).count();
+        assert!(
+            outcomes >= told,
+            "{case}: {told} presses told, {outcomes} kept"
+        );
+        if ended {
+            continue;
+        }
+        under_way += u64::from(outcomes > 0);
+        if before.len() > 0 && sealed(&session) {
+            expect(resume(&session), 2); // complete in time
+        } else {
+            goes_on(&session, 1, &case);
+        }
+    }
+    assert!(
+        under_way > 0,
+        "no crash during the presses: the instants are badly chosen"
+    );
+}
+
+fn sealed(session: &std::path::Path) -> bool {
+    let reader = skinrig_recorder::SessionReader::open(session).unwrap();
+    reader.seal().unwrap().is_some()
+}
+
+#[test]
+fn killed_again_while_it_goes_on() {
+    for (first, again) in [
+        (3, 2),
+        (12, 1),
+        (12, 5),
+        (18, 12),
+        (18, 17),
+        (30, 9),
+        (36, 11),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        assert!(killed(folder.path(), &format!("killed@journal:{first}")));
+        let session = session_in(folder.path()).unwrap();
+        let mut leg = resume(&session);
+        let output = leg
+            .args(["--fault", &format!("killed@journal:{again}")])
+            .output()
+            .unwrap();
+        let case = format!(
+            "killed at {first}, then at {again}: {}",
+            crate::lab::words(&output)
+        );
+        assert_eq!(output.status.code(), None, "{case}");
+        goes_on(&session, 2, &case);
+    }
+}
+
+#[test]
+fn killed_before_the_seal() {
+    let folder = tempfile::tempdir().unwrap();
+    assert!(killed(folder.path(), "killed@seal"));
+    let session = session_in(folder.path()).unwrap();
+    // Nothing is to be pressed: the seal alone is missing.
+    let said = expect(resume(&session), 0);
+    assert!(said.contains("only its seal was missing"), "{said}");
+    Uninterrupted::get().assert_equalled_by(&session, 0, "killed before the seal");
+    let said = expect(resume(&session), 2);
+    assert!(said.contains("nothing to resume"), "{said}");
+
+    // The same of a further leg.
+    let folder = tempfile::tempdir().unwrap();
+    assert!(killed(folder.path(), "killed@journal:20"));
+    let session = session_in(folder.path()).unwrap();
+    let mut leg = resume(&session);
+    let output = leg.args(["--fault", "killed@seal"]).output().unwrap();
+    assert_eq!(output.status.code(), None);
+    expect(resume(&session), 0);
+    Uninterrupted::get().assert_equalled_by(&session, 1, "killed before the seal of a leg");
+}

@@ -1,0 +1,107 @@
+//! The power is gone: of what was not yet flushed to the disk, any part may be missing or torn.
+
+use std::path::{Path, PathBuf};
+
+use crate::lab::{Dice, Presses, campaign, goes_on, journal, program, session_in, words};
+
+/// Length of the header of a write-ahead log, and of each of its frames beside the page (sqlite.org/fileformat2.html, 4.1 and 4.2).
+const LOG_HEADER: usize = 32;
+const FRAME_HEADER: usize = 24;
+
+fn log_of(session: &Path) -> PathBuf {
+    let mut name = session.as_os_str().to_owned();
+    name.push("-wal");
+    name.into()
+}
+
+/// Where the last transaction of a log ends that was committed, and thus flushed; 0 for none.
+fn flushed(log: &[u8]) -> usize {
+    let word = |at: usize| {
+        let bytes = log.get(at..at + 4)?;
+        Some(u32::from_be_bytes(bytes.try_into().ok()?))
+    };
+    let Some(page) = word(8) else { return 0 };
+    let frame = FRAME_HEADER + page as usize;
+    let salt = log.get(16..24);
+    let mut last = 0;
+    for at in (LOG_HEADER..).step_by(frame) {
+        let (Some(pages), true) = (word(at + 4), at + frame <= log.len()) else {
+            break;
+        };
+        if log.get(at + 8..at + 16) != salt {
+            break; // of an earlier round of the log
+        }
+        if pages > 0 {
+            last = at + frame;
+        }
+    }
+    last
+}
+
+/// A campaign that was killed at a random journal write, its journal, and its log.
+fn killed(dice: &mut Dice, folder: &Path) -> (PathBuf, Presses, Vec<u8>) {
+    let n = 10 + dice.below(20);
+    let output = campaign(folder)
+        .args(["--fault", &format!("killed@journal:{n}")])
+        .output()
+        .unwrap();
+    assert_eq!(output.status.code(), None, "{}", words(&output));
+    let session = session_in(folder).unwrap();
+    let log = std::fs::read(log_of(&session)).unwrap();
+    let before = journal(&session).unwrap();
+    (session, before, log)
+}
+
+#[test]
+fn what_was_not_flushed_may_be_torn() {
+    for seed in 0..4 {
+        let mut dice = Dice(seed);
+        let folder = tempfile::tempdir().unwrap();
+        let (session, before, mut log) = killed(&mut dice, folder.path());
+        log.truncate(flushed(&log).max(LOG_HEADER));
+        // What was on its way: anything, of any length.
+        let length = dice.below(20_000);
+        log.extend(dice.bytes(length));
+        std::fs::write(log_of(&session), &log).unwrap();
+        let case = format!("seed {seed}");
+        assert_eq!(
+            journal(&session).unwrap(),
+            before,
+            "{case}: what was flushed is there"
+        );
+        goes_on(&session, 1, &case);
+    }
+}
+
+#[test]
+fn a_log_cut_anywhere_tells_nothing_wrong() {
+    let mut sound = 0;
+    for seed in 100..110 {
+        let mut dice = Dice(seed);
+        let folder = tempfile::tempdir().unwrap();
+        let (session, before, mut log) = killed(&mut dice, folder.path());
+        let at = dice.below(log.len() as u64) as usize;
+        log.truncate(at);
+        std::fs::write(log_of(&session), &log).unwrap();
+        let case = format!("seed {seed}, cut at {at}");
+        let verified = program(&["verify"]).arg(&session).output().unwrap();
+        match verified.status.code() {
+            Some(0) => {}
+            // Told: pages were missing that had been flushed.
+            Some(2 | 4) => continue,
+            _ => panic!("{case}: {}", words(&verified)),
+        }
+        sound += 1;
+        let now = journal(&session).unwrap();
+        for ((_, now), (planned, before)) in now.iter().zip(&before) {
+            for (is, was) in now.iter().zip(before) {
+                // As it was, or as it was earlier: without its outcome.
+                let earlier = is.outcome.is_none() && is.id == was.id;
+                assert!(is == was || earlier, "{case}: {}: {is:?}", planned.id);
+            }
+            assert!(now.len() <= before.len(), "{case}");
+        }
+        goes_on(&session, 1, &case);
+    }
+    assert!(sound > 0, "every cut was damage: the cuts are badly chosen");
+}
