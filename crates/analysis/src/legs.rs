@@ -86,9 +86,12 @@ pub fn align(input: &mut SessionInput) {
         let moves = moves(&input.legs, &lines, k);
         move_camera(input, k, &moves);
         // A camera's zero may be long before its first event; what is recorded of a leg begins with its host time.
-        for ((leg, line), by) in input.legs.iter_mut().zip(&lines[1..]).zip(&moves[1..]) {
-            if let Some(line) = line {
-                let begins_us = line.fit.camera_us(leg.origin.0 as f64 * 1e-3) + *by as f64;
+        // A leg without a line of its own begins where those of the others say; else one that holds nothing could cut theirs.
+        let known = |leg: usize| lines[leg].map(|line| (line, moves[leg]));
+        let other = (0..lines.len()).find_map(known);
+        for (i, leg) in input.legs.iter_mut().enumerate() {
+            if let Some((line, by)) = known(i + 1).or(other) {
+                let begins_us = line.fit.camera_us(leg.origin.0 as f64 * 1e-3) + by as f64;
                 leg.camera_us[k] = (begins_us - BEFORE_US).max(0.0) as u64;
             }
         }
