@@ -94,7 +94,7 @@ fn killed_at_random_instants() {
             continue;
         }
         under_way += u64::from(outcomes > 0);
-        if before.len() > 0 && sealed(&session) {
+        if !before.is_empty() && sealed(&session) {
             expect(resume(&session), 2); // complete in time
         } else {
             goes_on(&session, 1, &case);
