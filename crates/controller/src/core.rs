@@ -112,7 +112,7 @@ impl<'a> Core<'a> {
             clock,
             control: control.clone(),
             journal: Journal::new(sink, plan.presses.len()),
-            machine: Machine::new(),
+            machine: Machine::new(control.clone()),
             report: None,
             begin: HostTime::ZERO,
             open: None,
@@ -381,6 +381,8 @@ impl<'a> Core<'a> {
 
     /// Listens to the operator.
     fn hear(&mut self) -> Result<(), Halt> {
+        self.write_notes()?;
+        let asked = self.control.asked();
         for request in self.control.take() {
             let before = self.machine.state();
             let (event, kind, words) = match request {
@@ -407,6 +409,7 @@ impl<'a> Core<'a> {
                 })?;
             }
         }
+        self.control.hear_up_to(asked);
         if self.breakable && self.machine.state() == State::PausingNow {
             self.breakable = false;
             return Err(Halt::PausedNow);
@@ -414,8 +417,25 @@ impl<'a> Core<'a> {
         Ok(())
     }
 
-    /// While ending: true once the operator wants the motors off.
+    /// Writes the operator's remarks.
+    pub(crate) fn write_notes(&mut self) -> Result<(), ControllerError> {
+        for text in self.control.take_notes() {
+            let t = self.now();
+            self.journal.emit(Record::Note { t, text })?;
+            self.control.note_written();
+        }
+        Ok(())
+    }
+
+    /// While ending: true once the operator wants the motors off. Nothing else that is asked for has an effect then.
     pub(crate) fn hear_halt(&mut self) -> bool {
+        let asked = self.control.asked();
+        let is_halted = self.heard_halt();
+        self.control.hear_up_to(asked);
+        is_halted
+    }
+
+    fn heard_halt(&mut self) -> bool {
         if self.control.is_halted() && self.halted_at.is_none() {
             self.halted_at = Some(self.now());
             self.machine.fire(Event::Halt);

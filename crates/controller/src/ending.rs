@@ -122,6 +122,7 @@ impl Core<'_> {
             }
             core.journal.miss_the_rest(&reason)
         });
+        self.attempt("the operator's notes", Self::write_notes);
         let problems = self.journal.problems.clone();
         for text in problems {
             let _ = self.journal.emit(Record::Note {

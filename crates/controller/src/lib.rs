@@ -55,7 +55,7 @@ mod verdict;
 pub mod watchdog;
 
 pub use checks::{ExpectedDevice, Loopback, Preflight};
-pub use control::ControlHandle;
+pub use control::{ControlHandle, NotesFull};
 pub use error::{ControllerError, GuardError};
 pub use guard::GuardedIndenter;
 pub use jog::{Jog, Moved, Touched};
@@ -65,4 +65,5 @@ pub use run::{
 };
 pub use settings::ControllerSettings;
 pub use sink::{RecordSink, SinkFault};
+pub use states::State;
 pub use watchdog::{Trip, WatchLimits, Watchdog};

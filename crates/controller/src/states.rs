@@ -2,6 +2,8 @@
 //!
 //! `docs/run-states.md` shows the same table; a test writes it out and compares.
 
+use crate::control::ControlHandle;
+
 /// Where a run is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum State {
@@ -99,6 +101,25 @@ impl State {
         Self::Halting,
         Self::Finished,
     ];
+
+    /// The name for programs: `running`, `pausing_now`.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Planned => "planned",
+            Self::Armed => "armed",
+            Self::Running => "running",
+            Self::Pausing => "pausing",
+            Self::PausingNow => "pausing_now",
+            Self::Paused => "paused",
+            Self::Stopping => "stopping",
+            Self::Aborting => "aborting",
+            Self::Retracting => "retracting",
+            Self::Faulted => "faulted",
+            Self::Halting => "halting",
+            Self::Finished => "finished",
+        }
+    }
 
     /// True when the robot's motors may be on.
     #[must_use]
@@ -313,21 +334,28 @@ pub fn markdown() -> String {
 
 /// A run's present state.
 #[derive(Debug)]
-pub(crate) struct Machine(State);
+pub(crate) struct Machine {
+    state: State,
+    /// Where the present state can be seen from other threads.
+    shown: ControlHandle,
+}
 
 impl Machine {
-    pub(crate) const fn new() -> Self {
-        Self(State::Planned)
+    pub(crate) fn new(shown: ControlHandle) -> Self {
+        let state = State::Planned;
+        shown.show(state);
+        Self { state, shown }
     }
 
     pub(crate) const fn state(&self) -> State {
-        self.0
+        self.state
     }
 
     /// Goes to the next state and says what to do.
     pub(crate) fn fire(&mut self, event: Event) -> Action {
-        let (next, action) = transition(self.0, event);
-        self.0 = next;
+        let (next, action) = transition(self.state, event);
+        self.state = next;
+        self.shown.show(next);
         action
     }
 }
@@ -362,11 +390,18 @@ mod tests {
         assert_eq!(found, BTreeSet::from(State::ALL));
     }
 
+    fn at(state: State) -> Machine {
+        Machine {
+            state,
+            shown: ControlHandle::new(),
+        }
+    }
+
     #[test]
     fn abort_and_fault_lead_to_disarmed_from_everywhere() {
         for state in State::ALL {
             for event in [Event::Abort, Event::Fault] {
-                let mut machine = Machine(state);
+                let mut machine = at(state);
                 let action = machine.fire(event);
                 if state == State::Finished {
                     assert_eq!(machine.state(), State::Finished);
@@ -388,7 +423,7 @@ mod tests {
     #[test]
     fn a_halt_disarms_at_once_from_everywhere() {
         for state in State::ALL {
-            let mut machine = Machine(state);
+            let mut machine = at(state);
             let action = machine.fire(Event::Halt);
             if matches!(state, State::Halting | State::Finished) {
                 assert_eq!((machine.state(), action), (state, Action::Ignore));

@@ -17,6 +17,9 @@ pub const DEADLINE_FACTOR: f64 = 3.0;
 /// ... plus this, s.
 pub const DEADLINE_SLACK_S: f64 = 1.0;
 
+/// Speed of motions that are no step of the plan, mm/s: the controller's default; never more than the plan's own limit.
+pub const OWN_SPEED_MM_S: f64 = 20.0;
+
 /// Time of a straight motion from rest to rest, s.
 #[must_use]
 pub fn motion_s(distance_mm: f64, speed_mm_s: f64) -> f64 {
@@ -75,6 +78,41 @@ pub(crate) fn press_s(limits: &RunLimits, press: &PressStep) -> (f64, f64) {
 /// The estimated time of a travel with settling, s.
 pub(crate) fn travel_s(limits: &RunLimits, distance_mm: f64, speed_mm_s: f64) -> f64 {
     motion_s(distance_mm, speed_mm_s) + limits.settle_time.as_secs_f64()
+}
+
+/// The estimated time of all checks of the surface, s: one before the first press, and one after each repetition when
+/// that is asked for. The mean case: the surface lies where the frame says.
+pub(crate) fn surface_checks_s(plan: &Plan) -> f64 {
+    let Some(check) = &plan.surface_check else {
+        return 0.0;
+    };
+    let (limits, search) = (&plan.limits, &check.search);
+    let speed = OWN_SPEED_MM_S.min(limits.max_speed_mm_s);
+    let down = (limits.clearance_mm - search.band_mm).max(0.0);
+    let touch = search.tare.as_secs_f64()
+        + travel_s(limits, down, speed)
+        + search.band_mm / search.speed_mm_s
+        + travel_s(limits, limits.clearance_mm, speed);
+    let first_press = plan.steps.iter().find_map(|step| match step {
+        Step::Press(p) => Some(p.at),
+        _ => None,
+    });
+    // From about where the presses are to every point, and back.
+    let stops = || first_press.iter().chain(&check.points);
+    let next = stops().skip(1).chain(stops().take(1));
+    let ways: f64 = stops()
+        .zip(next)
+        .map(|(from, to)| travel_s(limits, from.distance_mm(*to), speed))
+        .sum();
+    let is_repetition =
+        |step: &&Step| matches!(step, Step::Begin { repetition } if repetition.is_some());
+    let repetitions = plan.steps.iter().filter(is_repetition).count();
+    let times = 1 + if check.each_repetition {
+        repetitions
+    } else {
+        0
+    };
+    times as f64 * (ways + check.points.len() as f64 * touch)
 }
 
 /// The deadline for something that should take `estimate_s`.
@@ -185,7 +223,7 @@ pub(crate) fn duration_s(plan: &Plan) -> (f64, f64) {
             }
         }
     }
-    (now, contact)
+    (now + surface_checks_s(plan), contact)
 }
 
 #[cfg(test)]

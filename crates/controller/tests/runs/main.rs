@@ -4,6 +4,7 @@ mod course;
 mod edges;
 mod escape;
 mod guard;
+mod heard;
 mod mock;
 mod preflight;
 mod progress;

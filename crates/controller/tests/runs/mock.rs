@@ -25,6 +25,9 @@ pub enum Failure {
     Panic,
 }
 
+/// What the operator remarks.
+pub const NOTE: &str = "Ann: the lamp flickers";
+
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Press {
     Pause,
@@ -32,6 +35,8 @@ pub enum Press {
     Stop,
     Abort,
     Halt,
+    /// A remark.
+    Note,
 }
 
 /// What goes wrong with the feedback.
@@ -298,6 +303,7 @@ impl Clock for MockClock {
                     Press::Stop => w.control.stop(),
                     Press::Abort => w.control.abort(),
                     Press::Halt => w.control.halt(),
+                    Press::Note => assert_eq!(w.control.note(NOTE.into()), Ok(1)),
                 }
             } else if matches!(press, Press::Pause | Press::PauseNow) && w.ticks == tick + 200 {
                 w.control.resume();

@@ -1,9 +1,9 @@
 //! Presses that find the surface by touch, on the simulated rig whose skin does not lie where the frame says.
 
-use skinrig_controller::{ControlHandle, execute};
+use skinrig_controller::{ControlHandle, Resume, Run, execute};
 use skinrig_model::*;
 use skinrig_protocol::plan::{Plan, Step};
-use skinrig_protocol::{Surface, SurfaceCheck, TouchSearch};
+use skinrig_protocol::{Route, Surface, SurfaceCheck, TouchSearch};
 use skinrig_sim::config::SimConfig;
 use skinrig_sim::rig::simulated_rig;
 
@@ -127,8 +127,7 @@ fn a_search_that_makes_no_sense_never_moves() {
     }
 }
 
-/// What the check of the surface told, with the skin `off_mm` above the frame's.
-fn checked(off_mm: f64, each_repetition: bool) -> (RunEnd, Vec<Record>) {
+fn checked_plan(each_repetition: bool) -> Plan {
     let mut plan = paced_plan();
     plan.surface_check = Some(SurfaceCheck {
         points: vec![Point2::new(9.0, 3.0), Point2::new(12.0, 2.0)],
@@ -136,6 +135,12 @@ fn checked(off_mm: f64, each_repetition: bool) -> (RunEnd, Vec<Record>) {
         each_repetition,
         search: SEARCH,
     });
+    plan
+}
+
+/// What the check of the surface told, with the skin `off_mm` above the frame's.
+fn checked(off_mm: f64, each_repetition: bool) -> (RunEnd, Vec<Record>) {
+    let plan = checked_plan(each_repetition);
     let mut rig = simulated_rig(&SimConfig::new(5, SimLevel::Kinematic));
     rig.robot_from_skin.translation_mm[2] -= off_mm;
     let header = RunHeader {
@@ -211,6 +216,58 @@ fn a_surface_in_place_is_checked_and_pressed() {
             .iter()
             .filter(|r| matches!(r, Record::Outcome(o) if o.verdict == PressVerdict::Valid));
         assert_eq!(valid.count(), 3);
+    }
+}
+
+#[test]
+fn a_further_leg_checks_the_surface_before_it_presses() {
+    // Who resumes may have mounted the skin anew: 0.8 mm higher than at the session's begin.
+    for (off_mm, ends_well) in [(0.15, true), (0.8, false)] {
+        let plan = checked_plan(false);
+        let cut_off = PressHistory {
+            attempts: 1,
+            verdict: None,
+        };
+        let done = PressHistory {
+            attempts: 1,
+            verdict: Some(PressVerdict::Valid),
+        };
+        let histories = vec![done, cut_off, PressHistory::default()];
+        let wanted = plan.wanted(&histories);
+        let rest = plan.remaining(|id| wanted[id.0 as usize], Route::Straight);
+        let mut rig = simulated_rig(&SimConfig::new(5, SimLevel::Kinematic));
+        rig.robot_from_skin.translation_mm[2] -= off_mm;
+        let header = RunHeader {
+            robot_from_skin: rig.robot_from_skin,
+            ..header(&plan)
+        };
+        let (control, mut sink) = (ControlHandle::new(), Sink::default());
+        let report = Run::new(&rest, header, rig, &control, &mut sink)
+            .resumed(Resume {
+                header: ResumeHeader {
+                    operator: "o".into(),
+                    started_at: String::new(),
+                    host: String::new(),
+                    software: String::new(),
+                    command_line: String::new(),
+                },
+                histories,
+            })
+            .execute();
+        let at = |is: fn(&Record) -> bool| sink.records.iter().position(is);
+        let pressed = at(|r| matches!(r, Record::Intent { .. }));
+        let rows = rows(&sink.records);
+        assert_eq!(rows.len(), 2, "{report:?}");
+        if ends_well {
+            assert_eq!((report.end, report.valid), (RunEnd::Completed, 3));
+            let checked = at(
+                |r| matches!(r, Record::Preflight(rows) if rows.iter().any(|r| r.check.starts_with("surface at"))),
+            );
+            assert!(checked.is_some() && checked < pressed);
+        } else {
+            assert!(matches!(report.end, RunEnd::Faulted(_)), "{report:?}");
+            assert_eq!(pressed, None);
+        }
     }
 }
 

@@ -57,3 +57,21 @@ fn a_check_stays_on_the_skin_and_within_the_search() {
     let none = with("surface_check: {points: []}").unwrap_err().to_string();
     assert!(none.contains("surface_check.points"), "{none}");
 }
+
+#[test]
+fn the_time_of_the_checks_is_in_the_plans() {
+    let lasts = |section: &str| {
+        let plan = with(section).unwrap().compile();
+        let repetitions = plan.steps.iter().filter(
+            |s| matches!(s, skinrig_protocol::plan::Step::Begin { repetition } if repetition.is_some()),
+        );
+        (plan.summary().duration_s, repetitions.count() as f64)
+    };
+    let none = lasts("").0;
+    let (once, repetitions) = lasts("surface_check: {points: [[10 mm, 2 mm], [0 mm, 0 mm]]}");
+    let each = lasts("surface_check: {points: [[10 mm, 2 mm], [0 mm, 0 mm]], at: each_repetition}");
+    // A touch searches 1 mm at 2 mm/s after 300 ms of tare, besides its ways.
+    let check = once - none;
+    assert!(check > 2.0 * 0.8 && check < 60.0, "{check}");
+    assert!(((each.0 - none) - (1.0 + repetitions) * check).abs() < 1e-6);
+}
