@@ -8,6 +8,7 @@ use skinrig_protocol::quantity::{self, Dimension};
 
 use crate::exit::Exit;
 use crate::fault::Fault;
+use crate::remote::What;
 
 /// Runs tactile-skin experiments: protocol, robot, event cameras, session, analysis, report.
 #[derive(Debug, Parser)]
@@ -53,6 +54,21 @@ pub enum Command {
         cut off as a new attempt. A valid press is never pressed again."
     )]
     Resume(ResumeArgs),
+
+    /// Tell how a run is going, or how it ended; reads only.
+    #[command(after_help = "Examples:\n  skinrig status\n  \
+        skinrig status sessions/NAME.session.sqlite --json")]
+    Status(StatusArgs),
+
+    /// Pause, resume, stop, abort or halt a run from another terminal.
+    #[command(after_help = "Examples:\n  skinrig control sessions/ pause\n  \
+        skinrig control sessions/NAME.session.sqlite pause-now --wait 30s\n\n\
+        Comes back when the run has heard it, and tells the run's state. Only the user of the run (and root) is heard.")]
+    Control(ControlArgs),
+
+    /// Write a note into the session of a run, with its time and your name.
+    #[command(after_help = "Example:\n  skinrig note sessions/ \"the lamp flickers\"")]
+    Note(NoteArgs),
 
     /// List what is connected: robot, cameras, trigger box; and what keeps it from being used.
     #[command(
@@ -240,6 +256,44 @@ pub struct ResumeArgs {
     /// Make this fault on purpose, for tests: killed@record:N, killed@journal:N, killed@seal. Can be given several times.
     #[arg(long = "fault", value_name = "FAULT")]
     pub faults: Vec<Fault>,
+}
+
+/// Arguments of `status`.
+#[derive(Debug, Args)]
+pub struct StatusArgs {
+    /// The session file; of a folder the session that is being written, else the newest.
+    #[arg(default_value = "sessions")]
+    pub session: PathBuf,
+}
+
+/// Arguments of `control`.
+#[derive(Debug, Args)]
+pub struct ControlArgs {
+    /// The session file, or a folder in which one session is being written.
+    pub session: PathBuf,
+
+    /// What the run is to do.
+    #[arg(value_enum)]
+    pub what: What,
+
+    /// Come back only when it is done (paused, running again, ended), at most after this time (exit code 4).
+    #[arg(long, value_name = "TIME", value_parser = time_s)]
+    pub wait: Option<f64>,
+}
+
+/// Arguments of `note`.
+#[derive(Debug, Args)]
+pub struct NoteArgs {
+    /// The session file, or a folder in which one session is being written.
+    pub session: PathBuf,
+
+    /// The note.
+    #[arg(required = true)]
+    pub text: Vec<String>,
+
+    /// Who says so; the name under which you are logged in when absent.
+    #[arg(long, value_name = "NAME")]
+    pub by: Option<String>,
 }
 
 /// Arguments of `devices`.

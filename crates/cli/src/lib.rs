@@ -7,6 +7,7 @@ pub mod terminal;
 pub mod args;
 pub mod check;
 pub mod contacts;
+pub mod control;
 pub mod devices;
 pub mod exit;
 pub mod export;
@@ -18,6 +19,7 @@ pub mod paths;
 pub mod progress;
 pub mod provenance;
 pub mod recording;
+pub mod remote;
 pub mod results;
 pub mod resume;
 pub mod rig;
@@ -29,6 +31,7 @@ pub mod show;
 pub mod signals;
 pub mod sink;
 pub mod source;
+pub mod status;
 pub mod supervise;
 pub mod tradeoff;
 pub mod verify;
@@ -76,6 +79,9 @@ fn dispatch(cli: &Cli, arguments: &[OsString]) -> Outcome {
         Command::Plan(a) => check::plan(a, json),
         Command::Run(a) => run::run(a, &command_line(arguments), json),
         Command::Resume(a) => resume::resume(a, &command_line(arguments), json),
+        Command::Status(a) => status::status(a, json),
+        Command::Control(a) => control::control(a, json),
+        Command::Note(a) => control::note(a, json),
         Command::Devices(a) => devices::devices(a, json),
         Command::Jog(a) => jog::jog(a),
         Command::Sessions(a) => sessions::sessions(a, json),

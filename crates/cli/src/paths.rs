@@ -52,6 +52,13 @@ pub fn beside(session: &Path, suffix: &str) -> PathBuf {
     session.with_file_name(format!("{stem}{suffix}"))
 }
 
+/// The folder of a session; the present one for a bare name.
+#[must_use]
+pub fn folder_of(session: &Path) -> &Path {
+    let folder = session.parent().filter(|p| !p.as_os_str().is_empty());
+    folder.unwrap_or(Path::new("."))
+}
+
 /// Letters, digits, `_` and `-` stay; every run of anything else becomes one `-`.
 fn slug(text: &str) -> String {
     let mut out = String::new();

@@ -17,6 +17,7 @@ use skinrig_recorder::{DeviceRow, RecorderError, SessionReader, SessionWriter};
 use crate::args::ResumeArgs;
 use crate::exit::{Exit, Failure, Outcome};
 use crate::fault::Saboteur;
+use crate::paths;
 use crate::progress::ProgressView;
 use crate::results::RigDocument;
 use crate::rig::{self, bench, gates};
@@ -197,10 +198,11 @@ fn go_on(
     let (rig, preflight, notes) = open_rig(args, found, protocol, &rest)?;
     let expected = skinrig_model::HostDuration::from_secs_f64(rest.summary().duration_s);
     let view = ProgressView::resumed(&found.plan.presses, &found.histories, wanted, expected);
-    let folder = folder_of(&args.session);
+    let folder = paths::folder_of(&args.session);
     let sink = SessionSink::new(writer, view, Foreknowledge::default());
     let mut sink = sink
         .on_disk_of(folder)
+        .controlled(&args.session, operator.control())
         .with_notes(notes)
         .with_faults(Saboteur::new(&args.faults));
     let settings = bench::settings(&rig.kind);
@@ -255,7 +257,7 @@ fn open_rig(
     protocol: Protocol,
     rest: &Plan,
 ) -> Result<(Rig, Preflight, Vec<String>), Failure> {
-    let folder = folder_of(&args.session);
+    let folder = paths::folder_of(&args.session);
     let header = &found.header;
     let summary = rest.summary();
     if header.rig_kind == "simulated" {
@@ -292,12 +294,6 @@ fn open_rig(
     let mut preflight = gates::of_bench(&file, &rig, folder, summary.duration_s);
     preflight.made.insert(0, gates::recorder(&args.session));
     Ok((rig, preflight, notes))
-}
-
-/// The folder of a session; the present one for a bare name.
-fn folder_of(session: &Path) -> &Path {
-    let folder = session.parent().filter(|p| !p.as_os_str().is_empty());
-    folder.unwrap_or(Path::new("."))
 }
 
 /// The rig file must be of the session's bench: its kind, its place of the skin, and limits that bear the plan.

@@ -73,11 +73,10 @@ pub fn record(
     let view = ProgressView::new(plan.presses.len(), intent.expected);
     let mut sink = SessionSink::new(writer, view, intent.known.clone())
         .with_faults(Saboteur::new(intent.faults));
-    if preflight.is_some() {
-        sink = sink.on_disk_of(folder);
-    }
-
     let control = operator.control();
+    if preflight.is_some() {
+        sink = sink.on_disk_of(folder).controlled(&path, control);
+    }
     if let Some((at, kind)) = intent.known.interruption {
         rig.clock = Box::new(RepeatedOperator {
             clock: rig.clock,

@@ -1,6 +1,11 @@
-//! `skinrig sessions`.
+//! `skinrig sessions`, and which session of a folder is meant.
 
-use skinrig_recorder::{SessionState, SessionSummary, list};
+use std::path::{Path, PathBuf};
+use std::time::SystemTime;
+
+use skinrig_recorder::{
+    RecorderError, SESSION_SUFFIX, SessionReader, SessionState, SessionSummary, list, writer_of,
+};
 
 use crate::args::SessionsArgs;
 use crate::exit::{Exit, Failure, Outcome};
@@ -37,6 +42,86 @@ pub fn sessions(args: &SessionsArgs, json: bool) -> Outcome {
         outln!("{}", line(session));
     }
     Ok(Exit::Ok)
+}
+
+/// The session at `place`: the file itself; of a folder the one that is being written, else the one that was written last.
+///
+/// # Errors
+/// [`Failure::input`] when there is none, or when several are being written.
+pub fn find(place: &Path) -> Result<PathBuf, Failure> {
+    if !place.is_dir() {
+        return Ok(place.to_owned());
+    }
+    let all = files(place)?;
+    let mut running = all.iter().filter(|p| writer_of(p).is_some());
+    match (running.next(), running.next()) {
+        (Some(one), Some(other)) => Err(Failure::input(format!(
+            "{}: expected one session that is being written, found {}, {} and perhaps more\n  next: name the file",
+            place.display(),
+            one.display(),
+            other.display()
+        ))),
+        (Some(one), None) => Ok(one.clone()),
+        (None, _) => {
+            let newest = all.into_iter().max_by_key(|p| (written(p), p.clone()));
+            newest.ok_or_else(|| none_in(place))
+        }
+    }
+}
+
+/// The session at `place` that a process writes at this moment.
+///
+/// # Errors
+/// [`Failure::input`] that says what the session is instead.
+pub fn find_running(place: &Path) -> Result<PathBuf, Failure> {
+    let session = find(place)?;
+    if writer_of(&session).is_some() {
+        return Ok(session);
+    }
+    let shown = session.display();
+    let state = SessionReader::open(&session).and_then(|reader| {
+        let legs = reader.legs()?; // a session without a header is none
+        Ok((reader.seal()?.is_some(), reader.end()?.is_some(), legs))
+    });
+    Err(Failure::input(match state {
+        Ok((true, ..)) => format!(
+            "{shown}: expected a run under way, found a sealed session, which never changes\n  next: write remarks about it \
+             beside it; `skinrig resume {shown}` goes on with one that was stopped"
+        ),
+        Ok(_) | Err(RecorderError::NotThere { .. }) => format!(
+            "{shown}: expected a run under way, found a session that nobody runs\n  next: `skinrig resume {shown}` goes on \
+             with it"
+        ),
+        Err(e) => e.to_string(),
+    }))
+}
+
+fn none_in(folder: &Path) -> Failure {
+    Failure::input(format!(
+        "{}: expected a session, found none\n  next: `skinrig run` records one; name another folder or a file",
+        folder.display()
+    ))
+}
+
+fn files(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
+    let refused = |e: std::io::Error| Failure::input(format!("{}: {e}", folder.display()));
+    let mut found = Vec::new();
+    for entry in std::fs::read_dir(folder).map_err(refused)? {
+        let path = entry.map_err(refused)?.path();
+        let name = path.file_name().map(|n| n.to_string_lossy().into_owned());
+        if name.is_some_and(|n| n.ends_with(SESSION_SUFFIX)) {
+            found.push(path);
+        }
+    }
+    Ok(found)
+}
+
+/// When a session was last written, its log included.
+fn written(session: &Path) -> Option<SystemTime> {
+    let mut log = session.as_os_str().to_owned();
+    log.push("-wal");
+    let at = |path: &Path| std::fs::metadata(path).and_then(|m| m.modified()).ok();
+    at(session).max(at(Path::new(&log)))
 }
 
 fn line(session: &SessionSummary) -> String {

@@ -3,12 +3,13 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use skinrig_controller::{RecordSink, SinkFault};
+use skinrig_controller::{ControlHandle, RecordSink, SinkFault};
 use skinrig_model::{HostTime, InterruptionKind, PressId, PressVerdict, Record};
 use skinrig_recorder::{RecorderError, Sealed, SessionWriter};
 
 use crate::fault::Saboteur;
 use crate::progress::ProgressView;
+use crate::remote::Remote;
 use crate::rig::gates;
 
 /// What the rig cannot know about its presses, but an import or the replay of one can.
@@ -32,6 +33,8 @@ pub struct SessionSink {
     /// Remarks to be written once the leg has begun.
     notes: Vec<String>,
     saboteur: Saboteur,
+    /// The hand on the run from other terminals; goes away last, when the session is closed.
+    remote: Option<Remote>,
 }
 
 impl SessionSink {
@@ -45,6 +48,7 @@ impl SessionSink {
             folder: None,
             notes: Vec::new(),
             saboteur: Saboteur::none(),
+            remote: None,
         }
     }
 
@@ -59,6 +63,18 @@ impl SessionSink {
     #[must_use]
     pub fn with_notes(mut self, notes: Vec<String>) -> Self {
         self.notes = notes;
+        self
+    }
+
+    /// Listens to other terminals for the session at `session`. A run that cannot goes on, and says so.
+    #[must_use]
+    pub fn controlled(mut self, session: &Path, control: &ControlHandle) -> Self {
+        match Remote::open(session, control) {
+            Ok(remote) => self.remote = Some(remote),
+            Err(why) => self.view.say(&format!(
+                "warning: this run does not listen to other terminals ({why}); ctrl-C works"
+            )),
+        }
         self
     }
 
@@ -99,18 +115,21 @@ impl RecordSink for SessionSink {
         }
         self.saboteur.before(&record);
         // What is shown as done is on the disk. Bulk data, whose copy would cost, are only counted.
-        let shown = match &record {
-            Record::Chunk(_) | Record::Poses(_) => {
-                self.view.update(&record);
-                None
-            }
-            other => Some(other.clone()),
+        let is_bulk = matches!(&record, Record::Chunk(_) | Record::Poses(_));
+        let shown = if is_bulk {
+            self.view.update(&record);
+            None
+        } else {
+            Some(record.clone())
         };
         self.writer
             .accept(record)
             .map_err(|e| SinkFault(e.to_string()))?;
         if let Some(record) = shown {
             self.view.update(&record);
+        }
+        if let Some(remote) = &mut self.remote {
+            remote.show(self.view.progress(), is_bulk);
         }
         for text in std::mem::take(&mut self.notes) {
             self.view.say(&format!("note: {text}"));

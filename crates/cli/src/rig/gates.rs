@@ -160,7 +160,8 @@ pub fn free_bytes(_folder: &Path) -> Result<f64, String> {
 }
 
 /// `1.5 GB`.
-fn size(bytes: f64) -> String {
+#[must_use]
+pub fn size(bytes: f64) -> String {
     match bytes {
         b if b >= 1e9 => format!("{:.1} GB", b / 1e9),
         b => format!("{:.0} MB", b / 1e6),

@@ -2,9 +2,9 @@
 
 use crate::support::{ROOT, skinrig};
 
-const COMMANDS: [&str; 15] = [
-    "check", "plan", "run", "resume", "sessions", "show", "analyze", "report", "verify", "salvage",
-    "import", "export", "inspect", "schema", "tradeoff",
+const COMMANDS: [&str; 18] = [
+    "check", "plan", "status", "control", "note", "run", "resume", "sessions", "show", "analyze",
+    "report", "verify", "salvage", "import", "export", "inspect", "schema", "tradeoff",
 ];
 
 #[test]

@@ -10,6 +10,7 @@ mod import;
 mod import_refusals;
 mod interrupt;
 mod json;
+mod operator;
 mod options;
 mod pipeline;
 mod replay;

@@ -387,6 +387,7 @@ fn the_operator_may_interrupt_at_every_tick() {
                         assert_eq!(told.report.valid, 3, "{case}");
                     }
                 }
+                Press::Note => unreachable!("has a test of its own"),
                 Press::Abort => {
                     let wanted = RunEnd::Stopped("operator: abort".to_owned());
                     // At the very last ticks nothing is left to abort.

@@ -1,0 +1,135 @@
+//! What a run shows of itself to other terminals, and what it takes from them.
+
+use std::path::Path;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use skinrig_controller::{ControlHandle, Progress, State};
+
+use super::server::Server;
+use super::wire::{Live, Reply, Request, What};
+
+/// How often bulk data renew what is shown.
+const RENEW_EVERY: Duration = Duration::from_millis(100);
+
+/// Where the controller's thread leaves a copy of the run's progress.
+#[derive(Debug)]
+pub struct Board {
+    progress: Arc<Mutex<Progress>>,
+    control: ControlHandle,
+    began: Instant,
+}
+
+impl Board {
+    /// A board of a run that nothing is known of yet.
+    #[must_use]
+    pub fn new(control: ControlHandle) -> Self {
+        Self {
+            progress: Arc::default(),
+            control,
+            began: Instant::now(),
+        }
+    }
+
+    /// Answers one request; never waits.
+    #[must_use]
+    pub fn answer(&self, request: Request) -> Reply {
+        match request {
+            Request::Status => Reply::Live(Box::new(self.live())),
+            // Whoever ends a run that is over would otherwise wait for an answer that never comes.
+            _ if self.control.state() == State::Finished => {
+                Reply::Refused("expected a run under way, found one that has ended".to_owned())
+            }
+            Request::Control(what) => {
+                match what {
+                    What::Pause => self.control.pause(),
+                    What::PauseNow => self.control.pause_now(),
+                    What::Resume => self.control.resume(),
+                    What::Stop => self.control.stop(),
+                    What::Abort => self.control.abort(),
+                    What::Halt => self.control.halt(),
+                }
+                Reply::Handed(self.control.asked())
+            }
+            Request::Note { by, text } => match self.control.note(format!("{by}: {text}")) {
+                Ok(number) => Reply::Handed(number),
+                Err(full) => Reply::Refused(full.to_string()),
+            },
+        }
+    }
+
+    fn live(&self) -> Live {
+        let c = &self.control;
+        // What was heard first: a state that is read later is at least as new.
+        let counts = [c.heard(), c.noted()];
+        let [heard, noted] = counts;
+        let progress = self.progress.lock().unwrap_or_else(PoisonError::into_inner);
+        let waited_s = self.began.elapsed().as_secs_f64();
+        Live::of(&progress, c.state(), [c.asked(), heard, noted], waited_s)
+    }
+}
+
+/// The side of the run: listens, and is told the progress. Dropped, it listens no more.
+pub struct Remote {
+    progress: Arc<Mutex<Progress>>,
+    renewed: Option<Instant>,
+    _server: Server,
+}
+
+impl Remote {
+    /// Listens for the session at `session`, which this process writes.
+    ///
+    /// # Errors
+    /// Why that is not possible; the run does without.
+    pub fn open(session: &Path, control: &ControlHandle) -> Result<Self, String> {
+        let board = Board::new(control.clone());
+        let progress = Arc::clone(&board.progress);
+        let server = Server::open(session, move |request| board.answer(request))?;
+        Ok(Self {
+            progress,
+            renewed: None,
+            _server: server,
+        })
+    }
+
+    /// Renews what is shown, `bulk` data from time to time only; leaves it when somebody reads it at this instant.
+    pub fn show(&mut self, progress: &Progress, bulk: bool) {
+        if bulk && self.renewed.is_some_and(|t| t.elapsed() < RENEW_EVERY) {
+            return;
+        }
+        if let Ok(mut shown) = self.progress.try_lock() {
+            shown.clone_from(progress);
+            self.renewed = Some(Instant::now());
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn requests_go_to_the_hand_and_back_comes_their_number() {
+        let control = ControlHandle::new();
+        let board = Board::new(control.clone());
+        assert_eq!(
+            board.answer(Request::Control(What::Pause)),
+            Reply::Handed(1)
+        );
+        assert_eq!(board.answer(Request::Control(What::Halt)), Reply::Handed(2));
+        let note = Request::Note {
+            by: "Ann".into(),
+            text: "warm".into(),
+        };
+        assert_eq!(board.answer(note.clone()), Reply::Handed(1));
+        for n in 2..=16 {
+            assert_eq!(board.answer(note.clone()), Reply::Handed(n));
+        }
+        assert!(matches!(board.answer(note), Reply::Refused(_)));
+        let Reply::Live(live) = board.answer(Request::Status) else {
+            panic!("expected the run");
+        };
+        assert_eq!((live.asked, live.heard, live.noted), (2, 0, 0));
+        assert_eq!(live.state, "planned");
+    }
+}

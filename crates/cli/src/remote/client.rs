@@ -1,0 +1,82 @@
+//! The other terminal: asks the run that writes a session.
+
+use std::path::Path;
+
+use super::wire::{Reply, Request};
+
+/// Why there is no answer.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Silence {
+    /// Nobody listens: no run, or one that was killed.
+    Nobody,
+    /// Somebody does, but something went wrong.
+    Trouble(String),
+}
+
+/// Asks the run that writes the session at `session`.
+///
+/// # Errors
+/// [`Silence`].
+#[cfg(unix)]
+pub fn ask(session: &Path, request: &Request) -> Result<Reply, Silence> {
+    use std::io::ErrorKind;
+    use std::os::unix::net::UnixStream;
+
+    let trouble = |e: std::io::Error| Silence::Trouble(e.to_string());
+    for place in super::place::places(session).map_err(trouble)? {
+        match UnixStream::connect(&place) {
+            Ok(stream) => return talk(stream, request),
+            Err(e) => match e.kind() {
+                ErrorKind::PermissionDenied => {
+                    return Err(Silence::Trouble(format!(
+                        "{}: the run belongs to another user",
+                        place.display()
+                    )));
+                }
+                // Nothing there, nobody behind it, no socket, or an address that is too long for one.
+                _ => continue,
+            },
+        }
+    }
+    Err(Silence::Nobody)
+}
+
+/// # Errors
+/// Always.
+#[cfg(not(unix))]
+pub fn ask(_session: &Path, _request: &Request) -> Result<Reply, Silence> {
+    Err(Silence::Nobody)
+}
+
+#[cfg(unix)]
+fn talk(stream: std::os::unix::net::UnixStream, request: &Request) -> Result<Reply, Silence> {
+    use std::io::{ErrorKind, Read, Write};
+    use std::time::Duration;
+
+    /// Longest wait for an answer: others may be before us.
+    const ANSWER_WITHIN: Duration = Duration::from_secs(5);
+
+    super::place::check_peer(&stream).map_err(Silence::Trouble)?;
+    let mut said = Vec::new();
+    let mut talked = || -> std::io::Result<()> {
+        let mut stream = &stream;
+        stream.set_read_timeout(Some(ANSWER_WITHIN))?;
+        stream.set_write_timeout(Some(ANSWER_WITHIN))?;
+        let mut line = serde_json::to_vec(request)?;
+        line.push(b'\n');
+        stream.write_all(&line)?;
+        let most = super::wire::MOST_REPLY_BYTES as u64;
+        stream.take(most).read_to_end(&mut said)?;
+        Ok(())
+    };
+    match talked() {
+        // The run ended while we asked.
+        Err(e) if matches!(e.kind(), ErrorKind::BrokenPipe | ErrorKind::ConnectionReset) => {
+            Err(Silence::Nobody)
+        }
+        Err(e) => Err(Silence::Trouble(format!("no answer from the run: {e}"))),
+        Ok(()) if said.is_empty() => Err(Silence::Nobody),
+        Ok(()) => serde_json::from_slice(&said)
+            .map_err(|e| Silence::Trouble(format!("an answer that makes no sense: {e}"))),
+    }
+}

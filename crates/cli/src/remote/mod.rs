@@ -1,0 +1,39 @@
+//! The hand on a run from another terminal: a socket of the file system beside the session, and what goes over it.
+//!
+//! One line of JSON asks, one answers. Only the user of the run (and root) gets in; there is no network port. The controller
+//! never waits for any of it: requests are bits of its [`ControlHandle`](skinrig_controller::ControlHandle), remarks a short
+//! queue, and what is told of the run is a copy that it leaves behind when nobody is reading.
+
+mod board;
+mod client;
+#[cfg(unix)]
+mod place;
+#[cfg(unix)]
+mod server;
+mod wire;
+
+pub use board::{Board, Remote};
+pub use client::{Silence, ask};
+pub use wire::{Live, MOST_NAME_CHARS, Reply, Request, What};
+
+/// No sockets of the file system here.
+#[cfg(not(unix))]
+mod server {
+    use std::path::Path;
+
+    use super::{Reply, Request};
+
+    /// Nothing listens.
+    pub struct Server;
+
+    impl Server {
+        /// # Errors
+        /// Always.
+        pub fn open(
+            _session: &Path,
+            _answer: impl FnMut(Request) -> Reply + Send + 'static,
+        ) -> Result<Self, String> {
+            Err("this system has no control from another terminal; use ctrl-C".to_owned())
+        }
+    }
+}

@@ -1,0 +1,113 @@
+//! Where the socket of a session lies, and who may use it.
+
+use std::fs;
+use std::io;
+use std::os::unix::fs::{DirBuilderExt, MetadataExt};
+use std::os::unix::net::UnixStream;
+use std::path::{Path, PathBuf};
+
+use sha2::{Digest, Sha256};
+
+/// The places of the socket of `session`, the preferred one first: beside it; where that cannot be (the address of a socket
+/// is at most about 100 bytes long, and not every file system has sockets) in a folder of the user's own, under a name made
+/// of the session's path. None depends on the environment, so that every terminal finds the same.
+///
+/// # Errors
+/// When the session's folder cannot be found.
+pub fn places(session: &Path) -> io::Result<[PathBuf; 2]> {
+    let session = fs::canonicalize(session)?;
+    let mut beside = session.clone().into_os_string();
+    beside.push("-control");
+    let digest = Sha256::digest(session.as_os_str().as_encoded_bytes());
+    let name: String = digest.iter().take(16).map(|b| format!("{b:02x}")).collect();
+    Ok([PathBuf::from(beside), own_folder().join(name)])
+}
+
+/// The folder of the user's own for sockets that cannot lie beside their session.
+pub fn own_folder() -> PathBuf {
+    PathBuf::from(format!("/tmp/skinrig-{}", me()))
+}
+
+/// Makes the folder of the user's own, and refuses one that others can reach.
+///
+/// # Errors
+/// When it cannot be made, or somebody else made it.
+pub fn make_own_folder() -> io::Result<()> {
+    let folder = own_folder();
+    match fs::DirBuilder::new().mode(0o700).create(&folder) {
+        Err(e) if e.kind() == io::ErrorKind::AlreadyExists => {}
+        other => return other,
+    }
+    let found = fs::symlink_metadata(&folder)?;
+    if !found.is_dir() || found.uid() != me() || found.mode() & 0o077 != 0 {
+        return Err(io::Error::other(format!(
+            "{}: expected a folder of this user alone, found another",
+            folder.display()
+        )));
+    }
+    Ok(())
+}
+
+fn me() -> u32 {
+    rustix::process::geteuid().as_raw()
+}
+
+/// Whether the other end belongs to this user or to root, as the kernel knows it. On systems that do not tell, the
+/// permissions of the socket alone keep strangers out.
+///
+/// # Errors
+/// A message for the stranger.
+pub fn check_peer(stream: &UnixStream) -> Result<(), String> {
+    #[cfg(target_os = "linux")]
+    {
+        let peer = rustix::net::sockopt::socket_peercred(stream)
+            .map_err(|e| format!("cannot tell who asks: {e}"))?
+            .uid
+            .as_raw();
+        may_ask(peer, me())?;
+    }
+    #[cfg(not(target_os = "linux"))]
+    let _ = stream;
+    Ok(())
+}
+
+/// The rule of [`check_peer`].
+#[cfg_attr(
+    not(target_os = "linux"),
+    expect(dead_code, reason = "no peer is known")
+)]
+fn may_ask(peer: u32, me: u32) -> Result<(), String> {
+    if peer == me || peer == 0 || me == 0 {
+        return Ok(());
+    }
+    Err(format!(
+        "expected the user of the run (uid {me}), found uid {peer}"
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn strangers_are_refused() {
+        assert!(may_ask(1000, 1000).is_ok() && may_ask(0, 1000).is_ok());
+        let words = may_ask(1001, 1000).unwrap_err();
+        assert!(words.contains("1000") && words.contains("1001"), "{words}");
+    }
+
+    #[test]
+    fn every_way_to_a_session_gives_the_same_places() {
+        let folder = tempfile::tempdir().unwrap();
+        let session = folder.path().join("a.session.sqlite");
+        fs::write(&session, "").unwrap();
+        let link = folder.path().join("link");
+        std::os::unix::fs::symlink(folder.path(), &link).unwrap();
+        let of = |p: &Path| places(p).unwrap();
+        assert_eq!(of(&session), of(&link.join("a.session.sqlite")));
+        fs::write(folder.path().join("b.session.sqlite"), "").unwrap();
+        let other = of(&folder.path().join("b.session.sqlite"));
+        assert!(of(&session)[0] != other[0] && of(&session)[1] != other[1]);
+        assert!(places(&folder.path().join("none")).is_err());
+    }
+}

@@ -1,0 +1,246 @@
+//! The thread that listens for other terminals, one after the other, each for a short time.
+
+use std::fs;
+use std::io::{self, Read, Write};
+use std::os::unix::fs::{FileTypeExt, MetadataExt, PermissionsExt};
+use std::os::unix::net::{UnixListener, UnixStream};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use super::place;
+use super::wire::{MOST_REQUEST_BYTES, Reply, Request};
+
+/// Who asks must have asked within this time: the next one waits.
+const ASK_WITHIN: Duration = Duration::from_millis(300);
+/// Between two tries to take in a caller when the system refuses (no free file descriptor).
+const TRY_AGAIN: Duration = Duration::from_millis(100);
+
+/// Listens until it is dropped; the socket goes away with it.
+#[derive(Debug)]
+pub struct Server {
+    path: PathBuf,
+    /// Device and inode of the socket, so that nobody else's is removed.
+    id: (u64, u64),
+    over: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Server {
+    /// Listens for the session at `session`, whose only writer is this process: a socket that lies there is left over.
+    ///
+    /// # Errors
+    /// Why no place of a socket can be used.
+    pub fn open(
+        session: &Path,
+        mut answer: impl FnMut(Request) -> Reply + Send + 'static,
+    ) -> Result<Self, String> {
+        let [beside, own] = place::places(session).map_err(|e| e.to_string())?;
+        let (listener, path) = match bind(&beside) {
+            Ok(listener) => (listener, beside),
+            Err(first) => match place::make_own_folder().and_then(|()| bind(&own)) {
+                Ok(listener) => (listener, own),
+                Err(e) => {
+                    let (beside, own) = (beside.display(), own.display());
+                    return Err(format!("{beside}: {first}; {own}: {e}"));
+                }
+            },
+        };
+        let id = identity(&path).map_err(|e| e.to_string())?;
+        let over = Arc::new(AtomicBool::new(false));
+        let is_over = Arc::clone(&over);
+        let thread = std::thread::Builder::new()
+            .name("control".to_owned())
+            .spawn(move || {
+                for caller in listener.incoming() {
+                    if is_over.load(Ordering::Acquire) {
+                        return;
+                    }
+                    match caller {
+                        // A caller that goes away or says nonsense is none of the run's business.
+                        Ok(stream) => drop(serve(stream, &mut answer)),
+                        Err(_) => std::thread::sleep(TRY_AGAIN),
+                    }
+                }
+            })
+            .map_err(|e| e.to_string())?;
+        Ok(Self {
+            path,
+            id,
+            over,
+            thread: Some(thread),
+        })
+    }
+}
+
+impl Drop for Server {
+    fn drop(&mut self) {
+        self.over.store(true, Ordering::Release);
+        // A last caller wakes the thread. Where the socket was removed it sleeps on, and ends with the process.
+        let woken = identity(&self.path).is_ok_and(|id| id == self.id)
+            && UnixStream::connect(&self.path).is_ok();
+        if let Some(thread) = self.thread.take()
+            && woken
+        {
+            let _ = thread.join();
+            if identity(&self.path).is_ok_and(|id| id == self.id) {
+                let _ = fs::remove_file(&self.path);
+            }
+        }
+    }
+}
+
+/// A socket at `path` that only this user can connect to.
+fn bind(path: &Path) -> io::Result<UnixListener> {
+    match fs::symlink_metadata(path) {
+        Ok(found) if found.file_type().is_socket() => fs::remove_file(path)?,
+        Ok(_) => return Err(io::Error::other("expected no file, found one")),
+        Err(_) => {}
+    }
+    let listener = UnixListener::bind(path)?;
+    fs::set_permissions(path, fs::Permissions::from_mode(0o600))?;
+    Ok(listener)
+}
+
+fn identity(path: &Path) -> io::Result<(u64, u64)> {
+    fs::symlink_metadata(path).map(|m| (m.dev(), m.ino()))
+}
+
+/// Hears one request and answers it.
+fn serve(mut stream: UnixStream, answer: &mut impl FnMut(Request) -> Reply) -> io::Result<()> {
+    let reply = match place::check_peer(&stream) {
+        Err(refused) => Reply::Refused(refused),
+        Ok(()) => match hear(&mut stream)? {
+            Err(refused) => Reply::Refused(refused),
+            Ok(request) => answer(request),
+        },
+    };
+    let mut line = serde_json::to_vec(&reply)?;
+    line.push(b'\n');
+    stream.set_write_timeout(Some(ASK_WITHIN))?;
+    stream.write_all(&line)
+}
+
+/// Reads one line within the time and length that a caller has.
+fn hear(stream: &mut UnixStream) -> io::Result<Result<Request, String>> {
+    let until = Instant::now() + ASK_WITHIN;
+    let (mut line, mut block) = (Vec::new(), [0; 1024]);
+    loop {
+        let left = until.saturating_duration_since(Instant::now());
+        if left.is_zero() {
+            return Ok(Err("expected a request at once, found none".to_owned()));
+        }
+        stream.set_read_timeout(Some(left))?;
+        let n = match stream.read(&mut block) {
+            Err(e) if e.kind() == io::ErrorKind::Interrupted => continue,
+            // The time is over.
+            Err(e)
+                if matches!(
+                    e.kind(),
+                    io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut
+                ) =>
+            {
+                continue;
+            }
+            other => other?,
+        };
+        line.extend_from_slice(&block[..n]);
+        if let Some(end) = line.iter().position(|b| *b == b'\n') {
+            return Ok(Request::parse(&line[..end]));
+        }
+        if n == 0 || line.len() > MOST_REQUEST_BYTES {
+            return Ok(Err(format!(
+                "expected one line of at most {MOST_REQUEST_BYTES} bytes, found {} without an end",
+                line.len()
+            )));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::client::{Silence, ask};
+    use super::super::wire::What;
+    use super::*;
+
+    fn session() -> (tempfile::TempDir, PathBuf) {
+        let folder = tempfile::tempdir().unwrap();
+        let session = folder.path().join("a.session.sqlite");
+        fs::write(&session, "").unwrap();
+        (folder, session)
+    }
+
+    fn server(session: &Path) -> Server {
+        Server::open(session, |request| match request {
+            Request::Control(What::Pause) => Reply::Handed(7),
+            other => Reply::Refused(format!("{other:?}")),
+        })
+        .unwrap()
+    }
+
+    const PAUSE: Request = Request::Control(What::Pause);
+
+    #[test]
+    fn a_socket_that_was_left_over_is_replaced_and_the_own_one_removed() {
+        let (folder, session) = session();
+        let place = &place::places(&session).unwrap()[0];
+        // A process that was killed leaves the socket, and nobody behind it.
+        drop(UnixListener::bind(place).unwrap());
+        assert!(matches!(ask(&session, &PAUSE), Err(Silence::Nobody)));
+        let running = server(&session);
+        assert_eq!(fs::metadata(place).unwrap().mode() & 0o777, 0o600);
+        assert_eq!(ask(&session, &PAUSE), Ok(Reply::Handed(7)));
+        drop(running);
+        assert!(matches!(ask(&session, &PAUSE), Err(Silence::Nobody)));
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn where_no_socket_can_lie_beside_the_session_there_is_another_place() {
+        let (_folder, session) = session();
+        let [beside, own] = place::places(&session).unwrap();
+        // Something else lies there, and stays.
+        fs::write(&beside, "mine").unwrap();
+        let running = server(&session);
+        assert_eq!(ask(&session, &PAUSE), Ok(Reply::Handed(7)));
+        assert!(own.exists());
+        drop(running);
+        assert!(!own.exists());
+        assert_eq!(fs::read(&beside).unwrap(), b"mine");
+        // A path that is longer than an address may be.
+        let deep = session.parent().unwrap().join("d".repeat(120));
+        fs::create_dir(&deep).unwrap();
+        let far = deep.join("a.session.sqlite");
+        fs::write(&far, "").unwrap();
+        let running = server(&far);
+        assert_eq!(ask(&far, &PAUSE), Ok(Reply::Handed(7)));
+        drop(running);
+    }
+
+    #[test]
+    fn hostile_callers_are_refused_and_the_next_one_is_heard() {
+        let (_folder, session) = session();
+        let running = server(&session);
+        let place = &place::places(&session).unwrap()[0];
+        let call = |bytes: &[u8]| {
+            let mut stream = UnixStream::connect(place).unwrap();
+            // The server may hang up before all is written.
+            let _ = stream.write_all(bytes);
+            let _ = stream.shutdown(std::net::Shutdown::Write);
+            let mut said = Vec::new();
+            let _ = stream.read_to_end(&mut said);
+            String::from_utf8(said).unwrap()
+        };
+        assert!(call(b"\xff\0\n").contains("refused"));
+        assert!(call(b"").contains("without an end"));
+        assert!(call(&[b'x'; 500]).contains("without an end"));
+        call(&vec![b'['; 50 * MOST_REQUEST_BYTES]);
+        // One that says nothing, and one that is gone at once.
+        let silent = UnixStream::connect(place).unwrap();
+        drop(UnixStream::connect(place).unwrap());
+        assert_eq!(ask(&session, &PAUSE), Ok(Reply::Handed(7)));
+        drop((silent, running));
+    }
+}

@@ -1,0 +1,245 @@
+//! What is asked of a run from another terminal, and what it answers: one line of JSON each, of bounded length.
+
+use clap::ValueEnum;
+use serde::{Deserialize, Serialize};
+use skinrig_controller::{Progress, State};
+use skinrig_model::CameraId;
+
+/// Longest request, bytes.
+pub const MOST_REQUEST_BYTES: usize = 16 * 1024;
+/// Longest answer, bytes.
+pub const MOST_REPLY_BYTES: usize = 64 * 1024;
+/// Longest remark, characters.
+pub const MOST_NOTE_CHARS: usize = 2_000;
+/// Longest name of an operator, characters.
+pub const MOST_NAME_CHARS: usize = 64;
+
+/// What the operator wants of the run; `docs/run-states.md` says what each does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
+#[serde(rename_all = "snake_case")]
+pub enum What {
+    /// Wait after the present press.
+    Pause,
+    /// Break the present press off, leave the skin, and wait.
+    PauseNow,
+    /// Go on after a pause.
+    Resume,
+    /// End after the present press.
+    Stop,
+    /// Leave the skin now, disarm, keep the data.
+    Abort,
+    /// Motors off now, wherever the tip is.
+    Halt,
+}
+
+/// A question.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Request {
+    /// How is it going?
+    Status,
+    /// Do this.
+    Control(What),
+    /// Write this down.
+    Note {
+        /// Who says so.
+        by: String,
+        /// The remark.
+        text: String,
+    },
+}
+
+/// The answer.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Reply {
+    /// How it is going.
+    Live(Box<Live>),
+    /// Handed on, as the so manieth request or remark.
+    Handed(u64),
+    /// Not done, and why.
+    Refused(String),
+}
+
+/// A run at one instant, as the run itself tells it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Live {
+    /// Name of its [`State`].
+    pub state: String,
+    /// Requests made so far, by ctrl-C or from another terminal.
+    pub asked: u64,
+    /// How many of them the controller has heard.
+    pub heard: u64,
+    /// Remarks written.
+    pub noted: u64,
+    /// Presses of the plan.
+    pub planned: usize,
+    /// Presses that have ended.
+    pub done: usize,
+    /// How many of them are valid.
+    pub valid: usize,
+    /// How many of them are invalid.
+    pub invalid: usize,
+    /// How many of them were missed.
+    pub missed: usize,
+    /// Attempts beyond the first at a press, in this leg.
+    pub retaken: usize,
+    /// The press under way, or the last one.
+    pub press: Option<LivePress>,
+    /// The measured tip, skin frame, mm.
+    pub tip_mm: Option<[f64; 3]>,
+    /// Rig time of this leg so far, s.
+    pub elapsed_s: f64,
+    /// Rig time still to go, s.
+    pub eta_s: Option<f64>,
+    /// Time on the wall since the leg began, s.
+    pub waited_s: f64,
+    /// Marks that the trigger box sent.
+    pub marks_sent: u64,
+    /// Both cameras.
+    pub cameras: [LiveCamera; 2],
+}
+
+/// A press of a [`Live`] run.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct LivePress {
+    /// Its number in the plan, from 1.
+    pub number: u32,
+    /// `sync`, `calibrate` or `score`.
+    pub role: skinrig_model::PressRole,
+    /// Its repetition, from 1.
+    pub repetition: u32,
+    /// Its place, skin frame, mm.
+    pub at_mm: [f64; 2],
+}
+
+/// A camera of a [`Live`] run.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct LiveCamera {
+    /// CD events per second of rig time over about the last second.
+    pub events_per_s: Option<f64>,
+    /// CD events in this leg.
+    pub events: u64,
+    /// Bytes known to be lost in this leg.
+    pub lost_bytes: u64,
+    /// Complete marks on its trigger input.
+    pub marks_seen: u64,
+}
+
+impl Request {
+    /// Reads a request, which may be anything that anybody wrote.
+    ///
+    /// # Errors
+    /// What was expected.
+    pub fn parse(line: &[u8]) -> Result<Self, String> {
+        let request: Self = serde_json::from_slice(line)
+            .map_err(|e| format!("expected a request of `skinrig`, found other bytes: {e}"))?;
+        if let Self::Note { by, text } = &request {
+            for (what, words, most) in [
+                ("name", by, MOST_NAME_CHARS),
+                ("note", text, MOST_NOTE_CHARS),
+            ] {
+                let found = words.chars().count();
+                if !(1..=most).contains(&found) {
+                    return Err(format!(
+                        "expected a {what} of 1 to {most} characters, found {found}"
+                    ));
+                }
+                if words.chars().any(char::is_control) {
+                    return Err(format!(
+                        "expected a {what} without control characters, found one"
+                    ));
+                }
+            }
+        }
+        Ok(request)
+    }
+}
+
+impl Live {
+    /// From what the terminal of the run shows.
+    #[must_use]
+    pub fn of(p: &Progress, state: State, counts: [u64; 3], waited_s: f64) -> Self {
+        let [asked, heard, noted] = counts;
+        Self {
+            state: state.name().to_owned(),
+            asked,
+            heard,
+            noted,
+            planned: p.planned,
+            done: p.done,
+            valid: p.valid,
+            invalid: p.invalid,
+            missed: p.missed,
+            retaken: p.retaken,
+            press: p.press.map(|press| LivePress {
+                number: press.id.0 + 1,
+                role: press.role,
+                repetition: press.repetition + 1,
+                at_mm: [press.at.x_mm, press.at.y_mm],
+            }),
+            tip_mm: p.tip.map(|(at, z_mm)| [at.x_mm, at.y_mm, z_mm]),
+            elapsed_s: p.elapsed.as_secs_f64(),
+            eta_s: p.eta.map(|t| t.as_secs_f64()),
+            waited_s,
+            marks_sent: p.marks_sent,
+            cameras: CameraId::ALL.map(|c| {
+                let camera = p.cameras[c.index()];
+                LiveCamera {
+                    events_per_s: camera.events_per_s,
+                    events: camera.events,
+                    lost_bytes: camera.lost_bytes,
+                    marks_seen: camera.marks_seen,
+                }
+            }),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_request_reads_back_as_written() {
+        let note = |by: &str, text: &str| Request::Note {
+            by: by.into(),
+            text: text.into(),
+        };
+        for request in [
+            Request::Status,
+            Request::Control(What::PauseNow),
+            note("Ann", "the lamp flickers: \"40 %\""),
+        ] {
+            let line = serde_json::to_vec(&request).unwrap();
+            assert_eq!(Request::parse(&line), Ok(request));
+        }
+    }
+
+    #[test]
+    fn what_is_no_request_is_refused() {
+        let long = format!(
+            r#"{{"note":{{"by":"Ann","text":"{}"}}}}"#,
+            "x".repeat(MOST_NOTE_CHARS + 1)
+        );
+        for bytes in [
+            b"".as_slice(),
+            b"\0\xff\xfe",
+            b"GET / HTTP/1.1",
+            b"null",
+            b"[]",
+            b"\"launch\"",
+            br#"{"control":"jump"}"#,
+            br#"{"note":{"by":"","text":"a"}}"#,
+            br#"{"note":{"by":"Ann","text":""}}"#,
+            br#"{"note":{"by":"Ann","text":"a\nb"}}"#,
+            br#"{"note":{"by":"Ann\u001b[2J","text":"a"}}"#,
+            br#"{"note":{"by":"Ann","text":"a","more":1}}"#,
+            long.as_bytes(),
+            &[b'['; MOST_REQUEST_BYTES],
+        ] {
+            let found = Request::parse(bytes);
+            assert!(found.is_err(), "{}", String::from_utf8_lossy(bytes));
+        }
+    }
+}

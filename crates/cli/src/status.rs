@@ -1,0 +1,243 @@
+//! `skinrig status`: how a run is going, or how it ended, from the session file and from the run itself.
+
+use std::path::Path;
+
+use serde_json::{Value, json};
+use skinrig_model::{HostDuration, PressVerdict, RunEnd};
+use skinrig_recorder::{RecorderError, SessionReader, writer_of};
+
+use crate::args::StatusArgs;
+use crate::exit::{Exit, Failure, Outcome};
+use crate::paths;
+use crate::progress::{clock_text, eta_text};
+use crate::remote::{Live, Reply, Request, Silence, ask};
+use crate::rig::gates;
+use crate::sessions;
+
+/// So many of the last outcomes, interruptions and notes are told.
+const LAST: usize = 5;
+
+/// Tells how a session is going.
+///
+/// # Errors
+/// [`Failure::input`] when there is no readable session.
+pub fn status(args: &StatusArgs, as_json: bool) -> Outcome {
+    let session = sessions::find(&args.session)?;
+    // The writer first: a run that ends in between has then left its end in the file.
+    let writer = writer_of(&session);
+    let (live, silence) = match ask(&session, &Request::Status) {
+        Ok(Reply::Live(live)) => (Some(live), None),
+        Ok(Reply::Refused(why)) | Err(Silence::Trouble(why)) => (None, Some(why)),
+        Ok(Reply::Handed(_)) | Err(Silence::Nobody) => (None, None),
+    };
+    let filed = match filed(&session) {
+        Ok(filed) => filed,
+        // The first records of a run are not yet on the disk.
+        Err(RecorderError::NotThere { .. }) if writer.is_some() => json!({}),
+        Err(e) => return Err(Failure::input(e)),
+    };
+    let mut d = json!({
+        "session": session, "writer": writer, "live": live, "silence": silence,
+        "disk_free_bytes": gates::free_bytes(paths::folder_of(&session)).ok().map(|b| b as u64),
+    });
+    if let (Some(d), Value::Object(filed)) = (d.as_object_mut(), filed) {
+        d.extend(filed);
+    }
+    if as_json {
+        crate::print_json(&d);
+    } else {
+        print(&d, live.as_deref());
+    }
+    Ok(Exit::Ok)
+}
+
+/// What the session file says, as far as it is on the disk.
+fn filed(session: &Path) -> Result<Value, RecorderError> {
+    let reader = SessionReader::open(session)?;
+    let header = reader.header()?;
+    let end = reader.end()?.map(|(_, end)| end);
+    let totals = reader.totals()?;
+    let mut outcomes: Vec<_> = reader
+        .presses()?
+        .into_iter()
+        .flat_map(|(_, attempts)| attempts)
+        .filter_map(|a| a.outcome)
+        .filter(|o| !matches!(o.verdict, PressVerdict::Missed(_)))
+        .collect();
+    // A press that was taken again by a further leg comes before later ones in the plan.
+    outcomes.sort_by_key(|o| o.timing.map(|t| t.release));
+    let last = |n: usize| n.saturating_sub(LAST);
+    let outcomes: Vec<_> = outcomes[last(outcomes.len())..]
+        .iter()
+        .map(|o| {
+            json!({
+                "press": o.attempt.press.0 + 1, "attempt": o.attempt.number,
+                "verdict": o.verdict.name(), "reason": o.verdict.reason(),
+            })
+        })
+        .collect();
+    let interruptions = reader.interruptions()?;
+    let count = interruptions.len();
+    let interruptions: Vec<_> = interruptions[last(count)..]
+        .iter()
+        .map(|i| json!([i.t.as_secs_f64(), i.kind.name(), i.reason]))
+        .collect();
+    let notes = reader.notes()?;
+    let notes: Vec<_> = notes[last(notes.len())..]
+        .iter()
+        .map(|n| json!([n.t.as_secs_f64(), n.text]))
+        .collect();
+    let reason = end.as_ref().and_then(|end| match end {
+        RunEnd::Completed => None,
+        RunEnd::Stopped(r) | RunEnd::Faulted(r) => Some(r.as_str()),
+    });
+    Ok(json!({
+        "id": reader.session_id()?, "sealed": reader.seal()?.is_some(),
+        "started_at": header.started_at, "prototype": header.prototype, "operator": header.operator,
+        "protocol": header.protocol_name, "rig": header.rig_name, "rig_kind": header.rig_kind,
+        "legs": reader.legs()?.len(), "end": end.as_ref().map(RunEnd::name), "end_reason": reason,
+        "totals": totals, "last_outcomes": outcomes, "interruption_count": count,
+        "last_interruptions": interruptions, "last_notes": notes,
+    }))
+}
+
+/// In words, what the session is now.
+fn state(d: &Value, live: Option<&Live>) -> String {
+    let session = d["session"].as_str().unwrap_or_default();
+    let next = match d["rig_kind"].as_str() {
+        Some("imported" | "replayed") => "run it again".to_owned(),
+        _ => format!("`skinrig resume {session}` goes on with it"),
+    };
+    match (live, d["writer"].as_str(), d["end"].as_str()) {
+        (Some(live), by, _) => format!("{} ({})", live.state, by.unwrap_or("process unknown")),
+        (None, Some(by), _) => {
+            let why = d["silence"].as_str();
+            let why = why.map_or_else(String::new, |why| format!(": {why}"));
+            format!("written by {by}, which does not answer{why}")
+        }
+        (None, None, Some("completed")) if d["sealed"] == true => "completed".to_owned(),
+        (None, None, Some(end)) => {
+            let reason = d["end_reason"].as_str();
+            let reason = reason.map_or_else(String::new, |r| format!(": {r}"));
+            let sealed = if d["sealed"] == true {
+                ""
+            } else {
+                ", not sealed"
+            };
+            format!("{end}{sealed}{reason}; {next}")
+        }
+        (None, None, None) => format!("cut off: nobody runs it; {next}"),
+    }
+}
+
+fn print(d: &Value, live: Option<&Live>) {
+    let text = |key: &str| d[key].as_str().unwrap_or("-").to_owned();
+    outln!("session   {}", text("session"));
+    outln!("state     {}", state(d, live));
+    outln!(
+        "run       {} on {}, rig {}; begun {} by {}; leg {}",
+        text("protocol"),
+        text("prototype"),
+        text("rig"),
+        text("started_at"),
+        text("operator"),
+        d["legs"].as_u64().unwrap_or(1)
+    );
+    match live {
+        Some(live) => print_live(live),
+        None => print_filed(&d["totals"]),
+    }
+    let lost = d["totals"]["lost_bytes"].as_u64().unwrap_or(0);
+    outln!("lost      {lost} bytes of the camera streams in the session file");
+    match d["disk_free_bytes"].as_u64() {
+        Some(free) => outln!("disk      {} free", gates::size(free as f64)),
+        None => outln!("disk      free space unknown"),
+    }
+    for o in d["last_outcomes"].as_array().into_iter().flatten() {
+        let number = o["attempt"].as_u64().unwrap_or(1);
+        let again = if number > 1 {
+            format!(", attempt {number}")
+        } else {
+            String::new()
+        };
+        let reason = o["reason"].as_str();
+        let reason = reason.map_or_else(String::new, |r| format!(": {r}"));
+        outln!(
+            "          press {}{again} {}{reason}",
+            o["press"],
+            o["verdict"].as_str().unwrap_or("-")
+        );
+    }
+    let told = d["last_interruptions"].as_array().map_or(0, Vec::len) as u64;
+    let all = d["interruption_count"].as_u64().unwrap_or(0);
+    if all > told {
+        outln!("          {} earlier interruptions", all - told);
+    }
+    for row in d["last_interruptions"].as_array().into_iter().flatten() {
+        let word = |i: usize| row[i].as_str().unwrap_or("").to_owned();
+        let t = row[0].as_f64().unwrap_or(0.0);
+        outln!("          {t:.3} s  {}: {}", word(1), word(2));
+    }
+    for row in d["last_notes"].as_array().into_iter().flatten() {
+        let t = row[0].as_f64().unwrap_or(0.0);
+        outln!(
+            "          {t:.3} s  note: {}",
+            row[1].as_str().unwrap_or("")
+        );
+    }
+}
+
+fn print_live(live: &Live) {
+    let press = live.press.as_ref().map_or_else(String::new, |p| {
+        let block = match p.role {
+            skinrig_model::PressRole::Sync => "sync".to_owned(),
+            _ => format!("repetition {}", p.repetition),
+        };
+        let [x, y] = p.at_mm;
+        format!(" ({block}, at ({x:.1}, {y:.1}) mm)")
+    });
+    outln!(
+        "press     {} of {}{press}; {} done: {} valid, {} invalid, {} missed; {} taken again",
+        live.press.as_ref().map_or(0, |p| p.number),
+        live.planned,
+        live.done,
+        live.valid,
+        live.invalid,
+        live.missed,
+        live.retaken
+    );
+    let seconds = HostDuration::from_secs_f64;
+    let elapsed = seconds(live.elapsed_s);
+    let waited = std::time::Duration::try_from_secs_f64(live.waited_s).unwrap_or_default();
+    outln!(
+        "time      {} of rig time in this leg; eta {}",
+        clock_text(elapsed),
+        eta_text(elapsed, live.eta_s.map(seconds), waited)
+    );
+    let [one, two] = live.cameras.each_ref().map(|c| {
+        c.events_per_s
+            .map_or_else(|| "-".to_owned(), |r| format!("{:.1}", r / 1e3))
+    });
+    let [a, b] = &live.cameras;
+    outln!(
+        "streams   camera 1 {one}, camera 2 {two} kev/s; trigger {} sent, {}+{} seen; {}+{} bytes lost in this leg",
+        live.marks_sent,
+        a.marks_seen,
+        b.marks_seen,
+        a.lost_bytes,
+        b.lost_bytes
+    );
+}
+
+fn print_filed(totals: &Value) {
+    let of = |block: &str, key: &str| totals[block][key].as_u64().unwrap_or(0);
+    let both = |key: &str| of("presses", key) + of("sync", key);
+    outln!(
+        "press     {} planned: {} valid, {} invalid, {} missed, {} excluded",
+        both("planned"),
+        both("valid"),
+        both("invalid"),
+        both("missed"),
+        both("excluded")
+    );
+}
