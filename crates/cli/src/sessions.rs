@@ -146,9 +146,7 @@ fn line(session: &SessionSummary) -> String {
                 (Some("completed"), true) => String::new(),
                 (Some(end), true) => format!("  ({end})"),
                 (Some(end), false) => format!("  ({end}, not sealed)"),
-                (None, _) if skinrig_recorder::writer_of(&session.path).is_some() => {
-                    "  (under way)".to_owned()
-                }
+                (None, _) if writer_of(&session.path).is_some() => "  (under way)".to_owned(),
                 (None, _) => "  (cut off)".to_owned(),
             };
             format!(
