@@ -79,7 +79,7 @@ pub enum Command {
     /// Move the robot by hand under the limits of the rig file, and record touched points; lines from standard input.
     #[command(after_help = "Examples:\n  skinrig jog --rig hil/rigs/NAME.yaml\n  \
         printf 'z +5mm\\ntouch 20mm\\npoint nw at -30 40 0 mm\\n' | skinrig jog\n\n\
-        ctrl-C holds, rises and disarms. Coordinates are the robot's own. `help` lists what can be typed.")]
+        ctrl-C holds, rises and disarms; three times switches the motors off where the tip is. Coordinates are the robot's own. `help` lists what can be typed.")]
     Jog(JogArgs),
 
     /// List recorded sessions.
@@ -314,6 +314,11 @@ pub struct JogArgs {
     /// Where everything is logged; a new file in `sessions/` when absent.
     #[arg(long, value_name = "FILE")]
     pub log: Option<PathBuf>,
+
+    /// Let the tip go deeper below the surface of the rig file's frame than its `limits.max_depth`, down to the end of the
+    /// workspace: for touching off a skin that lies elsewhere. It is logged.
+    #[arg(long)]
+    pub beyond_frame: bool,
 
     /// Hold, rise, disarm and end after this long without a typed line.
     #[arg(long, value_name = "TIME", default_value = "5 min", value_parser = time_s)]

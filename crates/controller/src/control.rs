@@ -172,7 +172,8 @@ impl ControlHandle {
     }
 
     /// True once [`halt`](Self::halt) was asked for.
-    pub(crate) fn is_halted(&self) -> bool {
+    #[must_use]
+    pub fn is_halted(&self) -> bool {
         self.shared.bits.load(Ordering::Acquire) & HALT != 0
     }
 

@@ -43,6 +43,14 @@ pub enum GuardError {
         /// mm, positive.
         found_mm: f64,
     },
+    /// The target lies deeper below the surface of the rig's frame than allowed.
+    #[error("expected at most {limit_mm} mm below the frame's surface, found {found_mm:.3} mm")]
+    Floor {
+        /// mm, positive.
+        limit_mm: f64,
+        /// mm, positive.
+        found_mm: f64,
+    },
     /// Sideways motion below clearance height.
     #[error(
         "expected lateral motion only at {clearance_mm} mm or higher, found {lateral_mm:.3} mm sideways at {height_mm:.3} mm"
@@ -185,6 +193,9 @@ pub enum ControllerError {
         /// The number that came.
         found: u64,
     },
+    /// The operator switched the motors off.
+    #[error("operator: halt; the motors are off, the tip was left where it was")]
+    Halted,
     /// What suspended the run went on for too long.
     #[error("{reason}; expected it to be over within {limit}")]
     Suspended {

@@ -14,6 +14,15 @@ use crate::error::{ControllerError, GuardError};
 use crate::settings::ControllerSettings;
 use crate::watchdog::{Trip, WatchLimits, Watchdog};
 
+/// How deep the tip may go below the surface of a frame, where the coordinates of motions are not that frame's own.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Floor {
+    /// The frame whose z = 0 is the surface.
+    pub skin_from_robot: RigidTransform<Skin, Robot>,
+    /// mm, positive.
+    pub max_depth_mm: f64,
+}
+
 /// Owns the indenter. Takes targets in the skin frame, refuses what the limits of the run forbid, gives poses in the
 /// skin frame, and feeds them to its watchdog: when that trips, the robot holds or brakes before anybody is asked.
 pub struct GuardedIndenter {
@@ -22,6 +31,7 @@ pub struct GuardedIndenter {
     skin_from_robot: RigidTransform<Skin, Robot>,
     limits: RunLimits,
     surroundings: Option<Surroundings>,
+    floor: Option<Floor>,
     stale_after: HostDuration,
     armed: bool,
     watchdog: Watchdog,
@@ -46,6 +56,7 @@ impl GuardedIndenter {
             skin_from_robot: robot_from_skin.inverse(),
             limits,
             surroundings: None,
+            floor: None,
             stale_after,
             armed: false,
             watchdog: Watchdog::new(WatchLimits::of(&limits, stale_after, late_after)),
@@ -59,6 +70,13 @@ impl GuardedIndenter {
     #[must_use]
     pub fn within(mut self, surroundings: Option<Surroundings>) -> Self {
         self.surroundings = surroundings;
+        self
+    }
+
+    /// With this floor; rising is always allowed.
+    #[must_use]
+    pub const fn above(mut self, floor: Option<Floor>) -> Self {
+        self.floor = floor;
         self
     }
 
@@ -191,6 +209,7 @@ impl GuardedIndenter {
         let Some(last) = self.position() else {
             return Err(GuardError::NotArmed); // a fresh pose exists, see above
         };
+        self.check_floor(last.measured, target)?;
         let lateral_mm = target.plane().distance_mm(last.measured.plane());
         let rises = target.z_mm >= last.measured.z_mm && lateral_mm <= limits.position_tolerance_mm;
         if let Some(trip) = self.trip.as_ref().filter(|_| !rises) {
@@ -210,6 +229,25 @@ impl GuardedIndenter {
             return Ok(()); // away from everything, wherever it was
         }
         self.check_surroundings(last.measured, target)
+    }
+
+    /// Half-spaces are convex: with both ends above the floor so is the way between them.
+    fn check_floor(&self, from: Point3<Skin>, target: Point3<Skin>) -> Result<(), GuardError> {
+        let Some(floor) = &self.floor else {
+            return Ok(());
+        };
+        let depth_mm = |at| {
+            let in_robot = self.robot_from_skin.apply(at);
+            -floor.skin_from_robot.apply(in_robot).z_mm
+        };
+        let found_mm = depth_mm(target);
+        if found_mm > floor.max_depth_mm && found_mm > depth_mm(from) {
+            return Err(GuardError::Floor {
+                limit_mm: floor.max_depth_mm,
+                found_mm,
+            });
+        }
+        Ok(())
     }
 
     fn check_surroundings(

@@ -2,14 +2,14 @@
 
 use skinrig_device::{Clock, Indenter, MotionLimits};
 use skinrig_model::{
-    DeviceIdentity, HostDuration, HostTime, Point3, PoseSample, RigidTransform, Robot, Setting,
-    Skin,
+    DeviceIdentity, HostDuration, HostTime, Point3, PoseSample, RigidTransform, Setting, Skin,
 };
 use skinrig_protocol::TouchSearch;
 use skinrig_protocol::plan::RunLimits;
 
+use crate::control::ControlHandle;
 use crate::error::{ControllerError, GuardError};
-use crate::guard::GuardedIndenter;
+use crate::guard::{Floor, GuardedIndenter};
 use crate::moments::Settling;
 use crate::settings::ControllerSettings;
 use crate::touch::TouchDetector;
@@ -37,6 +37,7 @@ pub struct Jog {
     trace: Vec<PoseSample>,
     traced: Option<HostTime>,
     finished: bool,
+    control: ControlHandle,
 }
 
 /// How a motion ended.
@@ -60,20 +61,24 @@ pub enum Touched {
 }
 
 impl Jog {
-    /// Limits the robot, powers it, and waits for its pose. Coordinates are those of the frame that `robot_from_frame`
-    /// takes to the robot's: the skin's, or the robot's own with the identity.
+    /// Limits the robot, powers it, and waits for its pose. Coordinates, those of `limits` included, are the robot's own:
+    /// where the skin lies is what a touch-off is to find out. Nothing goes below the `floor`. Of `control` only a halt is
+    /// heard: it disarms at once, and ends whatever is under way with [`ControllerError::Halted`].
     ///
     /// # Errors
     /// What the robot answers; [`ControllerError::PoseStream`] when it tells no pose. It is then disarmed.
     pub fn start(
         indenter: Box<dyn Indenter>,
         clock: Box<dyn Clock>,
-        robot_from_frame: RigidTransform<Robot, Skin>,
         limits: RunLimits,
         robot_limits: &MotionLimits,
+        floor: Option<Floor>,
+        control: &ControlHandle,
         settings: ControllerSettings,
     ) -> Result<(Self, Vec<Setting>), ControllerError> {
-        let indenter = GuardedIndenter::new(indenter, robot_from_frame, limits, &settings);
+        let indenter =
+            GuardedIndenter::new(indenter, RigidTransform::identity(), limits, &settings)
+                .above(floor);
         let mut jog = Self {
             indenter,
             clock,
@@ -84,6 +89,7 @@ impl Jog {
             trace: Vec::new(),
             traced: None,
             finished: false,
+            control: control.clone(),
         };
         let written = jog.indenter.configure(robot_limits)?;
         jog.indenter.arm()?;
@@ -223,7 +229,7 @@ impl Jog {
         }
     }
 
-    /// Holds, rises where that is possible, disarms. Gives where the tip was then, or what went wrong on the way; the
+    /// Holds, rises where that is possible, disarms; after a halt disarms only. Gives where the tip was then, or what went wrong on the way; the
     /// robot is told to disarm in any case.
     ///
     /// # Errors
@@ -232,11 +238,15 @@ impl Jog {
         if std::mem::replace(&mut self.finished, true) {
             return Ok(self.indenter.position());
         }
-        let rose = if self.indenter.is_armed() {
-            self.rise()
-        } else {
-            Ok(())
+        let rose = match self.indenter.is_armed() && !self.control.is_halted() {
+            true => self.rise(),
+            false => Ok(()),
         };
+        // The operator broke the rise off; whether the motors are off is told below.
+        let rose = rose.or_else(|e| match e {
+            ControllerError::Halted => Ok(()),
+            other => Err(other),
+        });
         let disarmed = (0..3)
             .map(|_| self.indenter.disarm())
             .find(Result::is_ok)
@@ -309,6 +319,10 @@ impl Jog {
     fn tick(&mut self) -> Result<(), ControllerError> {
         self.clock.wait_until(self.clock.now() + self.settings.tick);
         self.fresh.clear();
+        if self.control.is_halted() && self.indenter.is_armed() {
+            self.indenter.disarm()?;
+            return Err(ControllerError::Halted);
+        }
         let polled = self.indenter.poll(self.clock.as_ref(), &mut self.fresh);
         for s in &self.fresh {
             if self.traced.is_none_or(|t| s.t - t >= TRACE_EVERY) {

@@ -57,7 +57,7 @@ pub mod watchdog;
 pub use checks::{ExpectedDevice, Loopback, Preflight};
 pub use control::{ControlHandle, NotesFull};
 pub use error::{ControllerError, GuardError};
-pub use guard::GuardedIndenter;
+pub use guard::{Floor, GuardedIndenter};
 pub use jog::{Jog, Moved, Touched};
 pub use progress::{Progress, ProgressTracker};
 pub use run::{

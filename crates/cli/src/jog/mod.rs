@@ -12,7 +12,9 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
 use std::time::{Duration, Instant};
 
 use chrono::Utc;
-use skinrig_controller::{ControllerError, ControllerSettings, GuardError, Jog, Moved, Touched};
+use skinrig_controller::{
+    ControlHandle, ControllerError, ControllerSettings, Floor, GuardError, Jog, Moved, Touched,
+};
 use skinrig_device::{Clock, Indenter, MotionLimits, RealClock};
 use skinrig_model::{HostDuration, Point3, PoseSample, RigidTransform, Robot, SimLevel, Skin};
 use skinrig_protocol::plan::{OnTrip, RunLimits};
@@ -31,6 +33,8 @@ use points::NamedPoint;
 const IDLE: Duration = Duration::from_millis(10);
 /// Speed until another one is asked for, mm/s.
 const FIRST_SPEED_MM_S: f64 = 5.0;
+/// How deep below its surface the tip may go in the simulated skin, mm.
+const SIMULATED_DEPTH_MM: f64 = 6.0;
 /// How close to its target a motion ends, mm.
 const TOLERANCE_MM: f64 = 0.1;
 /// How the surface is touched when the rig file does not say.
@@ -52,6 +56,7 @@ struct Bench {
     max_speed_mm_s: f64,
     max_acceleration_mm_s2: f64,
     max_force_n: f64,
+    max_depth_mm: f64,
     robot_from_skin: RigidTransform<Robot, Skin>,
     search: TouchSearch,
 }
@@ -76,6 +81,7 @@ fn open(args: &JogArgs) -> Result<Bench, Failure> {
         max_mm: file.limits.workspace_max_mm,
         max_speed_mm_s: file.limits.max_speed_mm_s,
         max_force_n: file.limits.max_force_n,
+        max_depth_mm: file.limits.max_depth_mm,
         robot_from_skin: file.frame.robot_from_skin,
         search,
     })
@@ -98,17 +104,19 @@ fn simulated() -> Bench {
         max_speed_mm_s: can.max_speed_mm_s,
         max_acceleration_mm_s2: can.max_acceleration_mm_s2,
         max_force_n: can.max_force_n,
+        max_depth_mm: SIMULATED_DEPTH_MM,
         robot_from_skin: rig.robot_from_skin,
         search: SEARCH,
     }
 }
 
-/// Coordinates are the robot's own: where the skin lies is what a touch-off is to find out.
+/// Coordinates are the robot's own: where the skin lies is what a touch-off is to find out. How deep the tip may go below the
+/// surface of the frame that is known so far, is the floor's business.
 fn limits(bench: &Bench) -> (RunLimits, MotionLimits) {
     let run = RunLimits {
         workspace_min_mm: bench.min_mm,
         workspace_max_mm: bench.max_mm,
-        // No surface is known: the workspace alone says how low the tip may go.
+        // In these coordinates the workspace says how low the tip may go.
         clearance_mm: bench.min_mm[2],
         max_depth_mm: (-bench.min_mm[2]).max(f64::MIN_POSITIVE),
         max_speed_mm_s: bench.max_speed_mm_s,
@@ -139,10 +147,19 @@ pub fn jog(args: &JogArgs) -> Outcome {
         .map_err(|e| Failure::input(format!("--idle: {e}")))?;
     let stop = Arc::new(AtomicBool::new(false));
     let pressed = Arc::clone(&stop);
+    let control = ControlHandle::new();
+    let hand = control.clone();
     signals::on_ctrl_c(move |times| {
         pressed.store(true, Ordering::SeqCst);
-        if times >= 3 {
-            std::process::exit(i32::from(Exit::Stopped as u8));
+        match times {
+            1 => errln!("\nholding, rising, disarming; ctrl-C twice more switches the motors off"),
+            2 => errln!("\nctrl-C once more switches the motors off where the tip is"),
+            3 => {
+                errln!("\nmotors off");
+                hand.halt();
+            }
+            // Something hangs; the supervisor brakes an arm that nobody commands any more.
+            _ => std::process::exit(i32::from(Exit::Stopped as u8)),
         }
     })
     .map_err(Failure::internal)?;
@@ -151,12 +168,17 @@ pub fn jog(args: &JogArgs) -> Outcome {
     let bench = open(args)?;
     let (run, robot) = limits(&bench);
     let skin_from_robot = bench.robot_from_skin.inverse();
+    let floor = Floor {
+        skin_from_robot,
+        max_depth_mm: bench.max_depth_mm,
+    };
     let (jog, _) = Jog::start(
         bench.indenter,
         bench.clock,
-        RigidTransform::identity(),
         run,
         &robot,
+        (!args.beyond_frame).then_some(floor),
+        &control,
         ControllerSettings {
             stale_after: bench::SLOW_STALE,
             ..ControllerSettings::default()
@@ -185,6 +207,15 @@ pub fn jog(args: &JogArgs) -> Outcome {
     );
     let started = format!("{}: {} {}", bench.name, identity.model, identity.serial);
     log.line(table.jog.now(), "start", &started);
+    if args.beyond_frame {
+        let words = "--beyond-frame: only the workspace says how low the tip may go";
+        log.line(table.jog.now(), "limit", words);
+        outln!("limit     {words}");
+    } else {
+        let words = format!("{} mm below the frame's surface", floor.max_depth_mm);
+        log.line(table.jog.now(), "limit", &words);
+        outln!("limit     {words} (--beyond-frame for a skin that lies lower)");
+    }
     let outcome = table.listen(&mut log);
     let ended = table.jog.finish();
     log.path_of_tip(&table.jog.take_trace());
@@ -252,7 +283,10 @@ impl Table {
                 Err(RecvTimeoutError::Timeout) => {
                     let looked = self.jog.look();
                     log.path_of_tip(&self.jog.take_trace());
-                    looked.map_err(Failure::rig)?;
+                    match looked {
+                        Err(ControllerError::Halted) => continue,
+                        other => other.map_err(Failure::rig)?,
+                    };
                     if heard.elapsed() < self.idle {
                         continue;
                     }
@@ -275,6 +309,10 @@ impl Table {
                 Ok(text) => {
                     log.line(self.jog.now(), "answer", &text);
                     outln!("{text}");
+                }
+                // The next turn ends it: whoever halts has stopped.
+                Err(Refusal::Rig(ControllerError::Halted)) => {
+                    log.line(self.jog.now(), "ctrl-C", "motors off");
                 }
                 Err(Refusal::Rig(e)) => {
                     log.line(self.jog.now(), "fault", &e.to_string());
@@ -379,6 +417,10 @@ impl From<ControllerError> for Refusal {
             ControllerError::Guard(
                 GuardError::StalePose { .. } | GuardError::NotArmed | GuardError::Tripped { .. },
             ) => Self::Rig(e),
+            ControllerError::Guard(e @ GuardError::Floor { .. }) => Self::Input(format!(
+                "{e}\n  next: look where the skin is; when it does lie lower than the rig file's frame says, start `skinrig jog` \
+                 with --beyond-frame"
+            )),
             ControllerError::Guard(e) => Self::Input(e.to_string()),
             ControllerError::Device(e @ skinrig_device::DeviceError::Refused { .. }) => {
                 Self::Input(e.to_string())

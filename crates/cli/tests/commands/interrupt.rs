@@ -138,7 +138,23 @@ fn ctrl_c_twice_retracts_and_stops_at_once() {
 #[test]
 fn ctrl_c_three_times_switches_the_motors_off_and_seals() {
     let lab = Lab::new();
-    let mut run = Underway::new(&lab.path("s"));
+    // Between presses a stop would end the run before the second ctrl-C: the tip is to be in the skin for some seconds.
+    let folder = lab.text("s");
+    let mut arguments = vec!["run", SMALL, "--real-time", "--no-analysis"];
+    for set in ["motion.hold=3s", "motion.period=5s", "sync.interval=5s"] {
+        arguments.extend(["--set", set]);
+    }
+    arguments.extend(["--sessions", &folder]);
+    let mut run = Underway::of(program(&arguments));
+    let in_the_skin = || {
+        let found = skinrig(&["status", "--json", &folder]).code(0).json();
+        let z_mm = found["live"]["tip_mm"][2].as_f64();
+        z_mm.is_some_and(|z_mm| z_mm < -1.0)
+    };
+    while !in_the_skin() {
+        let ended = run.child.try_wait().unwrap();
+        assert!(ended.is_none(), "{ended:?}");
+    }
     for word in ["stopping after this press", "retracting", "motors off"] {
         run.signal("INT");
         run.wait_for(word);

@@ -257,6 +257,36 @@ fn a_wrong_line_of_a_file_ends_the_jog_with_the_robot_disarmed() {
 }
 
 #[test]
+fn a_jog_stays_within_the_depth_of_the_frame_unless_told_otherwise() {
+    let lab = Lab::new();
+    // From z = -5 mm: the simulated skin is at -15 mm, and 6 mm of it may be pressed.
+    let log = lab.text("within.log");
+    jog("touch 16.5mm\n", &log)
+        .code(2)
+        .complains(&["at most 6 mm below the frame's surface", "--beyond-frame"]);
+    let log = std::fs::read_to_string(log).unwrap();
+    assert!(log.contains("\tlimit\t6 mm below"), "{log}");
+    let log = lab.text("beyond.log");
+    let mut child = program(&["jog", "--beyond-frame", "--log", &log])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut input = child.stdin.take().unwrap();
+    input.write_all(b"touch 16.5mm\n").unwrap();
+    drop(input);
+    let output = child.wait_with_output().unwrap();
+    let out = String::from_utf8(output.stdout).unwrap();
+    assert_eq!(output.status.code(), Some(0), "{out}");
+    assert!(
+        out.contains("touched at") && out.contains("limit     --beyond-frame"),
+        "{out}"
+    );
+    let log = std::fs::read_to_string(log).unwrap();
+    assert!(log.contains("\tlimit\t--beyond-frame"), "{log}");
+}
+
+#[test]
 fn the_logs_of_jogs_are_never_written_over() {
     let lab = Lab::new();
     let log = lab.text("jog.log");

@@ -5,6 +5,7 @@ mod edges;
 mod escape;
 mod guard;
 mod heard;
+mod jog;
 mod mock;
 mod preflight;
 mod progress;

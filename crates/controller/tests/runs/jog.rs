@@ -1,0 +1,115 @@
+//! The robot moved by hand, on the simulated rig: the floor of the frame, and the operator's halt.
+
+use skinrig_controller::{
+    ControlHandle, ControllerError, ControllerSettings, Floor, GuardError, Jog,
+};
+use skinrig_device::MotionLimits;
+use skinrig_model::{HostDuration, Point3, SimLevel, Skin};
+use skinrig_protocol::TouchSearch;
+use skinrig_protocol::plan::{OnTrip, RunLimits};
+use skinrig_sim::config::SimConfig;
+use skinrig_sim::rig::simulated_rig;
+
+const NOBODY: fn() -> bool = || false;
+
+/// A jog in the robot's own coordinates, whose floor is `max_depth_mm` below the skin. The skin's surface is at z = -15 mm.
+fn jog(max_depth_mm: Option<f64>, control: &ControlHandle) -> Jog {
+    let rig = simulated_rig(&SimConfig::new(1, SimLevel::Kinematic));
+    let can = rig.indenter.capabilities();
+    let (min_mm, max_mm) = (can.workspace_min_mm, can.workspace_max_mm);
+    let limits = RunLimits {
+        workspace_min_mm: min_mm,
+        workspace_max_mm: max_mm,
+        clearance_mm: min_mm[2],
+        max_depth_mm: -min_mm[2],
+        max_speed_mm_s: can.max_speed_mm_s,
+        max_force_n: can.max_force_n,
+        position_tolerance_mm: 0.1,
+        settle_time: HostDuration::from_millis(50),
+        max_acceleration_mm_s2: None,
+        on_trip: OnTrip::Retract,
+    };
+    let robot = MotionLimits {
+        min_mm,
+        max_mm,
+        max_speed_mm_s: can.max_speed_mm_s,
+        max_acceleration_mm_s2: can.max_acceleration_mm_s2,
+        max_force_n: can.max_force_n,
+    };
+    let floor = max_depth_mm.map(|max_depth_mm| Floor {
+        skin_from_robot: rig.robot_from_skin.inverse(),
+        max_depth_mm,
+    });
+    let started = Jog::start(
+        rig.indenter,
+        rig.clock,
+        limits,
+        &robot,
+        floor,
+        control,
+        ControllerSettings::default(),
+    );
+    started.unwrap().0
+}
+
+fn down_to(jog: &mut Jog, z_mm: f64) -> Result<f64, ControllerError> {
+    let here = jog.look()?.commanded;
+    jog.go(here.plane().at_height(z_mm), 10.0, &NOBODY)?;
+    Ok(jog.look()?.measured.z_mm)
+}
+
+#[test]
+fn nothing_goes_deeper_than_the_frame_allows_unless_it_is_told_to() {
+    let control = ControlHandle::new();
+    let mut low = jog(Some(2.0), &control);
+    assert!((down_to(&mut low, -16.9).unwrap() + 16.9).abs() < 0.1);
+    let is_floor =
+        |e: &ControllerError| matches!(e, ControllerError::Guard(GuardError::Floor { .. }));
+    assert!(down_to(&mut low, -17.1).is_err_and(|e| is_floor(&e)));
+    down_to(&mut low, -10.0).unwrap();
+    let search = TouchSearch {
+        threshold_n: 0.2,
+        samples: 5,
+        speed_mm_s: 2.0,
+        band_mm: 1.0,
+        tare: HostDuration::from_millis(300),
+    };
+    // Also when it would find the surface before.
+    let touched = low.touch(search, 9.0, &NOBODY);
+    assert!(touched.is_err_and(|e| is_floor(&e)));
+    low.touch(search, 6.5, &NOBODY).unwrap();
+    low.finish().unwrap();
+
+    let mut free = jog(None, &control);
+    down_to(&mut free, -17.1).unwrap();
+    free.finish().unwrap();
+}
+
+#[test]
+fn a_halt_leaves_the_tip_where_it_is() {
+    let control = ControlHandle::new();
+    let mut moved = jog(Some(5.0), &control);
+    down_to(&mut moved, -12.0).unwrap();
+    // On the way down the motors go off: no retraction.
+    let here = moved.look().unwrap().commanded;
+    let target: Point3<Skin> = here.plane().at_height(-17.0);
+    let halting = || {
+        control.halt();
+        false
+    };
+    assert_eq!(
+        moved.go(target, 1.0, &halting),
+        Err(ControllerError::Halted)
+    );
+    let left = moved.finish().unwrap().unwrap();
+    assert!((left.measured.z_mm + 12.0).abs() < 0.5, "{left:?}");
+    assert!(moved.look().is_err() || moved.look().unwrap().measured.z_mm < -11.0);
+
+    // Also when it comes during the rise at the end.
+    let control = ControlHandle::new();
+    let mut rising = jog(None, &control);
+    down_to(&mut rising, -12.0).unwrap();
+    control.halt();
+    let left = rising.finish().unwrap().unwrap();
+    assert!((left.measured.z_mm + 12.0).abs() < 0.5, "{left:?}");
+}
