@@ -49,7 +49,10 @@ fn jog(max_depth_mm: Option<f64>, control: &ControlHandle) -> Jog {
         control,
         ControllerSettings::default(),
     );
-    started.unwrap().0
+    match started {
+        Ok((jog, _)) => jog,
+        Err(e) => panic!("{e}"),
+    }
 }
 
 fn down_to(jog: &mut Jog, z_mm: f64) -> Result<f64, ControllerError> {
