@@ -49,7 +49,6 @@ impl GuardedIndenter {
         limits: RunLimits,
         settings: &ControllerSettings,
     ) -> Self {
-        let (stale_after, late_after) = (settings.stale_after, settings.late_after);
         Self {
             inner,
             robot_from_skin,
@@ -57,9 +56,9 @@ impl GuardedIndenter {
             limits,
             surroundings: None,
             floor: None,
-            stale_after,
+            stale_after: settings.stale_after,
             armed: false,
-            watchdog: Watchdog::new(WatchLimits::of(&limits, stale_after, late_after)),
+            watchdog: Watchdog::new(WatchLimits::of(&limits, settings)),
             trip: None,
             target: None,
             samples: Vec::new(),

@@ -13,6 +13,9 @@ pub struct ControllerSettings {
     pub stale_after: HostDuration,
     /// The tip is low and nobody looked for longer than this: the run ends.
     pub late_after: HostDuration,
+    /// The time over which the watchdog takes a speed: long enough that the noise of positions and of their times is no speed,
+    /// at most a tick, so that it trips within two.
+    pub speed_over: HostDuration,
     /// Longest time from arming the robot to the first sample of its pose stream.
     pub first_pose_within: HostDuration,
     /// Speed of motions that are not in the plan (rising from an unknown start, retracting after a
@@ -32,6 +35,7 @@ impl Default for ControllerSettings {
             tick: HostDuration::from_millis(5),
             stale_after: HostDuration::from_millis(100),
             late_after: HostDuration::from_millis(1_000),
+            speed_over: HostDuration::from_millis(5),
             first_pose_within: HostDuration::from_millis(2_000),
             rise_speed_mm_s: 20.0,
             rise_allowance: HostDuration::from_millis(3_000),

@@ -9,8 +9,8 @@ use std::collections::VecDeque;
 use skinrig_model::{HostDuration, HostTime, Point3, PoseSample, Skin};
 use skinrig_protocol::plan::RunLimits;
 
-/// The time over which a speed is taken: long enough that the measurement's noise is no speed.
-const BASE: HostDuration = HostDuration::from_millis(5);
+use crate::settings::ControllerSettings;
+
 /// How much faster than its limit a tip may seem: it lags behind its set point and catches up.
 const CATCH_UP: f64 = 1.25;
 
@@ -23,6 +23,8 @@ pub struct WatchLimits {
     pub max_force_n: f64,
     /// Fastest measured motion, mm/s.
     pub max_speed_mm_s: f64,
+    /// The time over which a speed is taken.
+    pub speed_over: HostDuration,
     /// What two samples may differ by without any motion, mm.
     pub tolerance_mm: f64,
     /// At this height and above nothing is touched, and the loop may be late, mm.
@@ -36,15 +38,16 @@ pub struct WatchLimits {
 impl WatchLimits {
     /// Those of a run.
     #[must_use]
-    pub fn of(limits: &RunLimits, stale_after: HostDuration, late_after: HostDuration) -> Self {
+    pub fn of(limits: &RunLimits, settings: &ControllerSettings) -> Self {
         Self {
             deepest_mm: limits.max_depth_mm + limits.position_tolerance_mm,
             max_force_n: limits.max_force_n,
             max_speed_mm_s: limits.max_speed_mm_s,
+            speed_over: settings.speed_over,
             tolerance_mm: limits.position_tolerance_mm,
             clear_mm: limits.clearance_mm - limits.position_tolerance_mm,
-            stale_after,
-            late_after,
+            stale_after: settings.stale_after,
+            late_after: settings.late_after,
         }
     }
 }
@@ -123,7 +126,7 @@ pub struct Watchdog {
     on: bool,
     tripped: bool,
     last: Option<PoseSample>,
-    /// Samples of the last [`BASE`], and the one before them.
+    /// Samples of the time over which a speed is taken, and the one before them.
     recent: VecDeque<(HostTime, Point3<Skin>)>,
     /// The tip has been above the deepest place since it was armed.
     above: bool,
@@ -257,9 +260,9 @@ impl Watchdog {
                 t: s.t,
             });
         }
-        let ends = [self.recent.front(), self.recent.back()];
-        for &(t, at) in ends.into_iter().flatten() {
-            let seconds = (s.t - t).as_secs_f64();
+        if let Some(&(t, at)) = self.recent.front() {
+            // Two samples close to one another say little about speed: each is a little off in time.
+            let seconds = (s.t - t).max(limits.speed_over).as_secs_f64();
             let way_mm = at.distance_mm(s.measured);
             if way_mm > CATCH_UP * limits.max_speed_mm_s * seconds + limits.tolerance_mm {
                 return Err(Trip::Speed {
@@ -274,7 +277,8 @@ impl Watchdog {
 
     fn remember(&mut self, s: &PoseSample) {
         self.recent.push_back((s.t, s.measured));
-        while self.recent.get(1).is_some_and(|(t, _)| s.t - *t >= BASE) {
+        let over = self.limits.speed_over;
+        while self.recent.get(1).is_some_and(|(t, _)| s.t - *t >= over) {
             self.recent.pop_front();
         }
     }

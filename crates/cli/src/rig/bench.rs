@@ -90,6 +90,9 @@ pub const SLOW_STALE: HostDuration = HostDuration::from_millis(1_000);
 /// So long may a run on stand-ins not look while the tip is low.
 const SLOW_LATE: HostDuration = HostDuration::from_millis(5_000);
 
+/// Over so long a speed is taken of an arm that, held up by other work on this computer, catches up in bursts.
+const SLOW_SPEED: HostDuration = HostDuration::from_millis(200);
+
 /// How patient a run is with a rig of this kind: stand-ins share the processors of this computer.
 #[must_use]
 pub fn settings(kind: &str) -> ControllerSettings {
@@ -97,6 +100,7 @@ pub fn settings(kind: &str) -> ControllerSettings {
     if kind == RigKind::Emulated.name() {
         settings.stale_after = SLOW_STALE;
         settings.late_after = SLOW_LATE;
+        settings.speed_over = SLOW_SPEED;
     }
     settings
 }

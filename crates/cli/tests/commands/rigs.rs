@@ -35,7 +35,9 @@ fn nothing_connected_is_no_error_and_every_line_has_a_next_step() {
     let role = |role: &str| lines.iter().find(|l| l["role"] == role);
     for name in ["camera1", "camera2", "trigger_box"] {
         let line = role(name).unwrap_or_else(|| panic!("{name} is not listed: {lines:?}"));
-        assert_eq!(line["state"], "absent", "{line}");
+        // On a machine without USB nobody can say whether a camera is there.
+        let no_bus = name != "trigger_box" && line["state"] == "not asked";
+        assert!(no_bus || line["state"] == "absent", "{line}");
         assert!(
             line["next_step"].as_str().is_some_and(|s| !s.is_empty()),
             "{line}"

@@ -10,7 +10,7 @@ use crate::mock::*;
 
 fn limits() -> WatchLimits {
     let settings = ControllerSettings::default();
-    WatchLimits::of(&LIMITS, settings.stale_after, settings.late_after)
+    WatchLimits::of(&LIMITS, &settings)
 }
 
 fn sample(ms: i64, at: [f64; 3], force_n: f64) -> PoseSample {
@@ -37,6 +37,9 @@ fn trip_of(samples: impl IntoIterator<Item = ([f64; 3], f64)>) -> Option<(i64, T
     None
 }
 
+/// What a position may change by within the 5 ms over which a speed is taken.
+const JUMP_MM: f64 = 1.25 * LIMITS.max_speed_mm_s * 5e-3 + LIMITS.position_tolerance_mm;
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 256, ..ProptestConfig::default() })]
 
@@ -62,7 +65,7 @@ proptest! {
         let bad = match which {
             0 => ([0.0; 3], 8.0 * by),
             1 => ([0.0, 0.0, -0.12 * by - 3.0], 0.0),
-            _ => ([0.0, 0.2 * by, 0.0], 0.0),
+            _ => ([0.0, JUMP_MM * by, 0.0], 0.0),
         };
         let before = ([0.0, 0.0, if which == 1 { -3.0 } else { 0.0 }], 1.0);
         let samples = std::iter::repeat_n(before, calm).chain([bad]);

@@ -28,6 +28,10 @@ const STATUS_EVERY: HostDuration = HostDuration::from_millis(10);
 /// Time between two looks at the rate of the regulation loop.
 const CONTROL_EVERY: HostDuration = HostDuration::from_millis(100);
 
+/// A position whose reading took longer has no time of its own (the thread was held up in between): it leads the motion and is kept
+/// out of the stream, which shows a gap there.
+const READ_WITHIN: HostDuration = HostDuration::from_millis(2);
+
 /// Readings in a row that may fail because the controller was busy.
 const HICCUPS: u32 = 5;
 
@@ -546,6 +550,7 @@ impl<C: Clock> Engine<C> {
         let reading = sdk
             .regulated_position(id)
             .and_then(|reading| sdk.force(id).map(|force| (reading, force)));
+        let timely = clock.now() - now <= READ_WITHIN;
         let Some((reading, force)) = tolerate(&mut armed.hiccups, reading)? else {
             return armed.not_silent(now, &config.trips);
         };
@@ -586,12 +591,14 @@ impl<C: Clock> Engine<C> {
 
         if new {
             armed.heard = now;
-            stream.push(RobotSample {
-                t: now,
-                commanded: set_point,
-                measured: tip,
-                force_n,
-            });
+            if timely {
+                stream.push(RobotSample {
+                    t: now,
+                    commanded: set_point,
+                    measured: tip,
+                    force_n,
+                });
+            }
             return Ok(());
         }
         armed.not_silent(now, &config.trips)
