@@ -6,8 +6,14 @@
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
 use crate::error::RecorderError;
+
+/// Who asks [`writer_of`] holds the lock for an instant: a lock that is still held after this time is a writer's.
+const LOOKED_WITHIN: Duration = Duration::from_millis(500);
+/// Between two tries.
+const TRY_AGAIN: Duration = Duration::from_millis(2);
 
 /// Held by whoever writes a session, for as long as it does. The file goes away with it.
 #[derive(Debug)]
@@ -28,6 +34,7 @@ impl WriterLock {
             doing: "locking the session",
             source,
         };
+        let from = Instant::now();
         loop {
             let mut file = OpenOptions::new()
                 .create(true)
@@ -38,6 +45,10 @@ impl WriterLock {
                 .map_err(io)?;
             match file.try_lock() {
                 Ok(()) => {}
+                Err(TryLockError::WouldBlock) if from.elapsed() < LOOKED_WITHIN => {
+                    std::thread::sleep(TRY_AGAIN);
+                    continue;
+                }
                 Err(TryLockError::WouldBlock) => {
                     return Err(RecorderError::InUse {
                         path: session.to_owned(),
@@ -122,5 +133,28 @@ mod tests {
         assert_eq!(writer_of(&session), None);
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
         WriterLock::take(&session).unwrap();
+    }
+
+    #[test]
+    fn who_only_looks_keeps_no_writer_out() {
+        let folder = tempfile::tempdir().unwrap();
+        let session = folder.path().join("a.session.sqlite");
+        let over = std::sync::atomic::AtomicBool::new(false);
+        let is_over = || over.load(std::sync::atomic::Ordering::SeqCst);
+        std::thread::scope(|scope| {
+            let looks = || {
+                while !is_over() {
+                    writer_of(&session);
+                }
+            };
+            scope.spawn(looks);
+            let taken: Vec<_> = (0..300)
+                .map(|_| WriterLock::take(&session).map(drop))
+                .collect();
+            over.store(true, std::sync::atomic::Ordering::SeqCst);
+            for taken in taken {
+                taken.unwrap();
+            }
+        });
     }
 }
