@@ -1,7 +1,7 @@
 //! What the operator's hand learns: that a request was heard, that a remark was written, where the run is.
 
-use skinrig_controller::State;
-use skinrig_model::Record;
+use skinrig_controller::{State, execute};
+use skinrig_model::{Record, RunEnd};
 
 use crate::course::{START, faults, run, run_plan};
 use crate::mock::*;
@@ -27,6 +27,22 @@ fn a_remark_at_any_tick_is_written_once_and_changes_nothing() {
         assert_eq!(told.records.len(), good.records.len() + 1, "tick {tick}");
         assert_eq!(lock(&told.world).control.noted(), 1, "tick {tick}");
     }
+}
+
+#[test]
+fn a_remark_to_a_run_that_fails_at_once_is_written() {
+    let failing = Faults {
+        at_call: Some((1, Failure::Once)),
+        ..faults()
+    };
+    let world = World::shared(failing, START);
+    let control = lock(&world).control.clone();
+    assert_eq!(control.note(NOTE.into()), Ok(1));
+    let (plan, mut sink) = (plan(), Sink::default());
+    let report = execute(&plan, header(&plan), rig(&world), &control, &mut sink);
+    assert!(matches!(report.end, RunEnd::Faulted(_)), "{report:?}");
+    let is_note = |r: &Record| matches!(r, Record::Note { text, .. } if text == NOTE);
+    assert!(sink.records.iter().any(is_note) && control.noted() == 1);
 }
 
 #[test]
