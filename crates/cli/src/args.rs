@@ -4,10 +4,10 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+use skinrig_protocol::PlantedFault;
 use skinrig_protocol::quantity::{self, Dimension};
 
 use crate::exit::Exit;
-use crate::fault::Fault;
 use crate::remote::What;
 
 /// Runs tactile-skin experiments: protocol, robot, event cameras, session, analysis, report.
@@ -214,9 +214,10 @@ pub struct RunArgs {
     #[arg(long, conflicts_with = "replay")]
     pub real_time: bool,
 
-    /// Make this fault on purpose, for tests: killed@record:N, killed@journal:N, killed@seal. Can be given several times.
+    /// Make this fault on purpose, for rehearsals on the simulated rig, such as camera1-stalled@hold:3 (docs/faults.md lists
+    /// them). Can be given several times.
     #[arg(long = "fault", value_name = "FAULT", conflicts_with = "replay")]
-    pub faults: Vec<Fault>,
+    pub faults: Vec<PlantedFault>,
 
     /// Folder for the session file, its results and its report.
     #[arg(long, value_name = "DIR", default_value = "sessions")]
@@ -253,9 +254,10 @@ pub struct ResumeArgs {
     #[arg(long)]
     pub allow_other_device: bool,
 
-    /// Make this fault on purpose, for tests: killed@record:N, killed@journal:N, killed@seal. Can be given several times.
+    /// Make this fault on purpose, for rehearsals on the simulated rig, such as camera1-stalled@hold:3 (docs/faults.md lists
+    /// them). Can be given several times.
     #[arg(long = "fault", value_name = "FAULT")]
-    pub faults: Vec<Fault>,
+    pub faults: Vec<PlantedFault>,
 }
 
 /// Arguments of `status`.

@@ -1,89 +1,41 @@
-//! Faults on purpose: `--fault KIND@WHERE:PARAMETER`.
-//!
-//! | fault | what happens |
-//! |---|---|
-//! | `killed@record:N` | the process is gone when it is to take its N-th record of the run, counted from 1 |
-//! | `killed@journal:N` | the same, counting only the records that tell of presses and of the run, not those of streams and motions |
-//! | `killed@seal` | the process is gone when the run has ended and its session is to be sealed |
+//! Faults on purpose that meet the records of a run: the process is gone, the disk is full. Those of devices: [`crate::rig::planted`].
 //!
 //! Gone means at once and without a word, as by `kill -9` or a power cut: no thread goes on, nothing is closed.
 
-use std::str::FromStr;
-
+use skinrig_controller::SinkFault;
 use skinrig_model::Record;
-
-/// A fault to be made.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Fault {
-    /// The process is gone.
-    Killed(Moment),
-}
-
-/// When the process is gone.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Moment {
-    /// Before its n-th record, from 1.
-    Record(u64),
-    /// Before its n-th record of the journal, from 1.
-    Journal(u64),
-    /// Before the session is sealed.
-    Seal,
-}
-
-impl FromStr for Fault {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let wrong =
-            || format!("expected killed@record:N, killed@journal:N or killed@seal, found {text}");
-        let place = text.strip_prefix("killed@").ok_or_else(wrong)?;
-        let (place, parameter) = match place.split_once(':') {
-            Some((place, parameter)) => (place, Some(parameter)),
-            None => (place, None),
-        };
-        let number = || {
-            let n = parameter.and_then(|p| p.parse().ok());
-            n.filter(|n| *n > 0).ok_or_else(wrong)
-        };
-        match place {
-            "record" => Ok(Self::Killed(Moment::Record(number()?))),
-            "journal" => Ok(Self::Killed(Moment::Journal(number()?))),
-            "seal" if parameter.is_none() => Ok(Self::Killed(Moment::Seal)),
-            _ => Err(wrong()),
-        }
-    }
-}
+use skinrig_protocol::{FaultKind, FaultPhase, FaultTime, PlantedFault};
+use skinrig_recorder::RecorderError;
 
 /// Counts the records of a run and makes its faults.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Saboteur {
-    faults: Vec<Fault>,
-    records: u64,
-    journal: u64,
+    faults: Vec<PlantedFault>,
+    records: u32,
+    journal: u32,
+    presses: u32,
+    full: bool,
 }
 
 impl Saboteur {
-    /// Makes none.
+    /// Makes those of these faults that meet records.
     #[must_use]
-    pub const fn none() -> Self {
+    pub fn new(faults: &[PlantedFault]) -> Self {
         Self {
-            faults: Vec::new(),
-            records: 0,
-            journal: 0,
-        }
-    }
-
-    /// Makes these faults.
-    #[must_use]
-    pub fn new(faults: &[Fault]) -> Self {
-        Self {
-            faults: faults.to_vec(),
-            ..Self::none()
+            faults: faults
+                .iter()
+                .copied()
+                .filter(|fault| fault.kind.is_of_records())
+                .collect(),
+            ..Self::default()
         }
     }
 
     /// The next record is about to be taken.
-    pub fn before(&mut self, record: &Record) {
+    ///
+    /// # Errors
+    /// What a full disk answers, from its time on.
+    pub fn before(&mut self, record: &Record) -> Result<(), SinkFault> {
         self.records += 1;
         let streams = matches!(
             record,
@@ -93,51 +45,51 @@ impl Saboteur {
                 | Record::MarkSent(_)
                 | Record::BoxReports { .. }
         );
-        self.journal += u64::from(!streams);
-        let due = self.faults.iter().any(|fault| match *fault {
-            Fault::Killed(Moment::Record(n)) => n == self.records,
-            Fault::Killed(Moment::Journal(n)) => !streams && n == self.journal,
-            Fault::Killed(Moment::Seal) => false,
-        });
-        if due {
-            gone();
+        let intent = matches!(record, Record::Intent { .. });
+        self.journal += u32::from(!streams);
+        self.presses += u32::from(intent);
+        for fault in &self.faults {
+            let due = match fault.when {
+                FaultTime::Nth(FaultPhase::Record, n) => n == self.records,
+                FaultTime::Nth(FaultPhase::Journal, n) => !streams && n == self.journal,
+                FaultTime::Nth(FaultPhase::Press, n) => intent && n == self.presses,
+                _ => false,
+            };
+            match fault.kind {
+                FaultKind::Killed if due => gone(),
+                FaultKind::DiskFull if due => self.full = true,
+                _ => {}
+            }
         }
+        if self.full {
+            return Err(SinkFault(full()));
+        }
+        Ok(())
     }
 
     /// The session is about to be sealed.
-    pub fn before_the_seal(&self) {
-        if self.faults.contains(&Fault::Killed(Moment::Seal)) {
+    ///
+    /// # Errors
+    /// On a full disk.
+    pub fn before_the_seal(&self) -> Result<(), RecorderError> {
+        let killed =
+            |fault: &PlantedFault| fault.kind == FaultKind::Killed && fault.when == FaultTime::Seal;
+        if self.faults.iter().any(killed) {
             gone();
         }
+        if self.full {
+            return Err(RecorderError::Failed(full()));
+        }
+        Ok(())
     }
+}
+
+/// What SQLite says of a full disk.
+fn full() -> String {
+    "writing a record: database or disk is full (a fault on purpose)".to_owned()
 }
 
 /// Ends the process without unwinding.
 fn gone() -> ! {
     std::process::abort()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn faults_are_read_or_refused() {
-        let killed = |moment| Ok(Fault::Killed(moment));
-        assert_eq!("killed@record:7".parse(), killed(Moment::Record(7)));
-        assert_eq!("killed@journal:1".parse(), killed(Moment::Journal(1)));
-        assert_eq!("killed@seal".parse(), killed(Moment::Seal));
-        for wrong in [
-            "",
-            "killed",
-            "killed@record",
-            "killed@record:0",
-            "killed@record:x",
-            "killed@seal:1",
-            "asleep@record:1",
-        ] {
-            let refused = wrong.parse::<Fault>().unwrap_err();
-            assert!(refused.contains("expected killed@record:N"), "{refused}");
-        }
-    }
 }

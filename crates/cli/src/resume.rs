@@ -20,7 +20,7 @@ use crate::fault::Saboteur;
 use crate::paths;
 use crate::progress::ProgressView;
 use crate::results::RigDocument;
-use crate::rig::{self, bench, gates};
+use crate::rig::{self, bench, gates, planted};
 use crate::run::{close, conclude, host_name};
 use crate::signals::Operator;
 use crate::sink::{Foreknowledge, SessionSink};
@@ -272,10 +272,12 @@ fn open_rig(
         let level: SimLevel = level
             .parse()
             .map_err(|e| Failure::input(format!("{}: rig: {e}", args.session.display())))?;
-        let rig = rig::simulated(&protocol, level, header.seed, args.real_time);
+        let faults = &args.faults;
+        let rig = rig::simulated(&protocol, level, header.seed, args.real_time, faults);
         let mut preflight = gates::of_simulated(&rig, folder, summary.expected_bytes);
         preflight.made.insert(0, gates::recorder(&args.session));
-        return Ok((rig, preflight, Vec::new()));
+        let notes = planted::told(faults).into_iter().collect();
+        return Ok((rig, preflight, notes));
     }
     let path = match (&args.rig, found.document.rig["file_name"].as_str()) {
         (Some(file), _) => file.clone(),
@@ -288,6 +290,7 @@ fn open_rig(
         }
     };
     let file = bench::load(&path)?;
+    planted::refuse(&args.faults, &bench::display_name(&file))?;
     same_bench(&file, found)?;
     let rig = bench::open(&file, &protocol)?;
     let notes = same_devices(&rig, found, args.allow_other_device)?;

@@ -3,23 +3,23 @@
 use std::path::{Path, PathBuf};
 
 use chrono::{DateTime, SecondsFormat, Utc};
-use skinrig_controller::{Preflight, RunReport, execute, execute_checked};
+use skinrig_controller::{Preflight, Run, RunReport, execute_checked};
 use skinrig_device::Rig;
 use skinrig_model::{
     AnalysisSettings, CameraId, HostDuration, InterruptionKind, PressVerdict, RunEnd, RunHeader,
     SimLevel,
 };
-use skinrig_protocol::{Plan, Protocol};
+use skinrig_protocol::{Plan, PlantedFault, Protocol};
 use skinrig_recorder::{RecorderError, SessionReader, SessionWriter};
 
 use crate::args::RunArgs;
 use crate::check;
 use crate::exit::{Exit, Failure, Outcome};
-use crate::fault::{Fault, Saboteur};
+use crate::fault::Saboteur;
 use crate::paths;
 use crate::progress::ProgressView;
 use crate::results::{self, RigDocument};
-use crate::rig::{self, RepeatedOperator, bench, gates};
+use crate::rig::{self, RepeatedOperator, bench, gates, planted};
 use crate::signals::Operator;
 use crate::sink::{Foreknowledge, SessionSink};
 
@@ -50,7 +50,7 @@ pub struct Intent<'a> {
     /// What is known of the presses beforehand.
     pub known: Foreknowledge,
     /// Faults on purpose.
-    pub faults: &'a [Fault],
+    pub faults: &'a [PlantedFault],
 }
 
 /// Records `plan` on `rig` into a new session in `folder`, after the `preflight` when there is one: an import and a
@@ -86,13 +86,16 @@ pub fn record(
         });
     }
 
+    let mut settings = bench::settings(&rig.kind);
+    if intent.known.scheduled {
+        settings.camera_lag = None;
+    }
     let report = match preflight {
         Some(mut preflight) => {
             preflight.made.insert(0, gates::recorder(&path));
-            let settings = bench::settings(&rig.kind);
             execute_checked(plan, header, rig, control, &mut sink, preflight, settings)
         }
-        None => execute(plan, header, rig, control, &mut sink),
+        None => Run::with_settings(plan, header, rig, control, &mut sink, settings).execute(),
     };
     Ok((path, close(sink, report, operator)))
 }
@@ -295,17 +298,22 @@ fn fresh(
     let seed = args.seed.unwrap_or(protocol.seed);
     plan.seed = seed;
     let summary = plan.summary();
+    let faults = [&protocol.faults[..], &args.faults].concat();
     if !json {
         outln!("{summary}");
         outln!("rig       simulated ({level}), seed {seed}\n");
     }
-    let mut rig = rig::simulated(&protocol, level, seed, args.real_time);
+    if let Some(told) = planted::told(&faults) {
+        errln!("warning: {told}\n");
+    }
+    let mut rig = rig::simulated(&protocol, level, seed, args.real_time, &faults);
     if level < protocol.scene.level {
         // In the name, so that no report of this session can be read without it.
-        rig.name = format!(
-            "simulated ({level}, less than the scene needs: {})",
+        let short = format!(
+            "{level}, less than the scene needs: {}",
             protocol.scene.level
         );
+        rig.name = rig.name.replacen(level.name(), &short, 1);
         errln!(
             "warning: --level {level} is less than the protocol's scene needs ({}): what needs it is not in the data\n",
             protocol.scene.level
@@ -313,7 +321,7 @@ fn fresh(
     }
     let preflight = gates::of_simulated(&rig, &args.sessions, summary.expected_bytes);
     let intent = Intent {
-        faults: &args.faults,
+        faults: &faults,
         ..intent_of(&protocol, seed, summary.duration_s, command_line)
     };
     record(
@@ -336,6 +344,8 @@ fn on_bench(
     operator: &Operator,
 ) -> Result<(PathBuf, RunReport), Failure> {
     let file = bench::load(file)?;
+    let faults = [&protocol.faults[..], &args.faults].concat();
+    planted::refuse(&faults, &bench::display_name(&file))?;
     bench::tighten(&mut protocol, &file);
     let mut plan = protocol.compile();
     protocol.check(&plan).map_err(|found| {
@@ -356,10 +366,7 @@ fn on_bench(
     }
     let rig = bench::open(&file, &protocol)?;
     let preflight = gates::of_bench(&file, &rig, &args.sessions, summary.duration_s);
-    let intent = Intent {
-        faults: &args.faults,
-        ..intent_of(&protocol, seed, summary.duration_s, command_line)
-    };
+    let intent = intent_of(&protocol, seed, summary.duration_s, command_line);
     record(
         &intent,
         &plan,

@@ -40,14 +40,14 @@ pub struct SessionSink {
 impl SessionSink {
     /// A sink over a new session.
     #[must_use]
-    pub const fn new(writer: SessionWriter, view: ProgressView, known: Foreknowledge) -> Self {
+    pub fn new(writer: SessionWriter, view: ProgressView, known: Foreknowledge) -> Self {
         Self {
             writer,
             view,
             known,
             folder: None,
             notes: Vec::new(),
-            saboteur: Saboteur::none(),
+            saboteur: Saboteur::default(),
             remote: None,
         }
     }
@@ -91,7 +91,7 @@ impl SessionSink {
     /// [`RecorderError`]; the session stays readable.
     pub fn seal(mut self) -> Result<Sealed, RecorderError> {
         self.view.finish();
-        self.saboteur.before_the_seal();
+        self.saboteur.before_the_seal()?;
         self.writer.finish()
     }
 }
@@ -113,7 +113,7 @@ impl RecordSink for SessionSink {
         if let Record::Preflight(checks) = &record {
             self.view.say(&gates::table(checks));
         }
-        self.saboteur.before(&record);
+        self.saboteur.before(&record)?;
         // What is shown as done is on the disk. Bulk data, whose copy would cost, are only counted.
         let is_bulk = matches!(&record, Record::Chunk(_) | Record::Poses(_));
         let shown = if is_bulk {

@@ -10,6 +10,7 @@ use skinrig_model::{
 use skinrig_protocol::plan::Plan;
 
 use crate::checks::{Preflight, Watch};
+use crate::continuity::Continuity;
 use crate::control::{ControlHandle, Request};
 use crate::error::{ControllerError, Halt};
 use crate::guard::GuardedIndenter;
@@ -30,6 +31,11 @@ pub(crate) struct OpenPress {
     pub(crate) marks: Vec<MarkKind>,
     pub(crate) lost: [u64; 2],
     pub(crate) bytes: [u64; 2],
+    pub(crate) events: [u64; 2],
+    /// When its intent was made.
+    pub(crate) began: HostTime,
+    /// What spoilt its data, besides lost bytes.
+    pub(crate) spoilt: Vec<String>,
 }
 
 /// Everything that a run holds. Dropped before its end, it brings the rig to rest first.
@@ -74,6 +80,7 @@ pub(crate) struct Core<'a> {
     marks_since: HostTime,
     line_free_at: HostTime,
     next_seq: [Option<u64>; 2],
+    pub(crate) continuity: [Continuity; 2],
     poses: Vec<PoseSample>,
     fresh: Vec<PoseSample>,
     chunks: Vec<RawChunk>,
@@ -130,6 +137,7 @@ impl<'a> Core<'a> {
             marks_since: HostTime::ZERO,
             line_free_at: HostTime::ZERO,
             next_seq: [None; 2],
+            continuity: [Continuity::default(); 2],
             poses: Vec::new(),
             fresh: Vec::new(),
             chunks: Vec::new(),
@@ -304,13 +312,15 @@ impl<'a> Core<'a> {
             if let Some(open) = &mut self.open {
                 open.lost[i] += chunk.lost_before;
                 open.bytes[i] += chunk.bytes.len() as u64;
+                open.events[i] += chunk.facts.cd_events;
             }
             self.suspender.count(&chunk);
             if let Some(watch) = &mut self.watch {
                 watch.see(&chunk);
             }
+            let followed = self.follow_stream(&chunk);
             let emitted = self.journal.emit(Record::Chunk(chunk));
-            answer = answer.and(emitted);
+            answer = answer.and(followed).and(emitted);
         }
         answer
     }

@@ -196,6 +196,19 @@ pub enum ControllerError {
     /// The operator switched the motors off.
     #[error("operator: halt; the motors are off, the tip was left where it was")]
     Halted,
+    /// A camera's clock was set forward.
+    #[error(
+        "{camera}: expected its time to go with the host's within {limit}, found it set forward by {found}; \
+         go on with a further leg, which has a clock of its own"
+    )]
+    ClockStep {
+        /// Which camera.
+        camera: skinrig_model::CameraId,
+        /// By how much it may be off.
+        limit: HostDuration,
+        /// By how much it is.
+        found: HostDuration,
+    },
     /// What suspended the run went on for too long.
     #[error("{reason}; expected it to be over within {limit}")]
     Suspended {

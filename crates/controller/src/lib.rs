@@ -31,6 +31,7 @@
 
 mod arming;
 pub mod checks;
+mod continuity;
 pub mod control;
 mod core;
 mod ending;

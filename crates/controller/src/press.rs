@@ -44,11 +44,15 @@ impl Core<'_> {
             marks: step.marks.clone(),
             lost: [0; 2],
             bytes: [0; 2],
+            events: [0; 2],
+            began: t,
+            spoilt: Vec::new(),
         });
         self.touch = None;
         // A durable intent may have taken a while: know the present pose before moving.
         self.observe()?;
         let trouble = self.press_motion(step)?;
+        self.await_streams()?;
         Ok(self.close_press(trouble)?)
     }
 
@@ -213,6 +217,7 @@ impl Core<'_> {
             flushed?;
         }
         self.emit_poses()?;
+        self.weigh_storm();
         let Some(open) = &self.open else {
             return Ok(false);
         };
@@ -222,4 +227,9 @@ impl Core<'_> {
         self.open = None;
         Ok(again)
     }
+}
+
+/// When the tip was back at clearance height.
+pub(crate) fn cleared_at(open: &OpenPress) -> Option<HostTime> {
+    open.tracker.as_ref().and_then(PressTracker::clear)
 }

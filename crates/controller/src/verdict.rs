@@ -59,6 +59,7 @@ pub(crate) fn judge(open: &OpenPress, trouble: Option<Trouble>) -> (PressOutcome
             troubles.push(Trouble::passing(format!("{camera} sent no bytes")));
         }
     }
+    troubles.extend(open.spoilt.iter().cloned().map(Trouble::passing));
     let again = !troubles.is_empty() && troubles.iter().all(|t| t.again);
     let reasons: Vec<String> = troubles.into_iter().map(|t| t.reason).collect();
     let tracker = open.tracker.as_ref();

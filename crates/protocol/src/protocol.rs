@@ -10,6 +10,7 @@ use skinrig_model::{
 
 use crate::area::Surroundings;
 use crate::diagnostic::Diagnostics;
+use crate::faults::PlantedFault;
 use crate::plan::{Plan, RunLimits};
 use crate::retakes::Retakes;
 use crate::surface::Surface;
@@ -72,6 +73,9 @@ pub struct Protocol {
     pub surface_check: Option<SurfaceCheck>,
     /// When the run waits by itself.
     pub suspend: Suspend,
+    /// Faults made on purpose; none in a real protocol.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub faults: Vec<PlantedFault>,
     /// Moments that emit a mark on the trigger line.
     pub marks: Vec<MarkKind>,
     /// How presses find the surface; `None`: as the rig says, at z = 0 when it says nothing.

@@ -12,7 +12,7 @@ use skinrig_model::{
 use crate::camera_stream::{Outgoing, Streaming};
 use crate::config::SimConfig;
 use crate::drifting::DriftingClock;
-use crate::faults::{Fault, When};
+use crate::faults::{Fault, STORM_NS, When};
 use crate::line::LineEdge;
 use crate::random::{Purpose, Stream};
 use crate::scene::{GRID_NS, PixelModel};
@@ -48,6 +48,10 @@ pub struct SimCamera {
     read_back_fault: bool,
     lost: Vec<(When, u64)>,
     unplug: Option<When>,
+    stall: Option<When>,
+    storms: Vec<When>,
+    steps: Vec<(When, u32)>,
+    buffer_bytes: usize,
     make_pixels: PixelFactory,
     random: Stream,
     draw_clock: crate::config::CameraClockConfig,
@@ -70,7 +74,8 @@ impl SimCamera {
         make_pixels: PixelFactory,
     ) -> Self {
         let mut lost = Vec::new();
-        let mut unplug = None;
+        let (mut unplug, mut stall) = (None, None);
+        let (mut storms, mut steps) = (Vec::new(), Vec::new());
         let mut read_back_fault = false;
         for fault in &config.faults {
             match *fault {
@@ -83,6 +88,13 @@ impl SimCamera {
                 }
                 Fault::CameraUnplugged { camera, when } if camera == id => unplug = Some(when),
                 Fault::CameraReadBack(camera) if camera == id => read_back_fault = true,
+                Fault::CameraStalled { camera, when } if camera == id => stall = Some(when),
+                Fault::HotPixelStorm { camera, when } if camera == id => storms.push(when),
+                Fault::ClockStep {
+                    camera,
+                    when,
+                    by_us,
+                } if camera == id => steps.push((when, by_us)),
                 _ => {}
             }
         }
@@ -95,6 +107,10 @@ impl SimCamera {
             read_back_fault,
             lost,
             unplug,
+            stall,
+            storms,
+            steps,
+            buffer_bytes: config.camera_clock.buffer_bytes.max(4) / 4 * 4,
             make_pixels,
             random: Stream::new(config.seed, Purpose::CameraClock, id.index() as u64),
             draw_clock: config.camera_clock,
@@ -183,7 +199,7 @@ impl SimCamera {
             return;
         };
         let index = self.id.index();
-        let (unplugged_ns, losses) = {
+        let struck = {
             let mut world = self.shared.world();
             world.tips_since(index, stream.grid, &mut stream.tips);
             let jitter = |random: &mut Stream| (random.unit() * self.jitter_ns as f64) as i64;
@@ -195,26 +211,60 @@ impl SimCamera {
                 stream.edges.push_back(LineEdge { t_ns, ..edge });
             }
             stream.grid = world.grid();
-            struck(&world, self.unplug, &mut self.lost)
+            Struck {
+                unplugged_ns: known(&world, self.unplug),
+                stalled_ns: known(&world, self.stall),
+                storms_ns: self
+                    .storms
+                    .iter()
+                    .filter_map(|s| world.struck_at(*s))
+                    .collect(),
+                losses: take_known(&world, &mut self.lost),
+                steps: take_known(&world, &mut self.steps),
+            }
         };
-        let Some(clock) = self.clock else { return };
+        let Some(mut clock) = self.clock else { return };
+        // What nobody has fetched for too long is lost, newest first.
+        let mut room = self.buffer_bytes;
         let tips = std::mem::take(&mut stream.tips);
         for pair in tips.windows(2) {
             let (from, to) = (pair[0], pair[1]);
-            if unplugged_ns.is_some_and(|t| t <= from.t_ns) {
+            if struck.unplugged_ns.is_some_and(|t| t <= from.t_ns) {
                 self.gone = true;
                 break;
             }
-            let lose: u64 = losses
+            let within = |t: &i64| (from.t_ns..to.t_ns).contains(t);
+            let lose: u64 = struck
+                .losses
                 .iter()
-                .filter(|(t, _)| (from.t_ns..to.t_ns).contains(t))
+                .filter(|(t, _)| within(t))
                 .map(|(_, words)| words * 4)
                 .sum();
             if lose > 0 {
                 self.out.close(self.id, &mut self.scanner);
                 self.out.to_lose += lose;
             }
-            stream.step(from, to, clock, &self.settings);
+            for (_, by_us) in struck.steps.iter().filter(|(t, _)| within(t)) {
+                clock = clock.stepped(i64::from(*by_us));
+                self.clock = Some(clock);
+                stream.encoder = evt2::Encoder::new(clock.own_us(from.t_ns));
+            }
+            let stormy = |t: &i64| (*t..*t + STORM_NS).contains(&from.t_ns);
+            let storm = struck.storms_ns.iter().any(stormy);
+            stream.step(from, to, clock, &self.settings, storm);
+            if struck.stalled_ns.is_some_and(|t| t <= from.t_ns) {
+                stream.fresh.clear();
+                continue;
+            }
+            if stream.fresh.len() > room {
+                if self.out.lost_before == 0 {
+                    self.out.close(self.id, &mut self.scanner);
+                }
+                self.out.lost_before += stream.fresh.len() as u64;
+                stream.fresh.clear();
+                continue;
+            }
+            room -= stream.fresh.len();
             self.out.take(
                 &mut stream.fresh,
                 HostTime(to.t_ns),
@@ -235,23 +285,32 @@ impl SimCamera {
     }
 }
 
-/// When the camera is unplugged, and the losses that have struck, both on world time.
-fn struck(
-    world: &World,
-    unplug: Option<When>,
-    lost: &mut Vec<(When, u64)>,
-) -> (Option<i64>, Vec<(i64, u64)>) {
+/// Faults of a camera on world time, ns.
+struct Struck {
+    unplugged_ns: Option<i64>,
+    stalled_ns: Option<i64>,
+    storms_ns: Vec<i64>,
+    losses: Vec<(i64, u64)>,
+    steps: Vec<(i64, u32)>,
+}
+
+/// When a fault struck, when it did before the present.
+fn known(world: &World, when: Option<When>) -> Option<i64> {
     let now_ns = world.grid() * GRID_NS;
-    let known = |when: When| world.struck_at(when).filter(|&t| t < now_ns);
-    let mut losses = Vec::new();
-    lost.retain(|&(when, words)| match known(when) {
+    world.struck_at(when?).filter(|&t| t < now_ns)
+}
+
+/// Takes those faults that struck before the present, with the instant.
+fn take_known<T: Copy>(world: &World, faults: &mut Vec<(When, T)>) -> Vec<(i64, T)> {
+    let mut struck = Vec::new();
+    faults.retain(|&(when, what)| match known(world, Some(when)) {
         Some(t) => {
-            losses.push((t, words));
+            struck.push((t, what));
             false
         }
         None => true,
     });
-    (unplug.and_then(known), losses)
+    struck
 }
 
 impl EventCamera for SimCamera {

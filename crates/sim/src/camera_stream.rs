@@ -4,12 +4,15 @@ use std::collections::VecDeque;
 
 use skinrig_device::CameraSettings;
 use skinrig_formats::{Scanner, evt2};
-use skinrig_model::{CameraId, CdEvent, HostTime, RawChunk, TriggerEdge};
+use skinrig_model::{
+    CameraId, CdEvent, HostTime, Polarity, RawChunk, SENSOR_HEIGHT, SENSOR_WIDTH, TriggerEdge,
+};
 
 use crate::camera::TRIGGER_CHANNEL;
 use crate::drifting::DriftingClock;
+use crate::faults::{STORM_PER_MS, STORM_PIXELS};
 use crate::line::LineEdge;
-use crate::scene::{PixelEvent, PixelModel, TipSample};
+use crate::scene::{GRID_NS, PixelEvent, PixelModel, TipSample};
 
 /// What exists only while streaming.
 pub(crate) struct Streaming {
@@ -40,17 +43,21 @@ pub(crate) struct Outgoing {
 }
 
 impl Streaming {
-    /// One grid step: its events and edges as bytes in `fresh`.
+    /// One grid step, in a `storm` or not: its events and edges as bytes in `fresh`.
     pub fn step(
         &mut self,
         from: TipSample,
         to: TipSample,
         clock: DriftingClock,
         set: &CameraSettings,
+        storm: bool,
     ) {
         self.events.clear();
         if let Some(pixels) = &mut self.pixels {
             pixels.advance(&[from, to], &mut self.events);
+        }
+        if storm {
+            blow(from.t_ns, &mut self.events);
         }
         let triggered = set.trigger_channels.contains(&TRIGGER_CHANNEL);
         for event in &self.events {
@@ -86,6 +93,26 @@ impl Streaming {
             .advance_to(clock.own_us(to.t_ns), &mut self.fresh);
         debug_assert!(reached.is_ok(), "time ran backwards: {reached:?}");
     }
+}
+
+/// Adds a millisecond of a storm of hot pixels to the events from `from_ns` on.
+fn blow(from_ns: i64, events: &mut Vec<PixelEvent>) {
+    for pixel in 0..STORM_PIXELS {
+        for n in 0..STORM_PER_MS {
+            // Spread over the sensor and over the millisecond by steps that share no factor with their ranges.
+            events.push(PixelEvent {
+                t_ns: from_ns + (n * GRID_NS / STORM_PER_MS + i64::from(pixel) * 997) % GRID_NS,
+                x: pixel * 211 % SENSOR_WIDTH,
+                y: pixel * 97 % SENSOR_HEIGHT,
+                polarity: if n % 2 == 0 {
+                    Polarity::On
+                } else {
+                    Polarity::Off
+                },
+            });
+        }
+    }
+    events.sort_by_key(|event| event.t_ns);
 }
 
 fn encode_edge(

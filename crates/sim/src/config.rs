@@ -22,6 +22,8 @@ pub struct CameraClockConfig {
     pub trigger_jitter_ns: i64,
     /// A full chunk, bytes; a multiple of 4.
     pub chunk_bytes: usize,
+    /// Bytes that wait for the host at most; what comes beyond is lost and counted.
+    pub buffer_bytes: usize,
 }
 
 impl Default for CameraClockConfig {
@@ -31,6 +33,7 @@ impl Default for CameraClockConfig {
             max_origin_s: 100.0,
             trigger_jitter_ns: 2_500,
             chunk_bytes: 1 << 20,
+            buffer_bytes: 64 << 20,
         }
     }
 }

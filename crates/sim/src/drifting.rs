@@ -33,6 +33,13 @@ impl DriftingClock {
         if ns < 0 { 0 } else { ns as u64 / 1_000 }
     }
 
+    /// The same clock, set forward by `by_us`.
+    #[must_use]
+    pub const fn stepped(mut self, by_us: i64) -> Self {
+        self.origin_ns += by_us * 1_000;
+        self
+    }
+
     /// What the clock gains on world time in `passed` ns.
     const fn gained_ns(&self, passed: i64) -> i64 {
         // Whole and broken seconds apart, so that no product leaves 64 bits in any run.

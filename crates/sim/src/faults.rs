@@ -9,6 +9,26 @@ pub enum When {
     At(HostTime),
     /// When the tip touches the skin for the n-th time, counted from 0.
     Contact(u32),
+    /// When this moment comes for the n-th time, counted from 0.
+    Moment(Moment, u32),
+}
+
+/// A moment of a run as the simulated robot sees it. Every way down counts, also one that looks for the surface and one of
+/// an attempt that did not succeed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Moment {
+    /// The motors are switched on.
+    Arming,
+    /// The tip is sent sideways above the skin.
+    Travel,
+    /// The tip is sent down to the skin.
+    Approach,
+    /// The set point comes to rest in the skin.
+    Hold,
+    /// The tip is sent up out of the skin.
+    Retract,
+    /// The set point comes to rest above the skin after a way up.
+    Between,
 }
 
 /// Something that goes wrong.
@@ -24,6 +44,12 @@ pub enum Fault {
         /// 1 to 100.
         percent: u32,
     },
+    /// The tip stays where it is, whatever the robot is told; its pose stream goes on.
+    IndenterStuck(When),
+    /// For [`SPIKE_NS`] the robot reports [`SPIKE_N`] more than it feels.
+    ForceSpike(When),
+    /// No pose sample comes any more, and no error either.
+    PosesStale(When),
     /// A limit reads back with another value than written. Seen as
     /// [`skinrig_device::DeviceError::ReadBack`].
     IndenterReadBack,
@@ -43,6 +69,29 @@ pub enum Fault {
         when: When,
         /// How many words.
         words: u64,
+    },
+    /// A camera sends nothing any more, and no error either.
+    CameraStalled {
+        /// Which.
+        camera: CameraId,
+        /// When.
+        when: When,
+    },
+    /// [`STORM_PIXELS`] pixels of a camera send [`STORM_PER_MS`] events per millisecond each, for [`STORM_NS`].
+    HotPixelStorm {
+        /// Which.
+        camera: CameraId,
+        /// When.
+        when: When,
+    },
+    /// The camera's clock is set forward.
+    ClockStep {
+        /// Which.
+        camera: CameraId,
+        /// When.
+        when: When,
+        /// By how much, µs.
+        by_us: u32,
     },
     /// A bias reads back with another value than written. Seen as
     /// [`skinrig_device::DeviceError::ReadBack`].
@@ -68,6 +117,23 @@ pub enum Fault {
         /// Edges that nobody sent, anywhere within a train.
         spurious_percent: u8,
     },
+    /// The next mark reaches no camera, reaches both twice, or late; the box tells that it was sent as ever.
+    Mark {
+        /// What becomes of it.
+        fate: MarkFate,
+        /// From when on the next mark is meant.
+        when: When,
+    },
+    /// From then on the trigger inputs of both cameras lose, double and invent edges, a fifth of each, and what the box sends to the
+    /// host is unreadable every now and then. Seen as [`skinrig_device::DeviceError::State`] when it is polled.
+    TriggerBoxNoisy(When),
+    /// The program is held up so long, as by a recorder that is slow: nobody looks at any device meanwhile.
+    HostHeldUp {
+        /// When.
+        when: When,
+        /// For so long, ms.
+        for_ms: u32,
+    },
     /// The trigger box answers no more. Seen as [`skinrig_device::DeviceError::Lost`].
     TriggerBoxLost(When),
     /// The n-th contact, counted from 0, gives no events in a camera (geometric level).
@@ -78,3 +144,27 @@ pub enum Fault {
         contact: u32,
     },
 }
+
+/// What becomes of a mark.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum MarkFate {
+    /// No pulse of it arrives.
+    Lost,
+    /// It arrives twice, one after the other.
+    Doubled,
+    /// It arrives [`DELAY_NS`] late.
+    Delayed,
+}
+
+/// How late a delayed mark arrives, ns.
+pub const DELAY_NS: i64 = 20_000_000;
+/// How long a force spike lasts, ns.
+pub const SPIKE_NS: i64 = 50_000_000;
+/// How high it is, N: more than the robot can push.
+pub const SPIKE_N: f64 = 20.0;
+/// How many pixels take part in a storm.
+pub const STORM_PIXELS: u16 = 40;
+/// Events of each of them per millisecond.
+pub const STORM_PER_MS: i64 = 20;
+/// How long a storm lasts, ns.
+pub const STORM_NS: i64 = 300_000_000;

@@ -16,6 +16,7 @@ pub struct SimIndenter {
     max_acceleration_mm_s2: f64,
     limits: Option<MotionLimits>,
     lost: Option<When>,
+    stale: Option<When>,
     read_back_fault: bool,
 }
 
@@ -27,6 +28,10 @@ impl SimIndenter {
             Fault::IndenterLost(when) => Some(*when),
             _ => None,
         });
+        let stale = config.faults.iter().find_map(|f| match f {
+            Fault::PosesStale(when) => Some(*when),
+            _ => None,
+        });
         Self {
             shared,
             serial: format!("sim-{:08x}-r", config.seed as u32),
@@ -34,6 +39,7 @@ impl SimIndenter {
             max_acceleration_mm_s2: config.motion.acceleration_mm_s2,
             limits: None,
             lost,
+            stale,
             read_back_fault: config.faults.contains(&Fault::IndenterReadBack),
         }
     }
@@ -101,7 +107,7 @@ impl Indenter for SimIndenter {
                 "without limits",
             ));
         }
-        world.motion.power_on();
+        world.power_on();
         Ok(())
     }
 
@@ -131,7 +137,11 @@ impl Indenter for SimIndenter {
         let mut world = self.shared.world();
         let from = samples.len();
         world.take_samples(samples);
-        if let Some(at) = self.lost.and_then(|when| world.struck_at(when)) {
+        for at in [self.lost, self.stale]
+            .into_iter()
+            .flatten()
+            .filter_map(|when| world.struck_at(when))
+        {
             let new = samples.split_off(from);
             samples.extend(new.into_iter().filter(|s| s.t.0 < at));
         }

@@ -13,8 +13,10 @@ pub mod config;
 pub mod drifting;
 pub mod faults;
 pub mod geometric;
+mod held_up;
 pub mod indenter;
 pub mod line;
+pub mod moments;
 pub mod motion;
 pub mod optical;
 pub mod random;
@@ -26,5 +28,5 @@ pub mod world;
 
 pub use clock::{Paced, SimClock};
 pub use config::SimConfig;
-pub use faults::{Fault, When};
+pub use faults::{Fault, MarkFate, Moment, When};
 pub use rig::{in_real_time, simulated_rig};

@@ -7,7 +7,7 @@ use skinrig_model::{BoxReport, BoxTime, CameraId, Mark, PulseTrain};
 
 use crate::config::SimConfig;
 use crate::drifting::DriftingClock;
-use crate::faults::Fault;
+use crate::faults::{DELAY_NS, Fault, MarkFate};
 use crate::random::{Purpose, Stream};
 
 /// An edge on a camera's trigger input, on world time.
@@ -49,6 +49,10 @@ pub struct Line {
     /// A periodic train may start then, world time, ns: a whole train after the first edge of the one before.
     sync_after_ns: i64,
     lost_pulses: Vec<(CameraId, u32, u32)>,
+    /// What becomes of the next marks.
+    doomed: VecDeque<MarkFate>,
+    /// Faults whose mark was found.
+    done: Vec<usize>,
     noise: [Noise; 2],
     random: [Stream; 2],
     /// Edges that the cameras have not taken yet.
@@ -99,6 +103,8 @@ impl Line {
             busy_until_ns: 0,
             sync_after_ns: 0,
             lost_pulses,
+            doomed: VecDeque::new(),
+            done: Vec::new(),
             noise,
             random: [random(3), random(4)],
             edges: [VecDeque::new(), VecDeque::new()],
@@ -111,6 +117,24 @@ impl Line {
     #[must_use]
     pub const fn clock(&self) -> DriftingClock {
         self.clock
+    }
+
+    /// From now on edges of both cameras are lost, doubled and invented.
+    pub const fn get_noisy(&mut self) {
+        let noise = Noise {
+            lost: 20.0,
+            doubled: 20.0,
+            spurious: 20.0,
+        };
+        self.noise = [noise; 2];
+    }
+
+    /// Fault `n` meets the next mark.
+    pub fn doom(&mut self, n: usize, fate: MarkFate) {
+        if !self.done.contains(&n) {
+            self.done.push(n);
+            self.doomed.push_back(fate);
+        }
     }
 
     /// Sends the periodic trains that are due by `now_ns`; one that finds the line taken waits until it is free.
@@ -145,11 +169,26 @@ impl Line {
     pub fn send(&mut self, mark: Mark, train: PulseTrain, rise_ns: i64, until_ns: i64) {
         let at = self.time(rise_ns);
         self.tell(rise_ns, BoxReport::Mark { mark, at });
-        self.put(train, rise_ns, Some(self.marks));
+        let fate = self.doomed.pop_front();
+        let late_ns = match fate {
+            None | Some(MarkFate::Lost) => 0,
+            Some(MarkFate::Doubled) => TRAIN_NS,
+            Some(MarkFate::Delayed) => DELAY_NS,
+        };
+        let (first, second) = match fate {
+            None => (Some(rise_ns), None),
+            Some(MarkFate::Lost) => (None, None),
+            Some(MarkFate::Doubled) => (Some(rise_ns), Some(rise_ns + late_ns)),
+            Some(MarkFate::Delayed) => (Some(rise_ns + late_ns), None),
+        };
+        for at_ns in [first, second].into_iter().flatten() {
+            self.put(train, at_ns, Some(self.marks));
+        }
         self.marks += 1;
-        self.busy_until_ns = until_ns;
+        // No other train comes into this one's way.
+        self.busy_until_ns = until_ns + late_ns;
         // What the host was told is free a latency earlier than the line is.
-        self.sync_after_ns = rise_ns + TRAIN_NS;
+        self.sync_after_ns = rise_ns + late_ns + TRAIN_NS;
     }
 
     /// The contact input changed at `t_ns`.

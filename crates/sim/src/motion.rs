@@ -62,6 +62,8 @@ pub struct Motion {
     powered: bool,
     /// Factor on the lag's frequency; a fault makes it small.
     pub sluggish: f64,
+    /// The tip does not move, by a fault.
+    pub stuck: bool,
 }
 
 impl Motion {
@@ -79,6 +81,7 @@ impl Motion {
             wander: [0.0; 3],
             powered: false,
             sluggish: 1.0,
+            stuck: false,
         }
     }
 
@@ -114,6 +117,12 @@ impl Motion {
     /// Sends the set point to `target` along a straight line.
     pub fn move_to(&mut self, target: Point3<Robot>, speed_mm_s: f64) {
         self.target = Some((target.to_array(), speed_mm_s));
+    }
+
+    /// True when the set point does not move.
+    #[must_use]
+    pub fn is_at_rest(&self) -> bool {
+        self.set_velocity == [0.0; 3]
     }
 
     /// Brings the set point to rest.
@@ -192,7 +201,7 @@ impl Motion {
         let kick = c.wander_mm * (1.0 - keep * keep).sqrt();
         for i in 0..3 {
             let noise = self.noise.gauss();
-            if !self.powered {
+            if !self.powered || self.stuck {
                 continue; // the brakes hold; the draw keeps the streams of both cases in step
             }
             let pull = w * w * (self.set_point[i] - self.tip[i]);

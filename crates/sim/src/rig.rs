@@ -8,6 +8,7 @@ use crate::clock::{Boxed, Paced};
 use crate::config::SimConfig;
 use crate::faults::Fault;
 use crate::geometric::GeometricModel;
+use crate::held_up::HeldUp;
 use crate::indenter::SimIndenter;
 use crate::optical::OpticalModel;
 use crate::random::{Purpose, derive_seed};
@@ -35,7 +36,10 @@ pub fn simulated_rig(config: &SimConfig) -> Rig {
         cameras: CameraId::ALL.map(camera),
         camera_settings: [settings.clone(), settings],
         trigger_box: Some(trigger_box),
-        clock: Box::new(shared.clock.clone()),
+        clock: match HeldUp::new(shared.clone(), &config.faults) {
+            Some(held_up) => Box::new(held_up),
+            None => Box::new(shared.clock.clone()),
+        },
         robot_from_skin: config.robot_from_skin,
         geometry: RigGeometry {
             outline: config.outline,
@@ -138,6 +142,7 @@ pub fn describe(config: &SimConfig) -> String {
             "max_origin_s": c.max_origin_s,
             "trigger_jitter_ns": c.trigger_jitter_ns,
             "chunk_bytes": c.chunk_bytes,
+            "buffer_bytes": c.buffer_bytes,
         },
         "trigger_box": {
             "min_latency_ns": t.min_latency_ns,

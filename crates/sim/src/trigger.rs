@@ -12,6 +12,9 @@ use crate::faults::{Fault, When};
 use crate::random::{Purpose, Stream};
 use crate::world::Shared;
 
+/// A noisy box sends something unreadable once in this time, ns.
+const NOISE_EVERY_NS: i64 = 1_000_000_000;
+
 /// A simulated trigger box.
 pub struct SimTriggerBox {
     shared: Shared,
@@ -24,6 +27,9 @@ pub struct SimTriggerBox {
     /// An exchange whose answer is still under way.
     exchange: Option<(i64, BoxReport)>,
     lost: Option<When>,
+    noisy: Option<When>,
+    /// When something unreadable came last, ns.
+    noise_ns: Option<i64>,
 }
 
 impl SimTriggerBox {
@@ -32,6 +38,10 @@ impl SimTriggerBox {
     pub fn new(config: &SimConfig, shared: Shared) -> Self {
         let lost = config.faults.iter().find_map(|fault| match fault {
             Fault::TriggerBoxLost(when) => Some(*when),
+            _ => None,
+        });
+        let noisy = config.faults.iter().find_map(|fault| match fault {
+            Fault::TriggerBoxNoisy(when) => Some(*when),
             _ => None,
         });
         Self {
@@ -43,6 +53,8 @@ impl SimTriggerBox {
             next_exchange_ns: 0,
             exchange: None,
             lost,
+            noisy,
+            noise_ns: None,
         }
     }
 
@@ -148,8 +160,19 @@ impl TriggerBox for SimTriggerBox {
             } else if let Some((_, report)) = self.exchange.take_if(|(t_ns, _)| *t_ns <= now.0) {
                 reports.push(report);
             } else {
-                return Ok(());
+                break;
             }
         }
+        let due_ns = self.noise_ns.map_or(0, |t_ns| t_ns + NOISE_EVERY_NS);
+        if self.noisy.is_some_and(|when| world.has_struck(when)) && now.0 >= due_ns {
+            self.noise_ns = Some(now.0);
+            return Err(DeviceError::State {
+                role: DeviceRole::TriggerBox,
+                serial: self.serial.clone(),
+                expected: "a readable report".to_owned(),
+                found: "noise on the serial line".to_owned(),
+            });
+        }
+        Ok(())
     }
 }

@@ -12,8 +12,9 @@ use skinrig_model::{HostTime, Point3, RigidTransform, Robot, Skin};
 
 use crate::clock::SimClock;
 use crate::config::SimConfig;
-use crate::faults::{Fault, When};
+use crate::faults::{Fault, SPIKE_N, SPIKE_NS, When};
 use crate::line::Line;
+use crate::moments::Moments;
 use crate::motion::Motion;
 use crate::scene::{GRID_NS, TipSample};
 
@@ -38,6 +39,7 @@ pub struct World {
     pub line: Line,
     contacts: u32,
     contact_times: Vec<i64>,
+    moments: Moments,
     touching: bool,
     last_z_mm: f64,
     force_limit_n: f64,
@@ -64,6 +66,7 @@ impl World {
             line: Line::new(config),
             contacts: 0,
             contact_times: Vec::new(),
+            moments: Moments::default(),
             touching: false,
             last_z_mm: config.start.z_mm,
             force_limit_n: f64::INFINITY,
@@ -88,12 +91,15 @@ impl World {
     }
 
     fn apply_faults(&mut self) {
-        for fault in &self.faults {
-            match *fault {
+        for n in 0..self.faults.len() {
+            match self.faults[n] {
                 Fault::Sluggish { when, percent } if self.has_struck(when) => {
                     self.motion.sluggish = f64::from(percent) / 100.0;
                 }
                 Fault::IndenterLost(when) if self.has_struck(when) => self.motion.power_off(),
+                Fault::IndenterStuck(when) if self.has_struck(when) => self.motion.stuck = true,
+                Fault::TriggerBoxNoisy(when) if self.has_struck(when) => self.line.get_noisy(),
+                Fault::Mark { fate, when } if self.has_struck(when) => self.line.doom(n, fate),
                 _ => {}
             }
         }
@@ -118,7 +124,18 @@ impl World {
             self.line.input(passed(LEFT_MM), false);
         }
         self.last_z_mm = position.z_mm;
-        let (force_n, felt_n) = self.motion.force_n(-position.z_mm, rate);
+        if self.motion.is_at_rest() {
+            self.moments.at_rest(t_ns, self.touching);
+        }
+        let (force_n, mut felt_n) = self.motion.force_n(-position.z_mm, rate);
+        for fault in &self.faults {
+            if let Fault::ForceSpike(when) = *fault
+                && let Some(from_ns) = self.struck_at(when)
+                && (from_ns..from_ns + SPIKE_NS).contains(&t_ns)
+            {
+                felt_n += SPIKE_N;
+            }
+        }
         self.overloaded = force_n > self.force_limit_n;
         if self.overloaded && !self.rising {
             self.tripped = true;
@@ -157,6 +174,7 @@ impl World {
         match when {
             When::At(t) => Some(t.0),
             When::Contact(n) => self.contact_times.get(n as usize).copied(),
+            When::Moment(moment, n) => self.moments.when(moment, n),
         }
     }
 
@@ -184,10 +202,19 @@ impl World {
         self.tripped || self.overloaded
     }
 
+    /// Switches the motors on.
+    pub fn power_on(&mut self) {
+        self.motion.power_on();
+        self.moments.armed(self.grid * GRID_NS);
+    }
+
     /// Sends the robot to `target`.
     pub fn move_to(&mut self, target: Point3<Robot>, speed_mm_s: f64, rises: bool) {
         self.rising = rises;
         self.tripped &= !rises;
+        let from = self.skin_from_robot.apply(self.motion.set_point());
+        let to = self.skin_from_robot.apply(target);
+        self.moments.sent(self.grid * GRID_NS, from, to);
         self.motion.move_to(target, speed_mm_s);
     }
 

@@ -97,10 +97,15 @@ const SLOW_SPEED: HostDuration = HostDuration::from_millis(200);
 #[must_use]
 pub fn settings(kind: &str) -> ControllerSettings {
     let mut settings = ControllerSettings::default();
+    // What is imported came when its times say, and may be sparse.
+    if kind == "imported" {
+        settings.camera_lag = None;
+    }
     if kind == RigKind::Emulated.name() {
         settings.stale_after = SLOW_STALE;
         settings.late_after = SLOW_LATE;
         settings.speed_over = SLOW_SPEED;
+        settings.camera_lag = Some(SLOW_LATE);
     }
     settings
 }

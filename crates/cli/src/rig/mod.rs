@@ -3,13 +3,14 @@
 pub mod bench;
 pub mod evt3_camera;
 pub mod gates;
+pub mod planted;
 
 use std::path::Path;
 
 use skinrig_controller::ControlHandle;
 use skinrig_device::{CameraSettings, Clock, Rig, Roi};
 use skinrig_model::{HostTime, InterruptionKind, RunHeader, SimLevel};
-use skinrig_protocol::{CameraRequest, Protocol};
+use skinrig_protocol::{CameraRequest, PlantedFault, Protocol};
 use skinrig_sim::replay::{RecordedRig, replayed_rig};
 use skinrig_sim::{SimConfig, in_real_time, simulated_rig};
 
@@ -17,12 +18,20 @@ use crate::exit::Failure;
 use crate::recording::SessionRecording;
 use crate::results::RigDocument;
 
-/// The simulated rig for `protocol`.
+/// The simulated rig for `protocol`, with those faults on purpose that meet devices; its name tells all of them.
 #[must_use]
-pub fn simulated(protocol: &Protocol, level: SimLevel, seed: u64, real_time: bool) -> Rig {
+pub fn simulated(
+    protocol: &Protocol,
+    level: SimLevel,
+    seed: u64,
+    real_time: bool,
+    faults: &[PlantedFault],
+) -> Rig {
     let mut config = SimConfig::new(seed, level);
     config.outline = protocol.surroundings.outline;
+    config.faults = planted::of_devices(faults);
     let mut rig = simulated_rig(&config);
+    planted::tell(&mut rig, faults);
     for (settings, request) in rig.camera_settings.iter_mut().zip(&protocol.cameras) {
         apply(settings, request);
     }

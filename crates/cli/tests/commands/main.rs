@@ -5,6 +5,7 @@
 mod damage;
 mod dataset;
 mod evaluation;
+mod faults;
 mod help;
 mod import;
 mod import_refusals;

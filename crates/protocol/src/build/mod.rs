@@ -187,6 +187,10 @@ fn assemble(
             out,
         )
     });
+    let faults = match root.get("faults") {
+        Some(f) => crate::faults::faults(f, out),
+        None => Some(Vec::new()),
+    };
     let suspend = root
         .get("suspend")
         .and_then(|s| crate::suspend::suspend(s, out));
@@ -278,6 +282,7 @@ fn assemble(
         max_consecutive_invalid: limits?.count("max_consecutive_invalid")?,
         surface_check: surface_check.map_or(Some(None), |s| s.map(Some))?,
         suspend: suspend?,
+        faults: faults?,
         marks: marks?,
         surface: surface.map_or(Some(None), |s| s.map(Some))?,
         analysis: analysis?,

@@ -11,6 +11,7 @@ pub(crate) use frame::{OUTLINE, OUTLINES};
 pub(crate) use path::UNITS;
 pub(crate) use run::{EVALUATION, ROI};
 
+use crate::faults::FAULT;
 use crate::quantity::Dimension::{Length, Speed, Time};
 use crate::retakes::RETAKES;
 use crate::shape::{Key, Need, Range, Shape, Table, Word};
@@ -206,6 +207,15 @@ pub(crate) static PROTOCOL: Table = Table {
             Shape::Map(&CAMERAS),
             "{}",
             "Settings written to the cameras before the run and read back.",
+        ),
+        optional(
+            "faults",
+            Shape::List {
+                of: &FAULT,
+                min: 1,
+                max: 100,
+            },
+            "Faults made on purpose, each KIND@WHEN such as camera1-stalled@hold:3 (docs/faults.md). On the simulated rig only.",
         ),
     ],
     exactly_one: &[&["depth", "depths"]],

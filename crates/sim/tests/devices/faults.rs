@@ -366,3 +366,27 @@ fn too_much_force_stops_the_robot() {
     rig.indenter.command(at(5.0), 20.0).unwrap();
     rig.indenter.command(at(4.0), 20.0).unwrap();
 }
+
+#[test]
+fn what_finds_no_room_is_lost_and_counted() {
+    let after = |buffer_bytes: usize, looks: i64| {
+        let mut config = SimConfig::new(4, SimLevel::Geometric);
+        config.camera_clock.buffer_bytes = buffer_bytes;
+        let mut rig = simulated_rig(&config);
+        ready(&mut rig);
+        let mut chunks: Vec<RawChunk> = Vec::new();
+        for look in 1..=looks {
+            rig.clock.wait_until(HostTime(1_000_000_000 * look / looks));
+            rig.cameras[0].flush(&mut chunks).unwrap();
+        }
+        let bytes: u64 = chunks.iter().map(|c| c.bytes.len() as u64).sum();
+        let lost: u64 = chunks.iter().map(|c| c.lost_before).sum();
+        (bytes, lost)
+    };
+    let (all, none) = after(64 << 20, 1);
+    assert_eq!(none, 0);
+    assert_eq!(after(64 << 10, 100), (all, 0), "fetched often enough");
+    let (kept, lost) = after(64 << 10, 1);
+    assert!(lost > 0 && kept <= 64 << 10, "{kept} kept, {lost} lost");
+    assert_eq!(kept + lost, all);
+}

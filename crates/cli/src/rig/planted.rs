@@ -1,0 +1,111 @@
+//! Faults on purpose on the simulated rig: what each kind is there, when it strikes, and a name that tells of them.
+
+use skinrig_device::Rig;
+use skinrig_model::HostTime;
+use skinrig_protocol::{FaultKind, FaultPhase, FaultTime, PlantedFault};
+use skinrig_sim::{Fault, MarkFate, Moment, When};
+
+use crate::exit::Failure;
+
+/// Words of 4 bytes that a camera loses.
+const LOST_WORDS: u64 = 2_000;
+/// How far a camera's clock is set forward, µs.
+const CLOCK_STEP_US: u32 = 300_000;
+/// The share of its usual swiftness that a slow robot keeps, percent.
+const SLOW_PERCENT: u32 = 4;
+/// How long a slow recorder holds the run up, ms.
+const HELD_UP_MS: u32 = 800;
+
+/// Those of the faults that meet devices, as the simulated rig makes them.
+#[must_use]
+pub fn of_devices(faults: &[PlantedFault]) -> Vec<Fault> {
+    faults.iter().filter_map(of_device).collect()
+}
+
+fn of_device(fault: &PlantedFault) -> Option<Fault> {
+    let when = when(fault.when)?;
+    let mark = |fate| Fault::Mark { fate, when };
+    Some(match fault.kind {
+        FaultKind::CameraUnplugged(camera) => Fault::CameraUnplugged { camera, when },
+        FaultKind::CameraStalled(camera) => Fault::CameraStalled { camera, when },
+        FaultKind::CameraDrops(camera) => Fault::CameraBytesLost {
+            camera,
+            when,
+            words: LOST_WORDS,
+        },
+        FaultKind::CameraStorm(camera) => Fault::HotPixelStorm { camera, when },
+        FaultKind::CameraClockStep(camera) => Fault::ClockStep {
+            camera,
+            when,
+            by_us: CLOCK_STEP_US,
+        },
+        FaultKind::TriggerLost => mark(MarkFate::Lost),
+        FaultKind::TriggerDoubled => mark(MarkFate::Doubled),
+        FaultKind::TriggerDelayed => mark(MarkFate::Delayed),
+        FaultKind::BoxSilent => Fault::TriggerBoxLost(when),
+        FaultKind::BoxNoisy => Fault::TriggerBoxNoisy(when),
+        FaultKind::RobotLost => Fault::IndenterLost(when),
+        FaultKind::RobotStalled => Fault::IndenterStuck(when),
+        FaultKind::RobotSlow => Fault::Sluggish {
+            when,
+            percent: SLOW_PERCENT,
+        },
+        FaultKind::RobotForceSpike => Fault::ForceSpike(when),
+        FaultKind::RobotStale => Fault::PosesStale(when),
+        FaultKind::RecorderSlow => Fault::HostHeldUp {
+            when,
+            for_ms: HELD_UP_MS,
+        },
+        FaultKind::DiskFull | FaultKind::Killed => return None,
+    })
+}
+
+/// Numbers count from 1 for people, from 0 there.
+fn when(time: FaultTime) -> Option<When> {
+    Some(match time {
+        FaultTime::Preflight => When::At(HostTime::ZERO),
+        FaultTime::Arming => When::Moment(Moment::Arming, 0),
+        FaultTime::Time(after) => When::At(HostTime::ZERO + after),
+        FaultTime::Nth(phase, n) => {
+            let moment = match phase {
+                FaultPhase::Travel => Moment::Travel,
+                FaultPhase::Press => Moment::Approach,
+                FaultPhase::Contact => return Some(When::Contact(n.checked_sub(1)?)),
+                FaultPhase::Hold => Moment::Hold,
+                FaultPhase::Retract => Moment::Retract,
+                FaultPhase::Between => Moment::Between,
+                FaultPhase::Record | FaultPhase::Journal => return None,
+            };
+            When::Moment(moment, n.checked_sub(1)?)
+        }
+        FaultTime::Seal => return None,
+    })
+}
+
+/// Puts the faults into the name of the rig, so that nothing of the session can be read without them.
+pub fn tell(rig: &mut Rig, faults: &[PlantedFault]) {
+    if let Some(told) = told(faults) {
+        rig.name = format!("{}, {told}", rig.name);
+    }
+}
+
+/// `FAULTS ON PURPOSE: ...`; `None` without any.
+#[must_use]
+pub fn told(faults: &[PlantedFault]) -> Option<String> {
+    let names: Vec<String> = faults.iter().map(ToString::to_string).collect();
+    (!names.is_empty()).then(|| format!("FAULTS ON PURPOSE: {}", names.join(", ")))
+}
+
+/// A bench takes no faults on purpose.
+///
+/// # Errors
+/// [`Failure::input`] when there are some.
+pub fn refuse(faults: &[PlantedFault], bench: &str) -> Result<(), Failure> {
+    match told(faults) {
+        None => Ok(()),
+        Some(told) => Err(Failure::input(format!(
+            "{bench}: expected a protocol and a command line without faults, because only the simulated rig makes them on \
+             purpose, found {told}\n  next: leave out `faults:` and --fault, or leave out --rig"
+        ))),
+    }
+}

@@ -1,0 +1,87 @@
+//! Faults on purpose: told wherever the session is, refused on a bench, their effects in the exit code.
+
+use crate::support::{Lab, SMALL, files, only, program, said, show, skinrig, text};
+
+#[test]
+fn a_run_with_faults_says_so_everywhere() {
+    let lab = Lab::new();
+    let folder = lab.path("a");
+    let said = skinrig(&[
+        "run",
+        SMALL,
+        "--sessions",
+        &text(&folder),
+        "--set",
+        "faults=[camera1-drops@hold:3]",
+        "--fault",
+        "trigger-lost@contact:5",
+    ])
+    .code(0);
+    let told = "FAULTS ON PURPOSE: camera1-drops@hold:3, trigger-lost@contact:5";
+    assert!(said.err.contains(told), "{said:#?}");
+    let words: Vec<&str> = said.out.split_whitespace().collect();
+    assert!(words.join(" ").contains(told), "{said:#?}");
+    let shown = show(&only(&folder, ".session.sqlite"));
+    let name = shown["rig"].as_str().unwrap_or_default();
+    assert!(name.contains(told), "{name}");
+    let report = std::fs::read_to_string(only(&folder, ".html")).unwrap();
+    let first = &report[..report.find("<h2").unwrap()];
+    assert!(first.contains(told), "not on the first screen");
+}
+
+#[test]
+fn a_bench_takes_no_faults() {
+    let lab = Lab::new();
+    let folder = text(&lab.path("a"));
+    for plant in [
+        ["--fault", "robot-slow@hold:1"],
+        ["--set", "faults=[robot-slow@hold:1]"],
+    ] {
+        let mut arguments = vec!["run", SMALL, "--sessions", &folder];
+        arguments.extend(["--rig", "hil/rigs/emulated.yaml"]);
+        arguments.extend(plant);
+        let mut command = program(&arguments);
+        command
+            .env("SKINRIG_EMULATED_LIBDRD", "not-there.so")
+            .env("SKINRIG_EMULATED_TRIGGER_BOX", "/dev/not-there");
+        said(command)
+            .code(2)
+            .complains(&["only the simulated rig", "robot-slow@hold:1", "next: "]);
+    }
+    assert!(files(&lab.path("."), ".sqlite").is_empty());
+}
+
+#[test]
+fn a_fault_that_nobody_knows_is_refused() {
+    let run = |plant: [&str; 2]| skinrig(&["run", SMALL, plant[0], plant[1]]).code(2);
+    run(["--fault", "camera1-stall@hold:1"]).complains(&["did you mean `camera1-stalled`?"]);
+    run(["--set", "faults=[robot-slow@record:3]"]).complains(&["faults[0]", "`preflight`"]);
+}
+
+#[test]
+fn a_full_disk_keeps_what_was_written() {
+    let lab = Lab::new();
+    let folder = lab.path("a");
+    skinrig(&[
+        "run",
+        SMALL,
+        "--sessions",
+        &text(&folder),
+        "--fault",
+        "disk-full@press:5",
+    ])
+    .code(3)
+    .complains(&["disk is full", "disk space", "skinrig resume"]);
+    let session = only(&folder, ".session.sqlite");
+    assert_eq!(show(&session)["totals"]["presses"]["valid"], 2);
+    // The place is there again: the rest follows, and the name stays.
+    skinrig(&["resume", &text(&session)]).code(0);
+    let shown = show(&session);
+    assert_eq!(shown["totals"]["presses"]["valid"], 8);
+    assert!(
+        shown["rig"]
+            .as_str()
+            .unwrap_or_default()
+            .contains("disk-full@press:5")
+    );
+}

@@ -1,0 +1,192 @@
+//! Whether the cameras' streams go on: their time keeps pace with the host's, they reach to the end of a press, and no storm
+//! drowns it. A press whose data are spoilt is taken again.
+
+use skinrig_model::{CameraId, HostDuration, HostTime, RawChunk, Record};
+
+use crate::core::{Collect, Core};
+use crate::error::{ControllerError, Halt};
+use crate::press::cleared_at;
+
+/// How fast two clocks may drift apart: far beyond any quartz, parts per million.
+const DRIFT_PPM: i64 = 1_000;
+
+/// Where a camera's stream has come to.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Continuity {
+    /// When the last bytes came.
+    arrived: Option<HostTime>,
+    /// When camera time came last, and how far that time then was ahead of the host's at most, µs: bytes come late at times,
+    /// but never early.
+    ahead: Option<(HostTime, i64)>,
+    /// The last bytes came late.
+    late: bool,
+}
+
+/// How a chunk's time compares with the host's.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Pace {
+    /// As ever, or the chunk has no time.
+    Even,
+    /// The camera's time stepped forward by this many µs.
+    Stepped(i64),
+    /// The bytes came late, or the camera's time stepped back, by this many µs; told once.
+    Late(i64),
+}
+
+impl Continuity {
+    /// Takes the next chunk; `limit` is how far its time may be off.
+    pub(crate) fn see(&mut self, chunk: &RawChunk, limit: HostDuration) -> Pace {
+        if !chunk.bytes.is_empty() {
+            self.arrived = Some(chunk.host_time);
+        }
+        let t = chunk.host_time;
+        let Some(camera_us) = chunk.facts.last_us.and_then(|us| i64::try_from(us).ok()) else {
+            return Pace::Even;
+        };
+        let ahead_us = camera_us - t.0 / 1_000;
+        let Some((before, most_us)) = self.ahead else {
+            self.ahead = Some((t, ahead_us));
+            return Pace::Even;
+        };
+        let drift_us = (t - before).0 / 1_000 * DRIFT_PPM / 1_000_000;
+        self.ahead = Some((t, ahead_us.max(most_us - drift_us)));
+        let off_us = ahead_us - most_us;
+        let limit_us = limit.0 / 1_000;
+        let was_late = std::mem::replace(&mut self.late, off_us < -limit_us);
+        if off_us > limit_us {
+            Pace::Stepped(off_us)
+        } else if self.late && !was_late {
+            Pace::Late(-off_us)
+        } else {
+            Pace::Even
+        }
+    }
+}
+
+impl Core<'_> {
+    /// Looks at the time of a chunk that came. Data that come late spoil the press under way; a clock that was set forward ends
+    /// the run, for no later press could be placed in time: resumed, the session gets a clock of its own for what follows.
+    pub(crate) fn follow_stream(&mut self, chunk: &RawChunk) -> Result<(), ControllerError> {
+        let Some(limit) = self.settings.camera_lag else {
+            return Ok(());
+        };
+        let camera = chunk.camera;
+        match self.continuity[camera.index()].see(chunk, limit) {
+            Pace::Even => Ok(()),
+            Pace::Stepped(us) => Err(ControllerError::ClockStep {
+                camera,
+                limit,
+                found: HostDuration(us * 1_000),
+            }),
+            Pace::Late(us) => {
+                let text = format!(
+                    "{camera}: expected data within {limit}, found them {} late",
+                    HostDuration(us * 1_000)
+                );
+                self.with_open(|open| open.spoilt.push(text.clone()));
+                let t = chunk.host_time;
+                self.journal.emit(Record::Note { t, text })
+            }
+        }
+    }
+
+    /// Waits until both cameras have delivered what they saw of the press; not for long.
+    pub(crate) fn await_streams(&mut self) -> Result<(), Halt> {
+        let Some(limit) = self.settings.camera_lag else {
+            return Ok(());
+        };
+        let end = self.end_of_press();
+        self.collect(Collect::Flush)?;
+        while self.first_behind(end).is_some() && self.now() < end + limit {
+            self.tick(None)?;
+            self.collect(Collect::Flush)?;
+        }
+        if let Some(camera) = self.first_behind(end) {
+            let arrived = self.continuity[camera.index()].arrived;
+            let found = arrived.map_or("none".to_owned(), |t| format!("none after {t}"));
+            let text =
+                format!("{camera}: expected data up to {end}, the end of the press, found {found}");
+            self.with_open(|open| open.spoilt.push(text));
+        }
+        Ok(())
+    }
+
+    /// A camera whose stream has not come to `end`.
+    fn first_behind(&self, end: HostTime) -> Option<CameraId> {
+        let behind = |c: &CameraId| self.continuity[c.index()].arrived.is_none_or(|t| t < end);
+        CameraId::ALL.into_iter().find(behind)
+    }
+
+    /// When the tip was clear again; the present when it was never seen to be.
+    fn end_of_press(&self) -> HostTime {
+        let cleared = self.open.as_ref().and_then(cleared_at);
+        cleared.unwrap_or_else(|| self.now())
+    }
+
+    /// Holds the event rates of the press under way against the level of a storm, when the plan has one.
+    pub(crate) fn weigh_storm(&mut self) {
+        let Some(level) = self.plan.suspend.event_rate.map(|t| t.trip) else {
+            return;
+        };
+        let now = self.now();
+        self.with_open(|open| {
+            let seconds = (now - open.began).as_secs_f64().max(1e-3);
+            for camera in CameraId::ALL {
+                let rate = open.events[camera.index()] as f64 / seconds;
+                if rate > level {
+                    open.spoilt.push(format!(
+                        "{camera}: expected at most {level} ev/s during the press (`suspend.event_rate`), found {rate:.0} ev/s"
+                    ));
+                }
+            }
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use skinrig_model::ChunkFacts;
+
+    use super::*;
+
+    fn chunk(host_ms: i64, camera_ms: Option<u64>) -> RawChunk {
+        RawChunk {
+            camera: CameraId::One,
+            seq: 0,
+            host_time: HostTime(host_ms * 1_000_000),
+            lost_before: 0,
+            bytes: vec![0; 4],
+            facts: ChunkFacts {
+                last_us: camera_ms.map(|ms| ms * 1_000),
+                ..ChunkFacts::default()
+            },
+            triggers: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn a_step_forward_is_told_from_late_bytes() {
+        let limit = HostDuration::from_millis(250);
+        let mut stream = Continuity::default();
+        let mut see = |host_ms, camera_ms| stream.see(&chunk(host_ms, camera_ms), limit);
+        assert_eq!(see(1_000, Some(77_000)), Pace::Even);
+        // A minute without bytes, in which the clocks drift apart.
+        assert_eq!(see(61_000, Some(137_010)), Pace::Even);
+        assert_eq!(see(62_000, None), Pace::Even);
+        // Late, and back in time: no step.
+        assert_eq!(see(63_000, Some(138_710)), Pace::Late(300_000));
+        assert_eq!(see(63_100, Some(138_720)), Pace::Even, "told once");
+        assert_eq!(see(64_000, Some(140_010)), Pace::Even);
+        assert_eq!(see(65_000, Some(141_310)), Pace::Stepped(300_000));
+    }
+
+    #[test]
+    fn a_slow_clock_is_never_late() {
+        let limit = HostDuration::from_millis(250);
+        let mut stream = Continuity::default();
+        for s in 0..40_000_u64 {
+            let chunk = chunk(s as i64 * 1_000, Some(s * 1_000 - s / 10));
+            assert_eq!(stream.see(&chunk, limit), Pace::Even, "at {s} s");
+        }
+    }
+}

@@ -1,0 +1,53 @@
+//! A clock on which the program is held up: the wait in which a fault strikes ends late.
+
+use skinrig_device::Clock;
+use skinrig_model::{HostDuration, HostTime};
+
+use crate::faults::{Fault, When};
+use crate::world::Shared;
+
+/// The clock of a rig whose host is slow at times.
+pub struct HeldUp {
+    shared: Shared,
+    faults: Vec<(When, u32)>,
+}
+
+impl HeldUp {
+    /// The clock of `shared` with those of these faults that hold the program up; `None` when there are none.
+    pub fn new(shared: Shared, faults: &[Fault]) -> Option<Self> {
+        let faults: Vec<_> = faults
+            .iter()
+            .filter_map(|fault| match *fault {
+                Fault::HostHeldUp { when, for_ms } => Some((when, for_ms)),
+                _ => None,
+            })
+            .collect();
+        (!faults.is_empty()).then_some(Self { shared, faults })
+    }
+}
+
+impl Clock for HeldUp {
+    fn now(&self) -> HostTime {
+        self.shared.clock.now()
+    }
+
+    fn wait_until(&mut self, t: HostTime) {
+        self.shared.clock.wait_until(t);
+        if self.faults.is_empty() {
+            return;
+        }
+        let mut held_ms = 0;
+        {
+            let world = self.shared.world();
+            self.faults.retain(|&(when, for_ms)| {
+                let struck = world.has_struck(when);
+                held_ms += if struck { i64::from(for_ms) } else { 0 };
+                !struck
+            });
+        }
+        if held_ms > 0 {
+            let until = self.shared.clock.now() + HostDuration::from_millis(held_ms);
+            self.shared.clock.wait_until(until);
+        }
+    }
+}

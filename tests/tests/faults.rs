@@ -1,0 +1,442 @@
+//! Faults on purpose, each in each phase of a run: what becomes of it is what docs/faults.md says, and wrong data never pass.
+//!
+//! With `SKINRIG_WRITE_DOCS=1` the table of docs/faults.md is written instead of compared.
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on must fail")]
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use rayon::prelude::*;
+use skinrig::fault::Saboteur;
+use skinrig::results::{Choices, analyze_session};
+use skinrig::rig::{self, gates};
+use skinrig::source::Rescan;
+use skinrig_analysis::Analysis;
+use skinrig_analysis::result::PressResult;
+use skinrig_controller::{
+    ControlHandle, ControllerSettings, RecordSink, RunReport, SinkFault, execute_checked,
+};
+use skinrig_model::{HostTime, PressId, PressTiming, Record, RunEnd, SimLevel};
+use skinrig_protocol::{FaultKind, FaultPhase, FaultTime, Plan, PlantedFault, Protocol};
+use skinrig_recorder::{SessionReader, SessionWriter, verify};
+use skinrig_sim::{SimConfig, simulated_rig};
+use skinrig_tests::{header, planned};
+
+const SEED: u64 = 11;
+const PROTOCOL: &str = "
+skinrig: 1
+name: faults
+operator: tests
+prototype: {id: none}
+seed: 11
+scene: {level: geometric}
+sync: {count: 2, interval: 1.5 s, at: [10 mm, 2 mm], pause_after: 1 s}
+path:
+  points: [[4 mm, 0 mm], [14 mm, 6 mm], [10 mm, -6 mm]]
+depth: 1.5 mm
+motion: {period: 2 s, hold: 300 ms}
+limits:
+  workspace: {min: [-40 mm, -48 mm, -4 mm], max: [60 mm, 52 mm, 30 mm]}
+  max_depth: 3 mm
+  max_speed: 100 mm/s
+  max_force: 5 N
+triggers: {marks: [contact, retract]}
+suspend: {event_rate: {above: 50 kev/s, resume_below: 20 kev/s}, resume_after: 1 s}
+evaluation: {calibrate: [], score: [1]}
+analysis: {calibration: none}
+";
+
+/// Bytes that a camera keeps for a program that does not come: a quarter of a second of an idle stream.
+const BUFFER_BYTES: usize = 64 << 10;
+
+/// The phases, in the order of the table, with the time of a fault that strikes then: the first press is a sync press, the
+/// third the first that is scored, the fifth the last.
+const PHASES: [(&str, &str); 10] = [
+    ("preflight", "preflight"),
+    ("arming", "arming"),
+    ("sync press", "hold:1"),
+    ("travel", "travel:1"),
+    ("approach", "approach:3"),
+    ("contact", "contact:3"),
+    ("hold", "hold:3"),
+    ("retract", "retract:3"),
+    ("between", "between:3"),
+    ("end", "between:5"),
+];
+
+/// The faults, in the order of the table.
+const FAULTS: [&str; 18] = [
+    "camera1-unplugged",
+    "camera1-stalled",
+    "camera1-drops",
+    "camera1-storm",
+    "camera1-clock-step",
+    "trigger-lost",
+    "trigger-doubled",
+    "trigger-delayed",
+    "box-silent",
+    "box-noisy",
+    "robot-lost",
+    "robot-stalled",
+    "robot-slow",
+    "robot-force-spike",
+    "robot-stale",
+    "recorder-slow",
+    "disk-full",
+    "killed",
+];
+
+/// Those that meet records strike at the record that is the first of the phase in the run without a fault.
+fn planted(fault: &str, phase: usize, record: usize) -> PlantedFault {
+    let of_records = matches!(fault, "disk-full" | "killed");
+    let when = if of_records {
+        format!("record:{}", record + 1)
+    } else {
+        PHASES[phase].1.to_owned()
+    };
+    format!("{fault}@{when}").parse().unwrap()
+}
+
+/// Where records go. Killed in place, without the process: what comes later nobody writes down.
+struct Sink {
+    writer: Option<SessionWriter>,
+    saboteur: Saboteur,
+    killed_at: Option<FaultTime>,
+    /// For each record the latest time that any told so far.
+    told: Vec<HostTime>,
+    moved: bool,
+}
+
+impl RecordSink for Sink {
+    fn accept(&mut self, record: Record) -> Result<(), SinkFault> {
+        let t = time_of(&record).max(self.told.last().copied());
+        self.told.push(t.unwrap_or_default());
+        self.moved |= matches!(record, Record::Command { .. });
+        let n = u32::try_from(self.told.len()).unwrap();
+        if self.killed_at == Some(FaultTime::Nth(FaultPhase::Record, n)) {
+            self.writer = None;
+        }
+        self.saboteur.before(&record)?;
+        match &mut self.writer {
+            Some(writer) => writer.accept(record).map_err(|e| SinkFault(e.to_string())),
+            None => Ok(()),
+        }
+    }
+}
+
+fn time_of(record: &Record) -> Option<HostTime> {
+    match record {
+        Record::Command { t, .. } | Record::Intent { t, .. } | Record::Note { t, .. } => Some(*t),
+        Record::Chunk(chunk) => Some(chunk.host_time),
+        Record::Poses(block) => block.last().map(|s| s.t),
+        Record::MarkSent(sent) => Some(sent.t),
+        Record::Outcome(outcome) => outcome.timing.map(|t| t.clear),
+        _ => None,
+    }
+}
+
+/// A run and what is left of it.
+struct Run {
+    report: RunReport,
+    path: PathBuf,
+    told: Vec<HostTime>,
+    moved: bool,
+    sealed: bool,
+}
+
+fn run((protocol, plan): (&Protocol, &Plan), fault: Option<PlantedFault>, path: PathBuf) -> Run {
+    let faults: Vec<PlantedFault> = fault.into_iter().collect();
+    let mut config = SimConfig::new(SEED, SimLevel::Geometric);
+    config.camera_clock.buffer_bytes = BUFFER_BYTES;
+    config.camera_clock.chunk_bytes = 16 << 10;
+    // Every touch of a place gives the same response, so that a press taken again can be compared.
+    config.geometric.dead_share = 0.0;
+    config.geometric.strength_spread = 0.0;
+    config.faults = rig::planted::of_devices(&faults);
+    let simulated = simulated_rig(&config);
+    let header = header(protocol, plan, &simulated).unwrap();
+    let preflight = gates::of_simulated(&simulated, path.parent().unwrap(), 1.0);
+    let killed = fault.filter(|fault| fault.kind == FaultKind::Killed);
+    let mut sink = Sink {
+        writer: Some(SessionWriter::create(&path).unwrap()),
+        saboteur: Saboteur::new(if killed.is_some() { &[] } else { &faults }),
+        killed_at: killed.map(|fault| fault.when),
+        told: Vec::new(),
+        moved: false,
+    };
+    let control = ControlHandle::new();
+    let settings = ControllerSettings::default();
+    let report = execute_checked(
+        plan, header, simulated, &control, &mut sink, preflight, settings,
+    );
+    let seals = killed.is_none() && sink.saboteur.before_the_seal().is_ok();
+    let writer = sink.writer.take();
+    let sealed = seals && writer.is_some_and(|writer| writer.finish().is_ok());
+    Run {
+        report,
+        path,
+        told: sink.told,
+        moved: sink.moved,
+        sealed,
+    }
+}
+
+/// What a cell says, and what is wrong with it.
+struct Cell {
+    words: String,
+    reason: String,
+    wrong: Vec<String>,
+}
+
+/// What becomes of a run with a fault, looked at from its session file alone, compared with the run without.
+fn judge(run: &Run, fault: PlantedFault, without: &BTreeMap<PressId, PressResult>) -> Cell {
+    let mut wrong = Vec::new();
+    let verified = verify(&run.path, &mut Rescan::default()).unwrap();
+    if !verified.is_sound() || verified.sealed != run.sealed {
+        wrong.push(format!(
+            "verify: {:?}, sealed {}",
+            verified.problems, verified.sealed
+        ));
+    }
+    let reader = SessionReader::open(&run.path).unwrap();
+    let killed = fault.kind == FaultKind::Killed;
+    let totals = reader.totals().unwrap();
+    for tally in [totals.presses, totals.sync] {
+        let counted = tally.valid + tally.missed + tally.invalid + tally.excluded;
+        let cut_off = !run.sealed;
+        if tally.planned != counted + tally.open() || (tally.open() > 0 && !cut_off) {
+            wrong.push(format!("counts: {tally:?}"));
+        }
+    }
+    let valid = totals.presses.valid + totals.sync.valid;
+    let attempts: usize = reader.presses().unwrap().iter().map(|(_, a)| a.len()).sum();
+    let attempted = reader
+        .presses()
+        .unwrap()
+        .iter()
+        .filter(|(_, a)| !a.is_empty())
+        .count();
+    let retaken = attempts - attempted;
+    let report = &run.report;
+    if !killed {
+        let robot = matches!(report.end, RunEnd::Faulted(_));
+        if !report.disarmed && !robot {
+            wrong.push("not disarmed, and the run says nothing of it".into());
+        }
+        if matches!(report.end, RunEnd::Completed) && !(report.retracted && report.disarmed) {
+            wrong.push("completed, but not at rest".into());
+        }
+        if run.sealed && valid != report.valid as u64 {
+            wrong.push(format!(
+                "{valid} valid in the file, {} in the report",
+                report.valid
+            ));
+        }
+    }
+    let analysis = analyze_session(&run.path, Choices::default()).map(|r| r.analysis);
+    let usable = analysis.as_ref().is_ok_and(|a| a.alignment.is_usable());
+    if let Ok(analysis) = &analysis
+        && usable
+    {
+        // A slow robot moves in another way: its events are others, and so are its times, which are measured.
+        let moves_as_ever = fault.kind != FaultKind::RobotSlow;
+        wrong.extend(differences(analysis, without, moves_as_ever));
+    }
+    let planned = totals.presses.planned + totals.sync.planned;
+    let mut words = match (&report.end, killed) {
+        (_, true) => format!("cut off, {valid} valid"),
+        (RunEnd::Faulted(_), _) if !run.moved => "refused before motion".to_owned(),
+        (RunEnd::Faulted(_), _) => {
+            let place = if report.retracted {
+                "at clearance"
+            } else {
+                "braked"
+            };
+            format!("ended, {valid} valid, {place}")
+        }
+        (RunEnd::Completed, _) if !usable => "INVALID session".to_owned(),
+        (RunEnd::Completed, _) if valid < planned => format!("{} invalid", planned - valid),
+        (RunEnd::Completed, _) => "survived".to_owned(),
+        (RunEnd::Stopped(_), _) => "stopped".to_owned(),
+    };
+    if retaken > 0 {
+        let _ = write!(words, ", {retaken} retaken");
+    }
+    let mut reason = match &report.end {
+        RunEnd::Completed => String::new(),
+        RunEnd::Stopped(r) | RunEnd::Faulted(r) => r.clone(),
+    };
+    match &analysis {
+        Ok(a) => {
+            for p in &a.presses {
+                if let Some(r) = &p.reason {
+                    let _ = write!(reason, " | {}: {r}", p.press);
+                }
+            }
+            if !usable {
+                let _ = write!(reason, " | {:?}", a.alignment.violations);
+            }
+        }
+        Err(e) => {
+            let _ = write!(reason, " | analysis: {}", e.message);
+        }
+    }
+    Cell {
+        words,
+        reason,
+        wrong,
+    }
+}
+
+/// How valid presses differ from those of the run without a fault, beyond what noise does.
+fn differences(
+    analysis: &Analysis,
+    without: &BTreeMap<PressId, PressResult>,
+    moves_as_ever: bool,
+) -> Vec<String> {
+    let mut found = Vec::new();
+    for press in analysis.presses.iter().filter(|p| p.verdict == "valid") {
+        let as_ever = &without[&press.press];
+        let off_mm = press
+            .truth
+            .zip(as_ever.truth)
+            .map(|(a, b)| a.distance_mm(b));
+        if off_mm.is_none_or(|off_mm| off_mm > 0.05) {
+            found.push(format!("{}: truth off by {off_mm:?} mm", press.press));
+        }
+        for (k, (seen, ever)) in press.views.iter().zip(&as_ever.views).enumerate() {
+            let (Some(seen), Some(ever)) = (seen, ever) else {
+                if seen.is_some() != ever.is_some() {
+                    found.push(format!("{}: view {k} is {seen:?}", press.press));
+                }
+                continue;
+            };
+            let (n, of) = (f64::from(seen.events), f64::from(ever.events));
+            if moves_as_ever && (n - of).abs() > 0.25 * of {
+                found.push(format!(
+                    "{}: camera {} saw {n} events, without a fault {of}",
+                    press.press,
+                    k + 1
+                ));
+            }
+        }
+        let off_mm = press
+            .estimate()
+            .zip(as_ever.estimate())
+            .map(|(a, b)| a.distance_mm(b));
+        if off_mm.is_some_and(|off_mm| off_mm > 1.5)
+            || press.estimate().is_some() != as_ever.estimate().is_some()
+        {
+            found.push(format!("{}: estimate off by {off_mm:?} mm", press.press));
+        }
+    }
+    found
+}
+
+/// The number of the first record of a phase in the run without a fault.
+fn record_of(phase: usize, told: &[HostTime], timings: &[PressTiming]) -> usize {
+    let (sync, press, last) = (timings[0], timings[2], timings[4]);
+    let t = match phase {
+        0 => return 2,
+        1 => {
+            let began = timings[0].approach;
+            return told.iter().position(|t| *t >= began).unwrap() - 3;
+        }
+        2 => sync.at_depth,
+        3 => HostTime(timings[1].clear.0 + 1_010_000_000),
+        4 => press.approach,
+        5 => press.contact,
+        6 => press.at_depth,
+        7 => press.retract,
+        8 => press.clear,
+        _ => last.clear,
+    };
+    told.iter().position(|told| *told >= t).unwrap()
+}
+
+#[test]
+fn each_fault_in_each_phase_ends_as_documented() {
+    let lab = tempfile::tempdir().unwrap();
+    let (protocol, plan) = planned(PROTOCOL.trim_start()).unwrap();
+    let experiment = (&protocol, &plan);
+    let ideal = run(experiment, None, lab.path().join("ideal.session.sqlite"));
+    assert_eq!(ideal.report.end, RunEnd::Completed);
+    assert_eq!(ideal.report.valid, plan.presses.len());
+    let analysis = analyze_session(&ideal.path, Choices::default())
+        .unwrap()
+        .analysis;
+    assert!(
+        analysis.alignment.is_usable(),
+        "{:?}",
+        analysis.alignment.violations
+    );
+    let without: BTreeMap<_, _> = analysis.presses.into_iter().map(|p| (p.press, p)).collect();
+    let timings: Vec<PressTiming> = without.values().filter_map(|p| p.timing).collect();
+
+    let cells: Vec<(usize, usize)> = (0..FAULTS.len())
+        .flat_map(|f| (0..PHASES.len()).map(move |p| (f, p)))
+        .collect();
+    let cells: Vec<Cell> = cells
+        .into_par_iter()
+        .map(|(f, p)| {
+            let path = lab.path().join(format!("{}-{p}.session.sqlite", FAULTS[f]));
+            let fault = planted(FAULTS[f], p, record_of(p, &ideal.told, &timings));
+            let run = run(experiment, Some(fault), path);
+            let cell = judge(&run, fault, &without);
+            std::fs::remove_file(&run.path).unwrap();
+            cell
+        })
+        .collect();
+
+    let mut wrong = Vec::new();
+    for (n, cell) in cells.iter().enumerate() {
+        let (f, p) = (n / PHASES.len(), n % PHASES.len());
+        for words in &cell.wrong {
+            wrong.push(format!(
+                "{} in {}: {words} ({})",
+                FAULTS[f], PHASES[p].0, cell.reason
+            ));
+        }
+    }
+    let table = table(&cells);
+    assert!(wrong.is_empty(), "wrong data:\n{}", wrong.join("\n"));
+    compare(&table);
+}
+
+fn table(cells: &[Cell]) -> String {
+    let mut table = String::from("| fault |");
+    for (phase, _) in PHASES {
+        let _ = write!(table, " {phase} |");
+    }
+    table.push_str("\n|---|");
+    table.push_str(&"---|".repeat(PHASES.len()));
+    table.push('\n');
+    for (name, row) in FAULTS.iter().zip(cells.chunks(PHASES.len())) {
+        let _ = write!(table, "| {name} |");
+        for cell in row {
+            let _ = write!(table, " {} |", cell.words);
+        }
+        table.push('\n');
+    }
+    table
+}
+
+const BEGIN: &str = "<!-- the table is written by tests/tests/faults.rs -->\n";
+const END: &str = "<!-- end of the table -->";
+
+fn compare(table: &str) {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/faults.md");
+    let text = std::fs::read_to_string(&path).unwrap();
+    let (before, rest) = text.split_once(BEGIN).unwrap();
+    let (documented, after) = rest.split_once(END).unwrap();
+    if std::env::var_os("SKINRIG_WRITE_DOCS").is_some() {
+        std::fs::write(&path, format!("{before}{BEGIN}{table}{END}{after}")).unwrap();
+    } else {
+        let next = "SKINRIG_WRITE_DOCS=1 cargo test -p skinrig-tests --test faults";
+        assert_eq!(
+            documented, table,
+            "docs/faults.md is not up to date; next: {next}"
+        );
+    }
+}
