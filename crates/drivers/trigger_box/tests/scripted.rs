@@ -60,7 +60,7 @@ impl Default for Script {
     fn default() -> Self {
         Self {
             firmware: [1, 1, 0],
-            protocol: 1,
+            protocol: 2,
             name: "skinrig-trigger-box",
             boot: 7,
             armed: false,
