@@ -188,11 +188,7 @@ fn rust_files(folder: &Path, root: &Path, to: &mut Vec<(String, String)>) {
 
 #[test]
 fn unsafe_code_lives_at_named_borders_and_gives_its_reason() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
-    let mut files = Vec::new();
-    for folder in ["crates", "hil", "tests", "benches"] {
-        rust_files(&root.join(folder), root, &mut files);
-    }
+    let files = all_rust_files();
     let mut faults = Vec::new();
     for (name, source) in &files {
         let home = UNSAFE_HOMES.contains(&name.as_str());
@@ -252,6 +248,91 @@ fn the_guard_alone_holds_the_robot() {
         BTreeSet::from(ROBOT_HOMES),
         "whoever moves the robot goes through `GuardedIndenter`"
     );
+}
+
+/// Our Rust files, tests included.
+fn all_rust_files() -> Vec<(String, String)> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
+    let mut files = Vec::new();
+    for folder in ["crates", "hil", "tests", "benches"] {
+        rust_files(&root.join(folder), root, &mut files);
+    }
+    files
+}
+
+/// The lines of `files` whose code, without comments and quotes, has one of `words`.
+fn with_words(files: &[(String, String)], words: &[&str]) -> Vec<String> {
+    let mut found = Vec::new();
+    for (name, source) in files {
+        for (line, text) in (1..).zip(source.lines()) {
+            let code = code(text);
+            if let Some(word) = words.iter().find(|w| code.contains(**w)) {
+                found.push(format!("{name}:{line}: {word}"));
+            }
+        }
+    }
+    found
+}
+
+#[test]
+fn no_sql_is_built_from_text() {
+    // sqlx takes a statement that is part of the program, or one for which somebody vouches; nobody does.
+    let found = with_words(
+        &all_rust_files(),
+        &["AssertSqlSafe", "raw_sql", "QueryBuilder", "SqlStr::from"],
+    );
+    assert!(found.is_empty(), "{}", found.join("\n"));
+    let vouched = ("x.rs".to_owned(), "query(Assert".to_owned() + "SqlSafe(sql))");
+    assert_eq!(with_words(&[vouched], &["AssertSqlSafe"]).len(), 1);
+}
+
+/// What opens or describes a network port. Sockets of the file system (`UnixListener`, `UnixStream`) are none.
+const NETWORK: [&str; 10] = [
+    "TcpListener",
+    "TcpStream",
+    "TcpSocket",
+    "UdpSocket",
+    "SocketAddrV",
+    "Ipv4Addr",
+    "Ipv6Addr",
+    "ToSocketAddrs",
+    "AF_INET",
+    "AddressFamily::INET",
+];
+
+/// Libraries that speak to a network.
+const NETWORK_LIBRARIES: [&str; 14] = [
+    "actix-web",
+    "axum",
+    "curl",
+    "h2",
+    "hyper",
+    "native-tls",
+    "openssl",
+    "quinn",
+    "reqwest",
+    "rustls",
+    "tonic",
+    "tungstenite",
+    "ureq",
+    "zmq",
+];
+
+#[test]
+fn no_network_port_is_opened() {
+    let found = with_words(&all_rust_files(), &NETWORK);
+    assert!(found.is_empty(), "{}", found.join("\n"));
+    let open = ("x.rs".to_owned(), "std::net::Tcp".to_owned() + "Listener::bind(a)");
+    assert_eq!(with_words(&[open], &NETWORK).len(), 1);
+    let metadata = metadata();
+    let linked: Vec<&str> = metadata["packages"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .filter_map(|p| p["name"].as_str())
+        .filter(|name| NETWORK_LIBRARIES.contains(name))
+        .collect();
+    assert!(linked.is_empty(), "{linked:?}");
 }
 
 fn metadata() -> Value {

@@ -9,8 +9,15 @@ use crate::from_row::chunk_from;
 use crate::query::{blob, each_row, int, num};
 use crate::rows::ChunkMeta;
 
-const CHUNK_COLUMNS: &str = "camera, seq, host_ns, lost_before, codec, raw_bytes, raw_crc32, first_us, \
-    last_us, cd_events, on_events, trigger_edges, length(stored) AS stored_bytes";
+/// What is known about a chunk, then how many bytes are stored of it.
+const INDEX: &str = "SELECT camera, seq, host_ns, lost_before, codec, raw_bytes, raw_crc32, first_us, last_us, cd_events,
+       on_events, trigger_edges, length(stored) AS stored_bytes
+     FROM chunk WHERE camera = ? ORDER BY seq";
+
+/// The same of one chunk, and what is stored of it.
+const NEXT: &str = "SELECT camera, seq, host_ns, lost_before, codec, raw_bytes, raw_crc32, first_us, last_us, cd_events,
+       on_events, trigger_edges, length(stored) AS stored_bytes, stored
+     FROM chunk WHERE camera = ? AND seq >= ? ORDER BY seq LIMIT 1";
 
 impl SessionReader {
     /// Every chunk of `camera` without its bytes, in stream order.
@@ -20,8 +27,7 @@ impl SessionReader {
     pub fn chunk_index(&self, camera: CameraId) -> Result<Vec<ChunkMeta>, RecorderError> {
         let restarts = self.restarts(camera)?;
         self.ask("reading the chunk index", async |conn| {
-            let sql = format!("SELECT {CHUNK_COLUMNS} FROM chunk WHERE camera = ? ORDER BY seq");
-            let query = sqlx::query(sqlx::AssertSqlSafe(sql)).bind(camera.number());
+            let query = sqlx::query(INDEX).bind(camera.number());
             let mut index = Vec::new();
             each_row(query, conn, |row| {
                 let mut meta = chunk_from(row)?;
@@ -58,10 +64,7 @@ impl SessionReader {
             return Ok(None);
         };
         let found = self.ask("reading a chunk", async |conn| {
-            let sql = format!(
-                "SELECT {CHUNK_COLUMNS}, stored FROM chunk WHERE camera = ? AND seq >= ? ORDER BY seq LIMIT 1"
-            );
-            let query = sqlx::query(sqlx::AssertSqlSafe(sql)).bind(camera.number()).bind(from);
+            let query = sqlx::query(NEXT).bind(camera.number()).bind(from);
             let row = query.fetch_optional(conn).await?;
             row.map(|row| Ok((chunk_from(&row)?, blob(&row, "stored")?))).transpose()
         })?;
