@@ -183,7 +183,15 @@ pub fn unfold(stored: &[u8], raw_bytes: usize) -> Result<Vec<u8>, CodecError> {
             format!("{} bytes more, to unfold to {raw_bytes}", rest.len()),
         ));
     }
-    let mut out = Vec::with_capacity(raw_bytes);
+    // Only what is there may take memory, not what the length claims.
+    let claimed = words.iter().map(|w| u32::from_le_bytes(*w));
+    let unfolded: usize = claimed
+        .map(|w| match w >> 28 {
+            TOKEN => 4 * (w as usize & MAX_RUN),
+            _ => 4,
+        })
+        .sum();
+    let mut out = Vec::with_capacity(unfolded.min(raw_bytes));
     let mut base = None;
     for (i, bytes) in words.iter().enumerate() {
         let word = u32::from_le_bytes(*bytes);

@@ -84,7 +84,7 @@ pub enum RecorderError {
     #[error("the session is no longer written: {0}")]
     Failed(String),
     /// The session cannot be sealed in its present state.
-    #[error("{}: cannot seal: expected {expected}, found {found}; the session stays readable", path.display())]
+    #[error("{}: cannot seal: expected {expected}, found {found}; the session stays readable, and `skinrig resume` finishes it", path.display())]
     Unsealable {
         /// The session file.
         path: PathBuf,

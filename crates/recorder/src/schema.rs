@@ -33,6 +33,7 @@ const BUSY: Duration = Duration::from_secs(10);
 
 /// Makes a new session file with an empty schema.
 pub async fn create(path: &Path) -> Result<SqliteConnection, RecorderError> {
+    refuse_links(path)?;
     match File::create_new(path) {
         Ok(_) => {}
         Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists => {
@@ -134,12 +135,14 @@ async fn roll_back(path: &Path) -> Result<(), RecorderError> {
 
 /// Opens a session file for reading, after a look at its first page.
 pub async fn open(path: &Path) -> Result<SqliteConnection, RecorderError> {
+    refuse_links(path)?;
     let rollback = check_first_page(path)?;
     if rollback && beside(path, "-journal").exists() && crate::lock::writer_of(path).is_none() {
         roll_back(path).await?;
     }
-    // A sealed file is in rollback mode, has nothing beside it and does not change.
+    // A sealed file is in rollback mode, has nothing beside it and does not change; one that is being sealed still does.
     let immutable = rollback
+        && crate::lock::writer_of(path).is_none()
         && !["-wal", "-journal"]
             .iter()
             .any(|end| beside(path, end).exists());
@@ -153,9 +156,14 @@ pub async fn open(path: &Path) -> Result<SqliteConnection, RecorderError> {
         .connect()
         .await
         .map_err(|e| Fault::from(e).at(path, "opening it"))?;
-    let text = check_schema_text(&mut conn).await;
-    text.map_err(|fault| fault.at(path, "reading its schema"))?;
+    let schema = check_schema(&mut conn).await;
+    schema.map_err(|fault| fault.at(path, "reading its schema"))?;
     Ok(conn)
+}
+
+async fn check_schema(conn: &mut SqliteConnection) -> Result<(), Fault> {
+    check_schema_text(conn).await?;
+    check_schema_is_data(conn).await
 }
 
 /// The schema of a damaged file may hold names that are no text, over which the SQLite client would panic.
@@ -171,12 +179,51 @@ async fn check_schema_text(conn: &mut SqliteConnection) -> Result<(), Fault> {
     .await
 }
 
+/// A session is data: tables and their indices. A stranger's file may hold what runs when it is read or written, for ever or out of
+/// all memory: views, triggers, virtual tables, columns that are computed.
+async fn check_schema_is_data(conn: &mut SqliteConnection) -> Result<(), Fault> {
+    let runs = "SELECT type, CAST(name AS BLOB) AS name FROM sqlite_schema
+         WHERE type NOT IN ('table', 'index') OR coalesce(rootpage, 0) = 0
+         UNION ALL SELECT 'column', CAST(x.name AS BLOB) FROM sqlite_schema s JOIN pragma_table_xinfo(s.name) x
+         WHERE s.type = 'table' AND x.hidden <> 0
+         LIMIT 1";
+    match sqlx::query(runs).fetch_optional(conn).await? {
+        None => Ok(()),
+        Some(row) => {
+            let (kind, name): (&[u8], &[u8]) =
+                (row.try_get_unchecked("type")?, row.try_get("name")?);
+            let kind = String::from_utf8_lossy(kind);
+            let found = format!("{kind} `{}`", String::from_utf8_lossy(name).escape_debug());
+            Err(Fault::bad(
+                "schema",
+                "plain tables and their indices",
+                found,
+            ))
+        }
+    }
+}
+
 /// The file that SQLite keeps beside a session: `-wal`, the write-ahead log, or `-journal`, what a transaction in rollback mode
 /// would be undone with.
 pub fn beside(path: &Path, ending: &str) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
     name.push(ending);
     PathBuf::from(name)
+}
+
+/// What is written beside a session is written there: a link in its place, in a folder from a stranger, would lead the writing to any
+/// other file.
+fn refuse_links(path: &Path) -> Result<(), RecorderError> {
+    for ending in ["-wal", "-shm", "-journal", "-lock"] {
+        let file = beside(path, ending);
+        if std::fs::symlink_metadata(&file).is_ok_and(|m| m.is_symlink()) {
+            return Err(RecorderError::NotASession {
+                path: path.to_owned(),
+                found: format!("a link beside it, {}: remove it", file.display()),
+            });
+        }
+    }
+    Ok(())
 }
 
 /// True when the file is in rollback mode. Layout: sqlite.org/fileformat.html section 1.3.
@@ -292,5 +339,77 @@ mod tests {
         // Nothing but the header, which nobody wrote.
         assert_eq!(problems.len(), 1, "{problems:?}");
         assert!(problems[0].contains("the run's header"), "{problems:?}");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_beside_a_session_lead_nowhere() {
+        let folder = tempfile::tempdir().unwrap();
+        let victim = folder.path().join("victim");
+        std::fs::write(&victim, "precious").unwrap();
+        for ending in ["-wal", "-shm", "-journal", "-lock"] {
+            let path = folder.path().join(format!("of{ending}.session.sqlite"));
+            let link = beside(&path, ending);
+            std::os::unix::fs::symlink(&victim, &link).unwrap();
+            assert!(crate::SessionWriter::create(&path).is_err(), "{ending}");
+            std::fs::remove_file(&link).unwrap();
+            drop(crate::SessionWriter::create(&path).unwrap());
+            std::os::unix::fs::symlink(&victim, &link).unwrap();
+            for refused in [
+                crate::SessionReader::open(&path).map(drop),
+                crate::SessionWriter::resume(&path).map(drop),
+                crate::SessionWriter::ended(&path).map(drop),
+            ] {
+                let refused = refused.unwrap_err().to_string();
+                assert!(refused.contains("a link beside it"), "{refused}");
+            }
+            assert_eq!(std::fs::read_to_string(&victim).unwrap(), "precious");
+        }
+    }
+
+    #[test]
+    fn a_schema_that_runs_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let runtime = tokio::runtime::Builder::new_current_thread()
+            .build()
+            .unwrap();
+        for (name, found, hostile) in [
+            (
+                "view",
+                "view `note`",
+                [
+                    "DROP TABLE note",
+                    "CREATE VIEW note AS WITH RECURSIVE n(t_ns) AS (SELECT 1 UNION ALL SELECT t_ns + 1 FROM n)
+                     SELECT t_ns AS id, t_ns, 'x' AS text FROM n",
+                ],
+            ),
+            (
+                "column",
+                "column `text`",
+                [
+                    "DROP TABLE note",
+                    "CREATE TABLE note (id INTEGER PRIMARY KEY, t_ns, text AS (hex(zeroblob(400000000))))",
+                ],
+            ),
+            (
+                "trigger",
+                "trigger `more`",
+                [
+                    "SELECT 1",
+                    "CREATE TRIGGER more AFTER UPDATE ON attempt BEGIN DELETE FROM chunk; END",
+                ],
+            ),
+        ] {
+            let path = folder.path().join(name);
+            runtime.block_on(async {
+                let mut conn = create(&path).await.unwrap();
+                for statement in hostile {
+                    sqlx::query(statement).execute(&mut conn).await.unwrap();
+                }
+                conn.close().await.unwrap();
+            });
+            let refused = crate::SessionReader::open(&path).unwrap_err().to_string();
+            assert!(refused.contains(found), "{refused}");
+        }
     }
 }

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::path::Path;
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use sqlx::Connection;
 use tokio::runtime::Runtime;
@@ -17,6 +17,9 @@ use crate::writer::Sealed;
 
 /// What is not committed by a durable record or by its size is committed after this time.
 const COMMIT_AFTER: Duration = Duration::from_millis(500);
+/// How long other programs may keep a session from being sealed.
+const SEAL_PATIENCE: Duration = Duration::from_secs(3);
+const SEAL_AGAIN: Duration = Duration::from_millis(20);
 
 /// Writes prepared records into the session file.
 pub struct Worker {
@@ -156,10 +159,16 @@ async fn seal_session(mut journal: Journal) -> Result<Sealed, RecorderError> {
     conn.clear_cached_statements()
         .await
         .map_err(|e| sql(e.into()))?;
-    let mode: String = sqlx::query_scalar("PRAGMA journal_mode = DELETE")
-        .fetch_one(&mut conn)
-        .await
-        .map_err(|e| unsealable(e.to_string()))?;
+    // Whoever just looks is gone in a moment; SQLite itself does not wait here.
+    let patience = Instant::now() + SEAL_PATIENCE;
+    let mode: String = loop {
+        let asked = sqlx::query_scalar("PRAGMA journal_mode = DELETE");
+        match asked.fetch_one(&mut conn).await {
+            Ok(mode) => break mode,
+            Err(_) if Instant::now() < patience => std::thread::sleep(SEAL_AGAIN),
+            Err(e) => return Err(unsealable(e.to_string())),
+        }
+    };
     if mode != "delete" {
         return Err(unsealable(format!("journal mode {mode}")));
     }

@@ -66,7 +66,8 @@ impl SessionReader {
         let found = self.ask("reading a chunk", async |conn| {
             let query = sqlx::query(NEXT).bind(camera.number()).bind(from);
             let row = query.fetch_optional(conn).await?;
-            row.map(|row| Ok((chunk_from(&row)?, blob(&row, "stored")?))).transpose()
+            row.map(|row| Ok((chunk_from(&row)?, blob(&row, "stored")?)))
+                .transpose()
         })?;
         let Some((meta, stored)) = found else {
             return Ok(None);

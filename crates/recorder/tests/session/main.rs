@@ -6,5 +6,6 @@ mod crash;
 mod damage;
 mod legs;
 mod python;
+mod readers;
 mod round_trip;
 mod salvage;

@@ -1,0 +1,209 @@
+//! A robot library whose every answer may be anything: numbers that are none, lies, refusals.
+
+use std::sync::{Mutex, PoisonError};
+use std::time::Duration;
+
+use skinrig_drd_abi::{
+    DEVICE_OMEGA3, DeviceId, ErrorCode, STATUS_CAPACITY, SdkVersion, StatusVector,
+};
+use skinrig_omega3::OmegaConfig;
+use skinrig_omega3::brake::brake;
+use skinrig_omega3::config::{Initialise, Patience};
+use skinrig_omega3::sdk::{Answer, CallError, Generator, Pace, Quantity, Reading, Sdk};
+use skinrig_omega3::{enumerate, open};
+
+/// Lists, opens, initialises and brakes a robot over such a library.
+pub fn answers(bytes: &[u8]) {
+    let sdk = Hostile(Mutex::new(bytes.to_vec()));
+    if let Ok(found) = enumerate::list(&sdk) {
+        for robot in &found {
+            assert!(!robot.to_string().is_empty());
+            let _ = robot.next_step();
+        }
+    }
+    let config = OmegaConfig {
+        initialise: Initialise::SampleIsOff,
+        patience: Patience {
+            brake_attempts: 3,
+            brake_retry: Duration::ZERO,
+            ..Patience::default()
+        },
+        ..OmegaConfig::default()
+    };
+    match open::open(&sdk, &config, |_| Ok(())) {
+        Ok(robot) => _ = brake(&sdk, robot.id, &config.patience, |_| ()),
+        Err(e) => assert!(!e.into_device("77").to_string().is_empty()),
+    }
+}
+
+/// Takes its answers from these bytes, and gives good ones when there are no more.
+struct Hostile(Mutex<Vec<u8>>);
+
+impl Hostile {
+    fn take<const N: usize>(&self) -> Option<[u8; N]> {
+        let mut left = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let said = left.first_chunk::<N>().copied()?;
+        left.drain(..N);
+        Some(said)
+    }
+
+    /// A quarter of the answers are refusals, another is whatever comes, the rest is good.
+    fn answer<T, const N: usize>(&self, good: T, any: impl Fn([u8; N]) -> T) -> Answer<T> {
+        match self.take::<1>().map(|[choice]| choice % 4) {
+            Some(0) => Err(CallError {
+                call: "hostile",
+                code: ErrorCode(i32::from_le_bytes(self.take().unwrap_or_default())),
+                text: String::from_utf8_lossy(&self.take::<8>().unwrap_or_default()).into_owned(),
+            }),
+            Some(1) => Ok(self.take().map_or(good, any)),
+            _ => Ok(good),
+        }
+    }
+
+    fn yes(&self, good: bool) -> bool {
+        self.take::<1>()
+            .map_or(good, |[choice]| (choice % 4 == 1) != good)
+    }
+
+    fn done(&self) -> Answer<()> {
+        self.answer((), |_: [u8; 0]| ())
+    }
+
+    fn real(&self, good: f64) -> Answer<f64> {
+        self.answer(good, f64::from_le_bytes)
+    }
+
+    fn vector(&self) -> Answer<[f64; 3]> {
+        Ok([self.real(0.0)?, self.real(0.0)?, self.real(0.0)?])
+    }
+
+    fn reading(&self) -> Answer<Reading> {
+        Ok(Reading {
+            position_m: self.vector()?,
+            cached: self.yes(false),
+        })
+    }
+}
+
+impl Sdk for Hostile {
+    fn version(&self) -> SdkVersion {
+        let number = || self.answer(10, i32::from_le_bytes).unwrap_or_default();
+        SdkVersion::new(number(), number(), number())
+    }
+    fn device_count(&self) -> Answer<i8> {
+        self.answer(1, i8::from_le_bytes)
+    }
+    fn open(&self, index: i8) -> Answer<DeviceId> {
+        self.answer(index, i8::from_le_bytes)
+    }
+    fn close(&self, _: DeviceId) -> Answer<()> {
+        self.done()
+    }
+    fn system_type(&self, _: DeviceId) -> Answer<i32> {
+        self.answer(DEVICE_OMEGA3, i32::from_le_bytes)
+    }
+    fn system_name(&self, _: DeviceId) -> Option<String> {
+        let name = self.take::<16>()?;
+        Some(String::from_utf8_lossy(&name).into_owned())
+    }
+    fn serial(&self, _: DeviceId) -> Answer<u16> {
+        self.answer(77, u16::from_le_bytes)
+    }
+    fn firmware(&self, _: DeviceId) -> Answer<f64> {
+        self.real(3.0)
+    }
+    fn com_mode(&self, _: DeviceId) -> Answer<i32> {
+        self.answer(1, i32::from_le_bytes)
+    }
+    fn check_memory(&self, _: DeviceId) -> Option<Answer<()>> {
+        Some(self.done())
+    }
+    fn status(&self, _: DeviceId) -> Answer<StatusVector> {
+        let mut words = [0; STATUS_CAPACITY];
+        for word in &mut words[..17] {
+            *word = self.answer(0, i32::from_le_bytes)?;
+        }
+        // Power, and no error.
+        words[0] = self.answer(1, i32::from_le_bytes)?;
+        Ok(StatusVector::from_words(&words))
+    }
+    fn is_supported(&self, _: DeviceId) -> bool {
+        self.yes(true)
+    }
+    fn is_initialized(&self, _: DeviceId) -> bool {
+        self.yes(true)
+    }
+    fn auto_init(&self, _: DeviceId) -> Answer<()> {
+        self.done()
+    }
+    fn set(&self, _: DeviceId, _: Quantity, _: f64) -> Option<Answer<()>> {
+        self.yes(true).then(|| self.done())
+    }
+    fn get(&self, _: DeviceId, _: Quantity) -> Option<Answer<f64>> {
+        self.yes(true).then(|| self.real(0.0))
+    }
+    fn compensate_gravity(&self, _: DeviceId) -> Answer<()> {
+        self.done()
+    }
+    fn enable_expert_mode(&self) -> Answer<()> {
+        self.done()
+    }
+    fn watchdog(&self, _: DeviceId) -> Answer<u8> {
+        self.answer(80, u8::from_le_bytes)
+    }
+    fn set_watchdog(&self, _: DeviceId, _: u8) -> Answer<()> {
+        self.done()
+    }
+    fn velocity_threshold(&self, _: DeviceId) -> Answer<u32> {
+        self.answer(40, u32::from_le_bytes)
+    }
+    fn start(&self, _: DeviceId) -> Answer<()> {
+        self.done()
+    }
+    fn stop(&self, _: DeviceId) -> Answer<()> {
+        self.done()
+    }
+    fn is_running(&self, _: DeviceId) -> bool {
+        self.yes(false)
+    }
+    fn control_khz(&self, _: DeviceId) -> Answer<f64> {
+        self.real(4.0)
+    }
+    fn regulate_position(&self, _: DeviceId) -> Answer<()> {
+        self.done()
+    }
+    fn enable_filter(&self, _: DeviceId) -> Answer<()> {
+        self.done()
+    }
+    fn is_filtering(&self, _: DeviceId) -> bool {
+        self.yes(true)
+    }
+    fn set_pace(&self, _: DeviceId, _: Generator, _: Pace) -> Answer<()> {
+        self.done()
+    }
+    fn pace(&self, _: DeviceId, _: Generator) -> Answer<Pace> {
+        Ok(Pace {
+            acceleration_m_s2: self.real(1.0)?,
+            speed_m_s: self.real(1.0)?,
+            jerk_m_s3: self.real(1.0)?,
+        })
+    }
+    fn track(&self, _: DeviceId, _: [f64; 3]) -> Answer<()> {
+        self.done()
+    }
+    fn regulated_position(&self, _: DeviceId) -> Answer<Reading> {
+        self.reading()
+    }
+    fn position(&self, _: DeviceId) -> Answer<Reading> {
+        self.reading()
+    }
+    fn force(&self, _: DeviceId) -> Answer<[f64; 3]> {
+        self.vector()
+    }
+    fn emergency_stop(&self, _: DeviceId) -> Answer<()> {
+        self.done()
+    }
+    fn force_off(&self, _: DeviceId) -> Answer<()> {
+        self.done()
+    }
+}

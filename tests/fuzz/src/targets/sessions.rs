@@ -1,0 +1,120 @@
+//! Session files, as a stranger hands them over.
+
+use std::path::{Path, PathBuf};
+
+use skinrig_formats::Scanner;
+use skinrig_model::{
+    CameraId, ChunkFacts, HostTime, Record, ResumeHeader, StreamFormat, TriggerEdge,
+};
+use skinrig_recorder::{ChunkScanner, RecorderError, SessionReader, SessionWriter};
+use tempfile::TempDir;
+
+/// A folder for one case, in memory where the system has such a place.
+pub struct Folder(TempDir);
+
+impl Folder {
+    #[expect(
+        clippy::expect_used,
+        reason = "a target without a place for files tests nothing"
+    )]
+    pub fn new() -> Self {
+        let memory = Path::new("/dev/shm");
+        let folder = if memory.is_dir() {
+            TempDir::new_in(memory)
+        } else {
+            TempDir::new()
+        };
+        Self(folder.expect("a temporary folder"))
+    }
+
+    #[expect(
+        clippy::expect_used,
+        reason = "a target without a place for files tests nothing"
+    )]
+    pub fn file(&self, name: &str, bytes: &[u8]) -> PathBuf {
+        let path = self.0.path().join(name);
+        std::fs::write(&path, bytes).expect("a temporary file");
+        path
+    }
+}
+
+/// What `verify` decodes chunks with.
+struct Rescan([Scanner; 2]);
+
+impl ChunkScanner for Rescan {
+    fn restart(&mut self, camera: CameraId, format: StreamFormat, origin_us: u64) {
+        let scanner = &mut self.0[camera.index()];
+        *scanner = Scanner::new(format);
+        scanner.restart(origin_us);
+    }
+
+    fn scan(
+        &mut self,
+        camera: CameraId,
+        _format: StreamFormat,
+        bytes: &[u8],
+    ) -> (ChunkFacts, Vec<TriggerEdge>) {
+        self.0[camera.index()].push(bytes)
+    }
+}
+
+/// A session file: listed, read, verified, salvaged, gone on with. It must not become anything but a session, and nothing but the
+/// files that belong to it may appear.
+pub fn session(bytes: &[u8]) {
+    let folder = Folder::new();
+    let path = folder.file("x.session.sqlite", bytes);
+    let _ = skinrig_recorder::list(folder.0.path());
+    let _ = read(&path);
+    let rescan = [StreamFormat::Evt2; 2].map(Scanner::new);
+    let _ = skinrig_recorder::verify(&path, &mut Rescan(rescan));
+    let saved = folder.0.path().join("saved.session.sqlite");
+    if skinrig_recorder::salvage(&path, &saved).is_ok() {
+        let _ = read(&saved);
+    }
+    let _ = go_on(&path);
+}
+
+/// Everything that a reader offers; what one method refuses does not keep the next from being asked.
+fn read(path: &Path) -> Result<(), RecorderError> {
+    let reader = SessionReader::open(path)?;
+    let _ = reader.session_id();
+    let _ = reader.header();
+    let _ = reader.seal();
+    let _ = reader.devices();
+    let _ = reader.totals();
+    let _ = reader.presses();
+    let _ = reader.last_outcomes();
+    let _ = reader.preflight();
+    let _ = reader.commands();
+    let _ = reader.marks_sent();
+    let _ = reader.box_reports();
+    let _ = reader.interruptions();
+    let _ = reader.notes();
+    let _ = reader.end();
+    let _ = reader.legs();
+    let _ = reader.history();
+    let _ = reader.for_each_pose_block(HostTime(i64::MIN), HostTime(i64::MAX), |_| ());
+    for camera in CameraId::ALL {
+        let _ = reader.chunk_index(camera);
+        let _ = reader.for_each_chunk(camera, 0, |_, _| ());
+        let _ = reader.gaps(camera);
+        let _ = reader.trigger_edges(camera);
+    }
+    Ok(())
+}
+
+/// Begins a further leg, and leaves it.
+fn go_on(path: &Path) -> Result<(), RecorderError> {
+    let mut writer = SessionWriter::resume(path)?;
+    writer.accept(Record::Resumed(Box::new(ResumeHeader {
+        operator: "stranger".into(),
+        started_at: "2026-01-03T03:04:05Z".into(),
+        host: "bench".into(),
+        software: "0.1.0".into(),
+        command_line: "skinrig resume".into(),
+    })))?;
+    writer.accept(Record::Note {
+        t: HostTime(0),
+        text: "here".into(),
+    })
+}

@@ -1,0 +1,57 @@
+//! Camera bytes: the words of every format, and folded chunks.
+
+use skinrig_formats::{Decoder, EventSink, Scanner};
+use skinrig_model::{CdEvent, StreamFormat, TriggerEdge};
+use skinrig_recorder::codec;
+
+struct Forget;
+
+impl EventSink for Forget {
+    fn on_cd(&mut self, _: &[CdEvent]) {}
+    fn on_trigger(&mut self, _: TriggerEdge) {}
+}
+
+/// The first byte chooses the format and where the words are split; a device that starts anew in between.
+pub fn any_format(bytes: &[u8]) {
+    let Some((choice, words)) = bytes.split_first() else {
+        return;
+    };
+    let format = [
+        StreamFormat::Evt2,
+        StreamFormat::Evt21,
+        StreamFormat::Evt21Legacy,
+        StreamFormat::Evt3,
+    ][usize::from(choice & 3)];
+    let (first, second) = words.split_at(words.len().min(usize::from(choice >> 2) * 37));
+    let (mut decoder, mut scanner) = (Decoder::new(format), Scanner::new(format));
+    decoder.push(first, &mut Forget);
+    let _ = scanner.push(first);
+    assert_eq!(
+        decoder.stats(),
+        scanner.stats(),
+        "decoder and scanner count alike"
+    );
+    let origin_us = decoder.last_us().unwrap_or_default();
+    decoder.restart(origin_us);
+    scanner.restart(origin_us);
+    decoder.push(second, &mut Forget);
+    let _ = scanner.push(second);
+    assert_eq!(
+        decoder.stats(),
+        scanner.stats(),
+        "decoder and scanner count alike"
+    );
+}
+
+/// The first four bytes claim a length, the others are to be unfolded to it.
+pub fn folded(bytes: &[u8]) {
+    let Some((claim, stored)) = bytes.split_first_chunk::<4>() else {
+        return;
+    };
+    if let Ok(raw) = codec::unfold(stored, u32::from_le_bytes(*claim) as usize) {
+        assert_eq!(raw.len(), u32::from_le_bytes(*claim) as usize);
+    }
+    if let Some(again) = codec::fold(stored) {
+        assert_eq!(codec::unfold(&again, stored.len()).as_deref(), Ok(stored));
+    }
+}
