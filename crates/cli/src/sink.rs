@@ -96,6 +96,27 @@ impl SessionSink {
     }
 }
 
+impl SessionSink {
+    /// Remarks that the run had to wait for the disk, which is where data are lost next.
+    fn tell_waits(&mut self, t: HostTime) -> Result<(), SinkFault> {
+        let load = self.writer.load();
+        if load.waits == 0 {
+            return Ok(());
+        }
+        let mb = |bytes: usize| bytes as f64 / 1e6;
+        let text = format!(
+            "recorder: expected room for every record, found none {} times: up to {:.1} of {:.1} MB waited for the disk, the run \
+             waited too, and data in the drivers; what they lost is counted per camera",
+            load.waits,
+            mb(load.most_bytes),
+            mb(load.limit_bytes)
+        );
+        self.view.say(&format!("note: {text}"));
+        let note = self.writer.accept(Record::Note { t, text });
+        note.map_err(|e| SinkFault(e.to_string()))
+    }
+}
+
 impl RecordSink for SessionSink {
     fn free_bytes(&mut self) -> Option<u64> {
         let free_b = gates::free_bytes(self.folder.as_deref()?).ok()?;
@@ -114,6 +135,9 @@ impl RecordSink for SessionSink {
             self.view.say(&gates::table(checks));
         }
         self.saboteur.before(&record)?;
+        if let Record::Ended { t, .. } = &record {
+            self.tell_waits(*t)?;
+        }
         // What is shown as done is on the disk. Bulk data, whose copy would cost, are only counted.
         let is_bulk = matches!(&record, Record::Chunk(_) | Record::Poses(_));
         let shown = if is_bulk {

@@ -37,6 +37,7 @@ pub use catalogue::{SESSION_SUFFIX, SessionState, SessionSummary, list};
 pub use codec::Codec;
 pub use error::RecorderError;
 pub use lock::writer_of;
+pub use queue::QueueLoad;
 pub use reader::SessionReader;
 pub use rows::{
     AttemptRow, ChunkMeta, CommandRow, DeviceRow, InterruptionRow, LegRow, NoteRow, PressTally,

@@ -30,11 +30,25 @@ struct Queue {
     prepared: VecDeque<(Prepared, usize)>,
     /// Bytes accepted and not yet written.
     bytes: usize,
+    /// The most of them at any time, and how often a caller waited for room.
+    most_bytes: usize,
+    waits: u64,
     /// Records accepted, and how many of them are durable, since the beginning.
     taken: u64,
     durable: u64,
     failed: Option<String>,
     closed: Option<Close>,
+}
+
+/// How full the queue of records has been.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct QueueLoad {
+    /// The most bytes that waited to be written at any time.
+    pub most_bytes: usize,
+    /// How many may wait.
+    pub limit_bytes: usize,
+    /// How often the run waited for room. Meanwhile data wait in the drivers, which count what they lose.
+    pub waits: u64,
 }
 
 /// How a session is left.
@@ -72,7 +86,9 @@ impl Shared {
     pub fn accept(&self, record: Record) -> Result<(), String> {
         let (bytes, durable) = (size_of(&record), is_durable(&record));
         let mut queue = self.lock();
-        while queue.failed.is_none() && queue.bytes > 0 && queue.bytes + bytes > QUEUE_BYTES {
+        let full = |q: &Queue| q.failed.is_none() && q.bytes > 0 && q.bytes + bytes > QUEUE_BYTES;
+        queue.waits += u64::from(full(&queue));
+        while full(&queue) {
             queue = self.wait(queue);
         }
         if let Some(detail) = &queue.failed {
@@ -80,6 +96,7 @@ impl Shared {
         }
         queue.accepted.push_back((record, bytes));
         queue.bytes += bytes;
+        queue.most_bytes = queue.most_bytes.max(queue.bytes);
         queue.taken += 1;
         let mine = queue.taken;
         self.changed.notify_all();
@@ -90,6 +107,16 @@ impl Shared {
             queue = self.wait(queue);
         }
         Ok(())
+    }
+
+    /// How full the queue has been.
+    pub fn load(&self) -> QueueLoad {
+        let queue = self.lock();
+        QueueLoad {
+            most_bytes: queue.most_bytes,
+            limit_bytes: QUEUE_BYTES,
+            waits: queue.waits,
+        }
     }
 
     /// The next record to prepare, with its bytes; `None` when there will be no more.
@@ -203,4 +230,44 @@ fn size_of(record: &Record) -> usize {
             Record::Poses(samples) => 64 * samples.len(),
             _ => 0,
         }
+}
+
+#[cfg(test)]
+mod tests {
+    use skinrig_model::{CameraId, ChunkFacts, HostTime, RawChunk};
+
+    use super::*;
+
+    fn chunk(bytes: usize) -> Record {
+        Record::Chunk(RawChunk {
+            camera: CameraId::One,
+            seq: 0,
+            host_time: HostTime::ZERO,
+            lost_before: 0,
+            bytes: vec![0; bytes],
+            facts: ChunkFacts::default(),
+            triggers: Vec::new(),
+        })
+    }
+
+    #[test]
+    fn who_finds_no_room_waits_and_is_counted() {
+        let shared = Shared::default();
+        let most = QUEUE_BYTES / 4 * 3;
+        assert_eq!(shared.accept(chunk(most)), Ok(()));
+        let before = shared.load();
+        assert!(before.most_bytes >= most && before.waits == 0, "{before:?}");
+        std::thread::scope(|scope| {
+            let second = scope.spawn(|| shared.accept(chunk(most)));
+            // It cannot be accepted before there is room, whenever it comes.
+            while shared.load().waits == 0 {
+                std::thread::yield_now();
+            }
+            assert!(!second.is_finished());
+            shared.written(before.most_bytes);
+            assert!(second.join().is_ok_and(|accepted| accepted.is_ok()));
+        });
+        let after = shared.load();
+        assert_eq!((after.most_bytes, after.waits), (before.most_bytes, 1));
+    }
 }

@@ -14,7 +14,7 @@ use crate::insert::Journal;
 use crate::leg::Joint;
 use crate::lock::WriterLock;
 use crate::prepare::Preparer;
-use crate::queue::{Close, Shared};
+use crate::queue::{Close, QueueLoad, Shared};
 use crate::rows::SessionTotals;
 use crate::worker::Worker;
 use crate::{prepare, resume, schema};
@@ -169,6 +169,12 @@ impl SessionWriter {
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
+    }
+
+    /// How full the queue of records has been.
+    #[must_use]
+    pub fn load(&self) -> QueueLoad {
+        self.shared.load()
     }
 
     /// Takes one record. `Started`, `Resumed`, `Intent`, `Outcome` and `Ended` return when they and all records before
