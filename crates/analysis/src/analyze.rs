@@ -55,6 +55,8 @@ pub fn analyze_and_keep(
     let plan = Closeups::choose(input, keep);
     let base = time_base(input);
     let legs = legs::clocks(input, base.as_ref());
+    let pressed = spans(input).into_iter().map(|s| s.contact_us);
+    let nominal = legs::nominal_only(&input.legs, &legs, pressed);
     let base_clock = |k: usize| base.as_ref().and_then(|b| b.clocks[k]);
     let [one, two] = std::thread::scope(|scope| {
         let second =
@@ -138,10 +140,13 @@ pub fn analyze_and_keep(
         rig: input.rig,
         geometry,
         counts,
-        alignment: base.map_or_else(
-            || uncertified([one.clock, two.clock]),
-            |base| base.alignment,
-        ),
+        alignment: Alignment {
+            warnings: nominal,
+            ..base.map_or_else(
+                || uncertified([one.clock, two.clock]),
+                |base| base.alignment,
+            )
+        },
         clocks: [one.clock, two.clock],
         legs,
         contact_timing: contact_timing(input, scheduled),

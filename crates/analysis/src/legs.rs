@@ -4,7 +4,7 @@
 //! leg's clock is fitted on its own, its times are moved by whole µs so that one line through camera over host time holds for all.
 //! From there on a session in legs is as any other.
 
-use skinrig_model::{HostTime, TriggerEdge};
+use skinrig_model::{CameraId, HostTime, TriggerEdge};
 
 use crate::clock::fit_marks;
 use crate::input::SessionInput;
@@ -179,4 +179,100 @@ pub(crate) fn clocks(input: &SessionInput, base: Option<&TimeBase>) -> Vec<LegCl
             }),
         })
         .collect()
+}
+
+/// Says so for every leg with presses, the first included, in which a camera's own trains or marks give no clock while there are other
+/// legs: where it lies among them is then known by its nominal start alone. `pressed_us`: host times of contacts, µs.
+pub(crate) fn nominal_only(
+    legs: &[LegStart],
+    clocks: &[LegClock],
+    pressed_us: impl Iterator<Item = f64>,
+) -> Vec<String> {
+    let mut pressed = vec![false; legs.len() + 1];
+    for us in pressed_us {
+        pressed[leg_at(legs, HostTime((us * 1e3) as i64))] = true;
+    }
+    let each = clocks.iter().zip(pressed).filter(|(_, pressed)| *pressed);
+    let unknown = each.flat_map(|(leg, _)| {
+        let cameras = CameraId::ALL.into_iter().zip(&leg.cameras);
+        cameras.filter(|(_, fit)| fit.is_none()).map(|(camera, _)| {
+            format!(
+                "leg {}, {camera}: expected trains or marks to fit its clock, found too few: it is laid on the other legs by \
+                 its nominal start alone",
+                leg.number
+            )
+        })
+    });
+    unknown.collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::result::ClockMethod;
+
+    fn edge(t_us: u64) -> TriggerEdge {
+        TriggerEdge {
+            t_us,
+            channel: 0,
+            rising: true,
+        }
+    }
+
+    const LEGS: [LegStart; 3] = [
+        LegStart::recorded(HostTime(10_000_000_000), [5_000_000, 7_000_000]),
+        // Nothing came in it: the next one begins at the same camera times.
+        LegStart::recorded(HostTime(12_000_000_000), [9_000_000, 8_000_000]),
+        LegStart::recorded(HostTime(14_000_000_000), [9_000_000, 8_000_000]),
+    ];
+
+    #[test]
+    fn every_edge_belongs_to_one_leg_and_an_empty_leg_has_none() {
+        let edges = [0, 4_999_999, 5_000_000, 8_999_999, 9_000_000, 20_000_000].map(edge);
+        let of = |leg| edges_of(&edges, &LEGS, leg, 0).len();
+        assert_eq!([0, 1, 2, 3].map(of), [2, 2, 0, 2]);
+        let at = |ns| leg_at(&LEGS, HostTime(ns));
+        assert_eq!(
+            [
+                -1,
+                9_999_999_999,
+                10_000_000_000,
+                13_999_999_999,
+                14_000_000_000
+            ]
+            .map(at),
+            [0, 0, 1, 2, 3]
+        );
+    }
+
+    #[test]
+    fn a_leg_that_lies_by_its_nominal_start_is_said() {
+        let fit = ClockFit {
+            method: ClockMethod::TriggerMarks,
+            offset_us: 0.0,
+            drift_ppm: 0.0,
+            drift_se_ppm: 1.0,
+            residual_rms_us: 1.0,
+            residual_max_us: 2.0,
+            n: 20,
+            rejected: 0,
+        };
+        let clock = |number, cameras| LegClock {
+            number,
+            start_s: 0.0,
+            cameras,
+        };
+        let clocks = [
+            clock(1, [Some(fit); 2]),
+            clock(2, [Some(fit), None]),
+            clock(3, [None; 2]),
+            clock(4, [Some(fit); 2]),
+        ];
+        // Nothing was pressed in the third.
+        let pressed = [1e6, 11e6, 11.5e6, 15e6].into_iter();
+        let said = nominal_only(&LEGS, &clocks, pressed);
+        assert_eq!(said.len(), 1, "{said:?}");
+        assert!(said[0].starts_with("leg 2, camera 2: expected"), "{said:?}");
+        assert_eq!(nominal_only(&[], &[], [1e6].into_iter()), [""; 0]);
+    }
 }

@@ -594,3 +594,35 @@ fn the_legs_are_laid_on_one_line() {
     let further = (input.legs[0].moved_us[1] - aligned[1]).abs();
     assert!(further <= 20, "{further} µs");
 }
+
+/// A leg that was cut off before its first chunk: the next one begins at the same camera times.
+#[test]
+fn a_leg_that_holds_nothing_changes_nothing() {
+    let s = in_legs(32);
+    let mut without = input(&s);
+    let mut with = without.clone();
+    let empty = LegStart::recorded(HostTime(42_000_000_000), s.leg.recorded_us);
+    with.legs.insert(0, empty);
+    let reset = |r: &BoxReport| matches!(r, BoxReport::Reset { .. });
+    let at = with.box_reports.iter().position(reset).unwrap();
+    let noticed = empty.origin;
+    with.box_reports.insert(at, BoxReport::Reset { noticed });
+    align(&mut without);
+    align(&mut with);
+    assert_eq!(with.edges, without.edges);
+    assert_eq!(with.gaps, without.gaps);
+    assert_eq!(with.legs[1].moved_us, without.legs[0].moved_us);
+    let base = |input: &SessionInput| {
+        let ties = Ties {
+            reports: &input.box_reports,
+            edges: [&input.edges[0], &input.edges[1]],
+            channel: 0,
+            legs: &input.legs,
+            used_at_us: &s.joined.presses,
+        };
+        TimeBase::new(&ties, &AlignmentSettings::default()).unwrap()
+    };
+    let (with, without) = (base(&with).alignment, base(&without).alignment);
+    assert_eq!(with.status, AlignmentStatus::Valid, "{with:#?}");
+    assert_eq!(with.camera_from_host, without.camera_from_host);
+}

@@ -1,9 +1,10 @@
 //! Where a session's numbers come from, gathered for the report.
 
+use chrono::DateTime;
 use skinrig_analysis::Analysis;
-use skinrig_model::{RunEnd, RunHeader};
+use skinrig_model::{HostTime, PressVerdict, RunEnd, RunHeader};
 use skinrig_recorder::{RecorderError, SessionReader};
-use skinrig_report::{DeviceRow, InterruptionRow, NoteRow, Provenance};
+use skinrig_report::{DeviceRow, InterruptionRow, LegRow, NoteRow, Provenance, RetakenRow};
 
 /// Reads the provenance block of a session.
 ///
@@ -88,8 +89,72 @@ pub fn provenance(
         results_hash: skinrig_analysis::results_hash(analysis),
         run_end,
         run_end_reason,
+        legs: legs(reader, header)?,
+        retaken: retaken(reader)?,
         interruptions,
         notes,
         lost_bytes,
     })
+}
+
+/// A leg that was cut off went on to at most this long before the next one's origin: the recorder leaves one to two seconds.
+const PAUSE_S: f64 = 1.5;
+
+/// The legs as the report tells of them.
+fn legs(reader: &SessionReader, header: &RunHeader) -> Result<Vec<LegRow>, RecorderError> {
+    let rows = reader.legs()?;
+    let civil = |text: &str| DateTime::parse_from_rfc3339(text).ok();
+    // A simulated rig's clock runs as fast as it can be computed.
+    let is_civil = header.rig_kind != "simulated";
+    let apart_s = |i: usize| {
+        let (before, leg) = (rows.get(i.checked_sub(1)?)?, &rows[i]);
+        let apart = civil(&leg.began.started_at)? - civil(&before.began.started_at)?;
+        let last: HostTime = before.end.as_ref().map_or(leg.origin, |(t, _)| *t);
+        let pause_s = if before.end.is_some() { 0.0 } else { PAUSE_S };
+        let ran_s = last.as_secs_f64() - before.origin.as_secs_f64() - pause_s;
+        Some(apart.as_seconds_f64() - ran_s)
+    };
+    let end = |i: usize| match &rows[i].end {
+        Some((_, end)) => match end {
+            RunEnd::Completed => end.name().to_owned(),
+            RunEnd::Stopped(why) | RunEnd::Faulted(why) => format!("{}: {why}", end.name()),
+        },
+        None if i + 1 == rows.len() && skinrig_recorder::writer_of(reader.path()).is_some() => {
+            "under way".to_owned()
+        }
+        None => "cut off".to_owned(),
+    };
+    let told = rows.iter().enumerate().map(|(i, leg)| LegRow {
+        number: leg.number,
+        started: leg.began.started_at.clone(),
+        start_s: leg.origin.as_secs_f64(),
+        end: end(i),
+        apart_s: apart_s(i).filter(|_| is_civil),
+    });
+    Ok(told.collect())
+}
+
+/// Attempts that were made, did not end well, and were replaced: sync presses that a further leg makes anew are none.
+fn retaken(reader: &SessionReader) -> Result<Vec<RetakenRow>, RecorderError> {
+    let mut rows = Vec::new();
+    for (planned, attempts) in reader.presses()? {
+        let replaced = attempts
+            .split_last()
+            .map_or(&[][..], |(_, earlier)| earlier);
+        for attempt in replaced.iter().filter(|a| a.intent.is_some()) {
+            let verdict = attempt.outcome.as_ref().map(|o| &o.verdict);
+            if verdict == Some(&PressVerdict::Valid) {
+                continue;
+            }
+            let reason = verdict
+                .and_then(PressVerdict::reason)
+                .unwrap_or("no outcome");
+            rows.push(RetakenRow {
+                press: planned.id.0,
+                attempt: attempt.id.number,
+                reason: reason.to_owned(),
+            });
+        }
+    }
+    Ok(rows)
 }

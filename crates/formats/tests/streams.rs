@@ -150,6 +150,38 @@ fn pieces<'a>(mut bytes: &'a [u8], sizes: &[usize]) -> Vec<&'a [u8]> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
 
+    /// Whatever came before, and wherever in a word it broke off.
+    #[test]
+    fn a_restarted_decoder_is_a_fresh_one_moved_by_the_origin(
+        (start, before) in items(),
+        (begin, after) in items(),
+        cut in 0_usize..9,
+        origin in 0_u64..1 << 40,
+        sizes in prop::collection::vec(1_usize..5000, 1..5),
+    ) {
+        for format in FORMATS {
+            let bytes_of = |start, items: &[Item]| match format {
+                StreamFormat::Evt2 => encode(start, items, 16),
+                other => encode_plainly(other, items),
+            };
+            let (old, new) = (bytes_of(start, &before), bytes_of(begin, &after));
+            let old = &old[..old.len().saturating_sub(cut)];
+            let mut decoder = decode(format, &[old]).1;
+            let mut found = Items::default();
+            decoder.restart(origin);
+            for part in pieces(&new, &sizes) {
+                decoder.push(part, &mut found);
+            }
+            let later = |item: &Item| match *item {
+                Item::Cd(e) => Item::Cd(CdEvent { t_us: e.t_us + origin, ..e }),
+                Item::Trigger(e) => Item::Trigger(TriggerEdge { t_us: e.t_us + origin, ..e }),
+                Item::Jump(step) => Item::Jump(step),
+            };
+            let fresh: Vec<Item> = decode(format, &[&new]).0.iter().map(later).collect();
+            prop_assert_eq!(&found.0, &fresh, "{:?}", format);
+        }
+    }
+
     #[test]
     fn evt2_round_trip_at_any_split(
         (start, items) in items(),

@@ -12,6 +12,7 @@
 pub mod axes;
 pub mod colour;
 pub mod comparison;
+mod course;
 pub mod derive;
 pub mod figures;
 pub mod page;
@@ -27,7 +28,7 @@ mod tables;
 mod terminal;
 
 pub use document::{JSON_FORMAT, JSON_VERSION};
-pub use provenance::{DeviceRow, InterruptionRow, NoteRow, Provenance};
+pub use provenance::{DeviceRow, InterruptionRow, LegRow, NoteRow, Provenance, RetakenRow};
 
 use skinrig_analysis::result::Analysis;
 

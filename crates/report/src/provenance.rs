@@ -50,6 +50,12 @@ pub struct Provenance {
     pub run_end: String,
     /// Why the run ended, when it did not simply complete.
     pub run_end_reason: Option<String>,
+    /// The legs in order; one alone when the session never went on.
+    #[serde(default)]
+    pub legs: Vec<LegRow>,
+    /// Attempts that another one replaced, in the plan's order.
+    #[serde(default)]
+    pub retaken: Vec<RetakenRow>,
     /// Everything that broke the normal course.
     pub interruptions: Vec<InterruptionRow>,
     /// Remarks.
@@ -66,6 +72,11 @@ impl Provenance {
             (false, true) => Some("emulated"),
             (false, false) => None,
         }
+    }
+
+    /// The legs, when there are several.
+    pub(crate) fn several_legs(&self) -> &[LegRow] {
+        if self.legs.len() > 1 { &self.legs } else { &[] }
     }
 
     /// True when this interruption is the one that ended the run: both give the same reason.
@@ -85,6 +96,33 @@ pub struct DeviceRow {
     pub serial: String,
     /// Firmware or library version.
     pub firmware: String,
+}
+
+/// One leg: one life of the process that recorded the session.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct LegRow {
+    /// 1, 2, 3, ...
+    pub number: u32,
+    /// Civil time of its beginning, RFC 3339.
+    pub started: String,
+    /// Where it begins on the session's host clock, s.
+    pub start_s: f64,
+    /// How it ended: `completed`, `cut off`, `stopped: ...`, `faulted: ...` or `under way`.
+    pub end: String,
+    /// Civil time since the last record of the leg before, s, to about a second; `None` for the first leg, and where
+    /// the rig's clock is not the civil one.
+    pub apart_s: Option<f64>,
+}
+
+/// An attempt that another one replaced.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct RetakenRow {
+    /// Which press.
+    pub press: u32,
+    /// Which attempt, from 1.
+    pub attempt: u32,
+    /// Why it does not count.
+    pub reason: String,
 }
 
 /// One interruption.

@@ -24,6 +24,9 @@ pub struct Alignment {
     pub status: AlignmentStatus,
     /// What is beyond its limit, in words; empty unless invalid.
     pub violations: Vec<String>,
+    /// What stands on an assumption instead of a measurement, in words.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub warnings: Vec<String>,
     /// The maps between the clocks.
     pub maps: Vec<ClockMap>,
     /// The trigger input of each camera; empty when not certified.

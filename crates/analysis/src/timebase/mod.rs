@@ -123,6 +123,7 @@ impl TimeBase {
         let mut alignment = Alignment {
             status: AlignmentStatus::Valid,
             violations: Vec::new(),
+            warnings: Vec::new(),
             maps: base.maps(ties.used_at_us, limits),
             lines: [0, 1].map(|k| base.counts(k)).to_vec(),
             resets,

@@ -1,6 +1,7 @@
 //! A session that goes on in a further leg: one line of time, every press counted once, sound at every instant.
 
 use proptest::prelude::*;
+use sha2::{Digest as _, Sha256};
 use skinrig_model::*;
 use skinrig_recorder::{LegRow, RecorderError, SessionReader, SessionWriter, verify};
 use sqlx::ConnectOptions;
@@ -256,6 +257,40 @@ fn a_session_that_ended_without_its_seal_is_sealed() {
         SessionWriter::ended(&path),
         Err(RecorderError::Completed { .. })
     ));
+}
+
+/// A process that ends between the rows of the seal and the file hash leaves the placeholder in its place.
+#[test]
+fn a_seal_that_is_half_written_is_found_and_written_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.session.sqlite");
+    let whole = sealed(&path, PRESSES);
+    let mut bytes = std::fs::read(&path).unwrap();
+    let hash = whole.file_sha256;
+    let at = bytes.windows(32).position(|w| w == hash).unwrap();
+    let placeholder = Sha256::new()
+        .chain_update(b"skinrig: the file hash goes here")
+        .chain_update(whole.tree_sha256)
+        .finalize();
+    bytes[at..at + 32].copy_from_slice(&placeholder);
+    // Not yet read-only, as it is then.
+    std::fs::remove_file(&path).unwrap();
+    std::fs::write(&path, &bytes).unwrap();
+    let report = verify(&path, &mut Evt2::default()).unwrap();
+    assert!(
+        report
+            .problems
+            .iter()
+            .any(|p| p.contains("sealing was broken off")),
+        "{report:?}"
+    );
+    SessionWriter::ended(&path).unwrap().finish().unwrap();
+    sound(&path, true);
+    let seal = SessionReader::open(&path).unwrap().seal().unwrap().unwrap();
+    assert_eq!(
+        seal.tree_sha256, whole.tree_sha256,
+        "the content is the same"
+    );
 }
 
 /// A process that ends in the middle of the step that takes the seal off leaves a file with pages of both states, and beside it what

@@ -46,6 +46,9 @@ pub(super) fn maps(a: &Analysis) -> Option<Grid> {
         ]);
     }
     grid.note(words(certificate));
+    for warning in &certificate.warnings {
+        grid.note(crate::format::sentence(warning));
+    }
     grid.note(
         "The interval of host from box holds for certain: the box's clock was read between two instants of the host. Robot \
          from host is the identity with a stated delay. A constant delay of the trigger inputs cannot be seen here beyond \

@@ -165,7 +165,12 @@ pub(crate) fn render(input: &ReportInput<'_>) -> Result<String, ReportError> {
         add_up => c.add_up(),
         disagreement => derive::disagreement(a),
         empty => a.presses.is_empty(),
-        warnings => a.warnings.clone(),
+        warnings => [&a.alignment.warnings[..], &a.warnings].concat(),
+        legs => p.several_legs().iter()
+            .map(|leg| context! { number => leg.number, text => crate::course::leg(leg) })
+            .collect::<Vec<_>>(),
+        retaken => crate::course::retaken(p),
+        retaken_for => crate::course::reasons(p),
         interruptions => p.interruptions.iter().filter(|i| !p.ended_by(i))
             .map(|i| context! { t => number(Some(i.t_s), 1), kind => i.kind.clone(), reason => i.reason.clone() })
             .collect::<Vec<_>>(),

@@ -200,7 +200,7 @@ pub(crate) fn table(input: &ReportInput<'_>, color: bool) -> String {
     if let Some(text) = crate::derive::disagreement(a) {
         out += &paint.warn(&wrap("warning   ", &text));
     }
-    for warning in &a.warnings {
+    for warning in a.alignment.warnings.iter().chain(&a.warnings) {
         out += &paint.warn(&wrap("warning   ", &plain(warning)));
     }
     if out.len() > before {
@@ -310,6 +310,21 @@ pub(crate) fn table(input: &ReportInput<'_>, color: bool) -> String {
     for (i, lost) in p.lost_bytes.iter().enumerate().filter(|(_, l)| **l > 0) {
         let text = format!("camera {}: {} bytes lost", i + 1, grouped(*lost));
         out += &paint.warn(&wrap("loss      ", &text));
+    }
+    for leg in p.several_legs() {
+        let first = format!("{:<10}", format!("leg {}", leg.number));
+        out += &wrap(&first, &plain(&crate::course::leg(leg)));
+    }
+    if let Some(text) = crate::course::retaken(p) {
+        out += &wrap("retaken   ", &text);
+        let reasons = crate::course::reasons(p);
+        for reason in reasons.iter().take(MOST_RULES) {
+            out += &wrap("          ", &plain(reason));
+        }
+        if let Some(more) = reasons.len().checked_sub(MOST_RULES + 1) {
+            let text = format!("and for {} other reasons", more + 1);
+            out += &wrap("          ", &text);
+        }
     }
     for row in &p.interruptions {
         let mut text = format!("{} at {} s", row.kind, number(Some(row.t_s), 1));

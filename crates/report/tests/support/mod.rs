@@ -4,7 +4,7 @@ pub mod studies;
 
 use skinrig_analysis::result::*;
 use skinrig_model::*;
-use skinrig_report::{DeviceRow, InterruptionRow, NoteRow, Provenance};
+use skinrig_report::{DeviceRow, InterruptionRow, LegRow, NoteRow, Provenance, RetakenRow};
 
 /// A small generator (SplitMix64): the report needs no better one.
 pub struct Noise(pub u64);
@@ -206,6 +206,7 @@ fn alignment() -> Alignment {
     Alignment {
         status: AlignmentStatus::Valid,
         violations: vec![],
+        warnings: Vec::new(),
         maps: vec![
             map(MapName::HostFromBox, 41.0, 171.5),
             map(MapName::Camera1FromBox, 0.41, 2.1),
@@ -485,6 +486,33 @@ pub fn provenance() -> Provenance {
         results_hash: "77e1".repeat(16),
         run_end: "completed".into(),
         run_end_reason: None,
+        legs: vec![
+            LegRow {
+                number: 1,
+                started: "2026-03-02T14:05:09+01:00".into(),
+                start_s: 0.0,
+                end: "cut off".into(),
+                apart_s: None,
+            },
+            LegRow {
+                number: 2,
+                started: "2026-03-02T22:10:30+01:00".into(),
+                start_s: 1210.0,
+                end: "completed".into(),
+                apart_s: Some(27_913.5),
+            },
+        ],
+        retaken: [
+            (41, "camera 2 lost 4096 bytes during the press"),
+            (77, "cut off: leg 1 ended during the press"),
+            (93, "camera 2 lost 4096 bytes during the press"),
+        ]
+        .map(|(press, reason)| RetakenRow {
+            press,
+            attempt: 1,
+            reason: reason.into(),
+        })
+        .to_vec(),
         interruptions: vec![InterruptionRow {
             t_s: 1803.2,
             kind: "pause".into(),
