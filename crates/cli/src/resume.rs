@@ -293,7 +293,7 @@ fn open_rig(
     planted::refuse(&args.faults, &bench::display_name(&file))?;
     same_bench(&file, found)?;
     let rig = bench::open(&file, &protocol)?;
-    let notes = same_devices(&rig, found, args.allow_other_device)?;
+    let notes = same_devices(&rig, &found.devices, args.allow_other_device)?;
     let mut preflight = gates::of_bench(&file, &rig, folder, summary.duration_s);
     preflight.made.insert(0, gates::recorder(&args.session));
     Ok((rig, preflight, notes))
@@ -343,7 +343,7 @@ fn same_bench(file: &RigFile, found: &Unfinished) -> Result<(), Failure> {
 }
 
 /// The devices must be those that the session was begun with; with leave, what differs is remarked.
-fn same_devices(rig: &Rig, found: &Unfinished, others: bool) -> Result<Vec<String>, Failure> {
+fn same_devices(rig: &Rig, known: &[DeviceRow], others: bool) -> Result<Vec<String>, Failure> {
     let [one, two] = &rig.cameras;
     let mut notes = Vec::new();
     for (role, now) in [
@@ -351,7 +351,7 @@ fn same_devices(rig: &Rig, found: &Unfinished, others: bool) -> Result<Vec<Strin
         (DeviceRole::Camera1, one.identity()),
         (DeviceRole::Camera2, two.identity()),
     ] {
-        let before = found.devices.iter().rev().find(|d| d.role == role);
+        let before = known.iter().rev().find(|d| d.role == role);
         if let Some(before) = before
             && before.identity.serial != now.serial
         {
@@ -414,4 +414,40 @@ fn only_seal(session: &Path) -> Outcome {
         session.display()
     );
     Ok(Exit::Ok)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use skinrig_sim::{SimConfig, simulated_rig};
+
+    #[test]
+    fn another_device_is_refused_or_remarked() {
+        let rig = |seed| simulated_rig(&SimConfig::new(seed, SimLevel::Kinematic));
+        let (before, now) = (rig(1), rig(2));
+        let row = |role, identity| DeviceRow {
+            role,
+            identity,
+            settings: Vec::new(),
+        };
+        // Camera 1 was exchanged before; its last serial counts.
+        let known = [
+            row(DeviceRole::Camera1, before.cameras[0].identity()),
+            row(DeviceRole::Indenter, now.indenter.identity()),
+            row(DeviceRole::Camera1, now.cameras[0].identity()),
+            row(DeviceRole::Camera2, before.cameras[1].identity()),
+        ];
+        let same = &known[1..3];
+        assert_eq!(same_devices(&now, same, false).unwrap(), [""; 0]);
+        let serials = |of: &Rig| of.cameras[1].identity().serial;
+        let remark = format!(
+            "camera 2: expected serial {}, as in the session, found {}",
+            serials(&before),
+            serials(&now)
+        );
+        assert_eq!(same_devices(&now, &known, true).unwrap(), [remark.as_str()]);
+        let refused = same_devices(&now, &known, false).unwrap_err().message;
+        assert!(refused.contains(&remark), "{refused}");
+        assert!(refused.contains("--allow-other-device"), "{refused}");
+    }
 }

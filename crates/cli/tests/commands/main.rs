@@ -15,6 +15,7 @@ mod operator;
 mod options;
 mod pipeline;
 mod replay;
+mod resume;
 mod rigs;
 mod streams;
 mod support;

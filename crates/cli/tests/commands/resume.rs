@@ -1,0 +1,161 @@
+//! A session that was cut off goes on in a further leg, from the command line to its results; and what is refused.
+
+use std::path::PathBuf;
+
+use serde_json::Value;
+use skinrig_model::{Record, RunHeader};
+use skinrig_recorder::{SessionReader, SessionWriter};
+
+use crate::support::{Lab, SMALL, files, only, read_json, show, skinrig, text};
+
+/// The small campaign, gone in the middle of a press of its second round.
+fn cut_off(lab: &Lab) -> PathBuf {
+    let sessions = lab.text("cut");
+    let run = skinrig(&[
+        "run",
+        SMALL,
+        "--sessions",
+        &sessions,
+        "--no-analysis",
+        "--fault",
+        "killed@journal:20",
+    ]);
+    assert_eq!(run.code, None, "{run:#?}");
+    only(&lab.path("cut"), ".session.sqlite")
+}
+
+fn analysis(session: &std::path::Path) -> (Value, String) {
+    let out = session.with_extension("results.json");
+    let said = skinrig(&["analyze", &text(session), "--out", &text(&out)]).code(0);
+    (read_json(&out), said.out)
+}
+
+#[test]
+fn a_resumed_session_gives_the_results_of_one_that_was_never_cut_off() {
+    let lab = Lab::new();
+    let session = cut_off(&lab);
+    let open: Vec<Value> = show(&session)["presses"].as_array().unwrap().clone();
+    let open = open
+        .iter()
+        .find(|p| p["verdict"] == "open" && p["attempts"] == 1);
+    let press = open.expect("one press was under way")["press"].clone();
+
+    let said = skinrig(&["resume", &text(&session)]).code(0).out;
+    assert!(said.contains(&format!("press {press} cut off")), "{said}");
+    let told = format!("press {press}: cut off: leg 1 of the session ended without its outcome");
+    for line in [
+        "leg 1 ",
+        ": cut off\n",
+        "leg 2 ",
+        ": completed\n",
+        "1 attempt at 1 press made again",
+        &told,
+    ] {
+        assert!(said.contains(line), "expected {line:?} in {said}");
+    }
+    let page = std::fs::read_to_string(only(&lab.path("cut"), ".report.html")).unwrap();
+    for part in [
+        "data-testid=\"legs\"",
+        "data-testid=\"retaken\"",
+        "<b>leg 2</b>",
+        &told,
+    ] {
+        assert!(page.contains(part), "expected {part:?} on the page");
+    }
+    skinrig(&["verify", &text(&session)]).code(0);
+
+    let (resumed, _) = analysis(&session);
+    let (whole, _) = analysis(&lab.record("whole", &[]));
+    assert_eq!(resumed["analysis"]["alignment"]["status"], "valid");
+    assert_eq!(resumed["analysis"]["alignment"]["warnings"], Value::Null);
+    let legs = resumed["analysis"]["legs"].as_array().unwrap();
+    assert_eq!(legs.len(), 2);
+    for fit in legs
+        .iter()
+        .flat_map(|leg| leg["cameras"].as_array().unwrap())
+    {
+        assert_eq!(fit["method"], "time_base", "a clock of its own: {fit}");
+    }
+    assert_eq!(resumed["analysis"]["counts"], whole["analysis"]["counts"]);
+    let presses = |of: &Value| of["analysis"]["presses"].as_array().unwrap().clone();
+    let (resumed, whole) = (presses(&resumed), presses(&whole));
+    assert_eq!((resumed.len(), whole.len()), (10, 10));
+    for (was, is) in whole.iter().zip(&resumed) {
+        assert_eq!(
+            (&is["press"], &is["planned"]),
+            (&was["press"], &was["planned"])
+        );
+        assert_eq!(is["verdict"], "valid", "{is}");
+        for axis in ["x_mm", "y_mm"] {
+            let of = |press: &Value, what: &str| press[what][axis].as_f64().unwrap();
+            // The robot's noise is not the same twice.
+            for expected in [of(was, "truth"), of(was, "planned")] {
+                let off = of(is, "truth") - expected;
+                assert!(off.abs() < 0.1, "{off} mm: {is}, was {was}");
+            }
+        }
+    }
+}
+
+/// A session that was just begun, with another header.
+fn begun(
+    lab: &Lab,
+    name: &str,
+    like: &std::path::Path,
+    change: impl FnOnce(&mut RunHeader),
+) -> PathBuf {
+    let mut header = SessionReader::open(like).unwrap().header().unwrap();
+    change(&mut header);
+    let path = lab.path(name);
+    let mut writer = SessionWriter::create(&path).unwrap();
+    writer.accept(Record::Started(Box::new(header))).unwrap();
+    path
+}
+
+#[test]
+fn what_cannot_go_on_is_refused_and_left_as_it_is() {
+    let lab = Lab::new();
+    let session = cut_off(&lab);
+    let refused = |session: &std::path::Path, parts: &[&str]| {
+        skinrig(&["resume", &text(session)])
+            .code(2)
+            .complains(parts);
+    };
+    let writer = SessionWriter::resume(&session).unwrap();
+    refused(&session, &["process "]);
+    drop(writer);
+    assert_eq!(show(&session)["legs"].as_array().unwrap().len(), 1);
+
+    let rig = ["resume", &text(&session), "--rig", "hil/rigs/emulated.yaml"];
+    skinrig(&rig).code(2).complains(&["expected no --rig"]);
+
+    for kind in ["imported", "replayed"] {
+        let other = |header: &mut RunHeader| header.rig_kind = kind.to_owned();
+        let path = begun(&lab, &format!("{kind}.session.sqlite"), &session, other);
+        refused(&path, &["expected a session that a rig recorded", kind]);
+    }
+    let whole = lab.record("whole", &[]);
+    let before = std::fs::read(&whole).unwrap();
+    refused(&whole, &["nothing to resume"]);
+    assert_eq!(std::fs::read(&whole).unwrap(), before);
+    assert_eq!(
+        files(&lab.path("whole"), "-wal"),
+        [""; 0].map(PathBuf::from)
+    );
+
+    // One byte of a text is another than when its SHA-256 was taken.
+    let header = SessionReader::open(&whole).unwrap().header().unwrap();
+    for (what, of) in [
+        ("protocol", &header.protocol_text),
+        ("plan", &header.plan_json),
+    ] {
+        let start = &of.as_bytes()[..32];
+        let at = before.windows(32).position(|bytes| bytes == start);
+        let mut bytes = before.clone();
+        bytes[at.unwrap()] ^= 1;
+        let path = lab.path(&format!("{what}.session.sqlite"));
+        std::fs::write(&path, bytes).unwrap();
+        let expected = format!("expected a {what} with SHA-256");
+        refused(&path, &[&expected, "skinrig verify"]);
+    }
+}
