@@ -89,6 +89,46 @@ mod tests {
     }
 
     #[test]
+    fn hostile_names_make_one_plain_file_in_the_folder() {
+        let dir = tempfile::tempdir().unwrap();
+        let t = DateTime::from_timestamp(0, 0).unwrap();
+        let long = "x".repeat(10_000);
+        for name in [
+            "../../x",
+            "/etc/passwd",
+            "..",
+            ".",
+            "",
+            "a/../../b",
+            "a\\..\\b",
+            "C:\\x",
+            "\\\\host\\share",
+            "CON",
+            "nul.txt",
+            "x\0y",
+            "~",
+            "$(touch x)",
+            "-rf",
+            "x\ny",
+            "\u{202e}gpj",
+            &long,
+        ] {
+            for (protocol, prototype) in [(name, "a"), ("a", name), (name, name)] {
+                let path = new_session(dir.path(), t, protocol, prototype).unwrap();
+                assert_eq!(path.parent(), Some(dir.path()), "{name:?}");
+                let file = path.file_name().unwrap().to_str().unwrap();
+                let plain = |c: char| c.is_ascii_alphanumeric() || "._-".contains(c);
+                // The time in front keeps it from being an option, a hidden file or a device of Windows.
+                assert!(
+                    file.starts_with("19700101T000000Z-") && file.chars().all(plain),
+                    "{file}"
+                );
+                assert!(file.len() < 140 && file.ends_with(SESSION_SUFFIX), "{file}");
+            }
+        }
+    }
+
+    #[test]
     fn results_lie_beside_the_session() {
         let session = Path::new("s/x.session.sqlite");
         assert_eq!(

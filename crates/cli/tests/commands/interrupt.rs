@@ -264,7 +264,7 @@ fn on_a_full_disk(folder: &str, blocks: u32) -> crate::support::Said {
 }
 
 #[test]
-fn a_disk_that_fills_up_stops_the_run_and_keeps_what_was_written() {
+fn a_disk_that_fills_up_stops_the_run_which_can_be_resumed() {
     // How much is written before the first press is the recorder's affair: the limit rises until some of it fits.
     for blocks in (1_000..40_000).step_by(1_000) {
         let lab = Lab::new();
@@ -285,6 +285,15 @@ fn a_disk_that_fills_up_stops_the_run_and_keeps_what_was_written() {
         let verified = skinrig(&["verify", &text(&session)]).code(0).out;
         assert!(verified.contains("not sealed"), "{verified}");
         if shown["totals"]["cd_events"].as_u64().unwrap() > 0 {
+            // With space again it goes on where it was.
+            skinrig(&["resume", &text(&session), "--no-analysis"]).code(0);
+            let shown = show(&session);
+            assert_eq!(
+                (&shown["end"], &shown["sealed"]),
+                (&"completed".into(), &true.into())
+            );
+            let verified = skinrig(&["verify", &text(&session)]).code(0).out;
+            assert!(verified.contains("sound, sealed"), "{verified}");
             return;
         }
     }

@@ -17,6 +17,7 @@ mod pipeline;
 mod replay;
 mod resume;
 mod rigs;
+mod strangers;
 mod streams;
 mod support;
 mod tradeoff;

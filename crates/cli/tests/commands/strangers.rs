@@ -1,0 +1,104 @@
+//! Input from strangers: names in it lead nowhere but into the folders that were asked for.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+use crate::support::{Lab, SMALL, only, skinrig, text};
+
+/// Names of a prototype or a protocol by somebody who wants to write elsewhere, or does not think of it.
+fn names() -> [String; 3] {
+    [
+        "../../../x".to_owned(),
+        "/etc/x".to_owned(),
+        "long ".repeat(100),
+    ]
+}
+
+/// Every file below `folder`, links not followed.
+fn everything(folder: &Path, to: &mut BTreeSet<PathBuf>) {
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() && !path.is_symlink() {
+            everything(&path, to);
+        } else {
+            to.insert(path);
+        }
+    }
+}
+
+#[test]
+fn names_from_a_file_stay_in_the_folders_that_were_asked_for() {
+    let lab = Lab::new();
+    let protocol = std::fs::read_to_string(Path::new(crate::support::ROOT).join(SMALL)).unwrap();
+    for (n, name) in names().iter().enumerate() {
+        // Deep inside, so that a name that climbs would still end in this test's own folder.
+        let (inner, sessions) = (format!("a/b/c/{n}"), format!("a/b/c/{n}/sessions"));
+        std::fs::create_dir_all(lab.path(&inner)).unwrap();
+        let file = lab.path(&format!("{inner}/x.yaml"));
+        let named = protocol
+            .replace("name: small", &format!("name: \"{name}\""))
+            .replace("id: test skin", &format!("id: \"{name}\""));
+        std::fs::write(&file, named).unwrap();
+        let ran = skinrig(&[
+            "run",
+            &text(&file),
+            "--sessions",
+            &lab.text(&sessions),
+            "--no-analysis",
+        ]);
+        ran.code(0);
+        let session = text(&only(&lab.path(&sessions), ".session.sqlite"));
+        let out = lab.text(&format!("{inner}/out"));
+        skinrig(&["export", &session, "--to", "all", "--out", &out]).code(0);
+        skinrig(&["report", &session]);
+        skinrig(&["salvage", &session]).code(0);
+    }
+    let mut found = BTreeSet::new();
+    everything(&lab.path(""), &mut found);
+    let strays: Vec<&PathBuf> = found
+        .iter()
+        .filter(|path| {
+            let folder = path.parent().unwrap();
+            let asked = folder.ends_with("sessions") || folder.ends_with("out");
+            let name = path.file_name().unwrap().to_str().unwrap();
+            let plain = name
+                .chars()
+                .all(|c| c.is_ascii_alphanumeric() || "._-".contains(c));
+            !(asked && plain && name.len() < 200 || path.ends_with("x.yaml"))
+        })
+        .collect();
+    assert!(strays.is_empty(), "{strays:?}");
+    // Protocol, session, salvaged session, six exports, and no run that was refused.
+    assert!(found.len() >= 9 * names().len(), "{found:?}");
+}
+
+#[cfg(unix)]
+#[test]
+fn links_in_a_strangers_folder_are_not_written_through() {
+    let lab = Lab::new();
+    let session = lab.record("s", &[]);
+    let victim = lab.path("victim");
+    std::fs::write(&victim, "precious").unwrap();
+    let stem = text(&session);
+    let stem = stem.strip_suffix(".session.sqlite").unwrap();
+    for ending in [
+        ".report.html.partial",
+        ".results.json.partial",
+        ".report.html",
+        ".presses.csv",
+        ".camera1.raw",
+        ".camera2.hdf5",
+        ".salvaged.session.sqlite",
+    ] {
+        std::os::unix::fs::symlink(&victim, format!("{stem}{ending}")).unwrap();
+    }
+    let session = text(&session);
+    skinrig(&["report", &session]).code(0);
+    for kind in ["raw", "hdf5", "presses"] {
+        skinrig(&["export", &session, "--to", kind])
+            .code(1)
+            .complains(&["next:"]);
+    }
+    skinrig(&["salvage", &session]).code(2);
+    assert_eq!(std::fs::read_to_string(&victim).unwrap(), "precious");
+}
