@@ -5,6 +5,7 @@
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
+use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
@@ -17,7 +18,7 @@ use skinrig_analysis::result::PressResult;
 use skinrig_controller::{
     ControlHandle, ControllerSettings, RecordSink, RunReport, SinkFault, execute_checked,
 };
-use skinrig_model::{HostTime, PressId, PressTiming, Record, RunEnd, SimLevel};
+use skinrig_model::{CameraId, HostTime, PressId, PressTiming, Record, RunEnd, SimLevel};
 use skinrig_protocol::{FaultKind, FaultPhase, FaultTime, Plan, PlantedFault, Protocol};
 use skinrig_recorder::{SessionReader, SessionWriter, verify};
 use skinrig_sim::{SimConfig, simulated_rig};
@@ -182,6 +183,34 @@ fn run((protocol, plan): (&Protocol, &Plan), fault: Option<PlantedFault>, path: 
     }
 }
 
+/// The run without a fault.
+struct Ideal {
+    presses: BTreeMap<PressId, PressResult>,
+    recorded: u64,
+}
+
+/// A fingerprint of what the devices delivered. Equal seeds deliver the same: a fault that strikes changes it.
+fn recorded(reader: &SessionReader) -> u64 {
+    let mut hash = DefaultHasher::new();
+    for camera in CameraId::ALL {
+        let chunks = reader.for_each_chunk(camera, 0, |meta, bytes| {
+            (meta.lost_before, bytes).hash(&mut hash);
+        });
+        chunks.unwrap();
+        format!("{:?}", reader.trigger_edges(camera).unwrap()).hash(&mut hash);
+    }
+    let poses = reader
+        .poses(HostTime(i64::MIN), HostTime(i64::MAX))
+        .unwrap();
+    let told = (
+        reader.box_reports().unwrap(),
+        reader.marks_sent().unwrap(),
+        poses,
+    );
+    format!("{told:?}").hash(&mut hash);
+    hash.finish()
+}
+
 /// What a cell says, and what is wrong with it.
 struct Cell {
     words: String,
@@ -190,7 +219,7 @@ struct Cell {
 }
 
 /// What becomes of a run with a fault, looked at from its session file alone, compared with the run without.
-fn judge(run: &Run, fault: PlantedFault, without: &BTreeMap<PressId, PressResult>) -> Cell {
+fn judge(run: &Run, fault: PlantedFault, without: &Ideal) -> Cell {
     let mut wrong = Vec::new();
     let verified = verify(&run.path, &mut Rescan::default()).unwrap();
     if !verified.is_sound() || verified.sealed != run.sealed {
@@ -200,6 +229,12 @@ fn judge(run: &Run, fault: PlantedFault, without: &BTreeMap<PressId, PressResult
         ));
     }
     let reader = SessionReader::open(&run.path).unwrap();
+    let struck = recorded(&reader) != without.recorded;
+    // After the last press no mark follows that could be spoiled.
+    let may_miss = matches!(fault.when, FaultTime::Nth(FaultPhase::Between, 5));
+    if !struck && !may_miss {
+        wrong.push("all that was recorded is as without the fault: it did not strike".into());
+    }
     let killed = fault.kind == FaultKind::Killed;
     let totals = reader.totals().unwrap();
     for tally in [totals.presses, totals.sync] {
@@ -220,9 +255,9 @@ fn judge(run: &Run, fault: PlantedFault, without: &BTreeMap<PressId, PressResult
     let retaken = attempts - attempted;
     let report = &run.report;
     if !killed {
-        let robot = matches!(report.end, RunEnd::Faulted(_));
-        if !report.disarmed && !robot {
-            wrong.push("not disarmed, and the run says nothing of it".into());
+        // A robot that answers no more cannot say that it is disarmed: its own brakes are on.
+        if !report.disarmed && fault.kind != FaultKind::RobotLost {
+            wrong.push("not disarmed".into());
         }
         if matches!(report.end, RunEnd::Completed) && !(report.retracted && report.disarmed) {
             wrong.push("completed, but not at rest".into());
@@ -241,7 +276,7 @@ fn judge(run: &Run, fault: PlantedFault, without: &BTreeMap<PressId, PressResult
     {
         // A slow robot moves in another way: its events are others, and so are its times, which are measured.
         let moves_as_ever = fault.kind != FaultKind::RobotSlow;
-        wrong.extend(differences(analysis, without, moves_as_ever));
+        wrong.extend(differences(analysis, &without.presses, moves_as_ever));
     }
     let planned = totals.presses.planned + totals.sync.planned;
     let mut words = match (&report.end, killed) {
@@ -255,6 +290,7 @@ fn judge(run: &Run, fault: PlantedFault, without: &BTreeMap<PressId, PressResult
             };
             format!("ended, {valid} valid, {place}")
         }
+        (RunEnd::Completed, _) if !struck => "too late to strike".to_owned(),
         (RunEnd::Completed, _) if !usable => "INVALID session".to_owned(),
         (RunEnd::Completed, _) if valid < planned => format!("{} invalid", planned - valid),
         (RunEnd::Completed, _) => "survived".to_owned(),
@@ -371,8 +407,10 @@ fn each_fault_in_each_phase_ends_as_documented() {
         "{:?}",
         analysis.alignment.violations
     );
-    let without: BTreeMap<_, _> = analysis.presses.into_iter().map(|p| (p.press, p)).collect();
-    let timings: Vec<PressTiming> = without.values().filter_map(|p| p.timing).collect();
+    let presses: BTreeMap<_, _> = analysis.presses.into_iter().map(|p| (p.press, p)).collect();
+    let timings: Vec<PressTiming> = presses.values().filter_map(|p| p.timing).collect();
+    let recorded = recorded(&SessionReader::open(&ideal.path).unwrap());
+    let without = Ideal { presses, recorded };
 
     let cells: Vec<(usize, usize)> = (0..FAULTS.len())
         .flat_map(|f| (0..PHASES.len()).map(move |p| (f, p)))
