@@ -1,0 +1,160 @@
+//! One pass over events, held against what a plain count gives.
+
+use super::*;
+
+fn window(row: usize, idle_start_us: u64, start_us: u64, end_us: u64) -> Window {
+    Window {
+        row,
+        start_us,
+        end_us,
+        idle_start_us,
+    }
+}
+
+fn event(t_us: u64, y: u16, polarity: Polarity) -> CdEvent {
+    CdEvent {
+        t_us,
+        x: 100,
+        y,
+        polarity,
+    }
+}
+
+fn run(windows: &[Window], events: &[CdEvent]) -> Accumulated {
+    let settings = AnalysisSettings::default();
+    let wanted = Wanted {
+        windows,
+        ..Wanted::default()
+    };
+    let mut all = Accumulator::new(CameraId::One, &settings, wanted);
+    events.chunks(2).for_each(|slice| all.take(slice));
+    all.finish().unwrap()
+}
+
+#[test]
+fn windows_include_their_start_and_exclude_their_end_in_any_order_within_the_slack() {
+    let windows = [window(4, 500_000, 1_000_000, 1_600_000)];
+    let on = |t| event(t, 200, Polarity::On);
+    let off = |t| event(t, 200, Polarity::Off);
+    let mut events = vec![
+        on(499_999),
+        on(500_000),
+        off(999_999),
+        on(1_000_000),
+        off(1_300_000),
+        off(1_599_999),
+        on(1_600_000),
+    ];
+    // Rows outside the crop (185..=360) count nowhere.
+    events.push(event(1_600_001, 184, Polarity::On));
+    events.push(event(1_600_002, 361, Polarity::On));
+    // Behind the newest event, but within the slack.
+    events.push(off(1_599_000));
+    let done = run(&windows, &events);
+    let (row, view) = done.views[0];
+    assert_eq!((row, view.events, view.on_events), (4, 4, 1));
+    assert!((view.idle_rate_per_s - 2.0 / 0.5).abs() < 1e-9);
+    assert!((view.rate_per_s - 4.0 / 0.6).abs() < 1e-9);
+    assert_eq!(done.late, 0);
+}
+
+#[test]
+fn overlapping_windows_each_keep_all_of_their_events() {
+    let windows = [
+        window(0, 1_000, 1_000, 5_000),
+        window(1, 3_000, 3_000, 9_000),
+    ];
+    let events: Vec<CdEvent> = (0..100)
+        .map(|i| event(100 * i, 250, Polarity::On))
+        .collect();
+    let views = run(&windows, &events).views;
+    let counts: Vec<(usize, u32)> = views.iter().map(|(row, v)| (*row, v.events)).collect();
+    assert_eq!(counts, [(0, 40), (1, 60)]);
+    assert_eq!(views[0].1.idle_s, 0.0);
+}
+
+#[test]
+fn an_estimator_keeps_so_many_events_of_all_open_windows_and_no_more() {
+    let windows = [
+        window(0, 1_000, 1_000, 5_000),
+        window(1, 3_000, 3_000, 9_000),
+        window(2, 20_000, 20_000, 24_000),
+    ];
+    let events: Vec<CdEvent> = (0..400)
+        .map(|i| event(100 * i, 250, Polarity::On))
+        .collect();
+    let done = |estimator, most_kept| {
+        let settings = AnalysisSettings {
+            estimator,
+            ..AnalysisSettings::default()
+        };
+        let wanted = Wanted {
+            windows: &windows,
+            ..Wanted::default()
+        };
+        let mut all = Accumulator::new(CameraId::Two, &settings, wanted);
+        all.most_kept = most_kept;
+        events.chunks(2).for_each(|slice| all.take(slice));
+        all.finish().map(|done| done.views.len())
+    };
+    // 40 and 60 while both are open; the 40 of the last come when those are gone.
+    assert_eq!(done(Estimator::ColumnMedian, 100), Ok(3));
+    let too_many = AnalysisError::TooManyEvents {
+        camera: CameraId::Two,
+        row: 1,
+        most: 99,
+    };
+    assert_eq!(done(Estimator::ColumnMedian, 99), Err(too_many));
+    // Clusters of pixels need counts only.
+    assert_eq!(done(Estimator::Dbscan, 0), Ok(3));
+}
+
+#[test]
+fn an_event_that_is_too_late_is_reported() {
+    let windows = [window(0, 1_000, 1_000, 5_000)];
+    let late = [2_000, 16_000, 15_000, 5_999].map(|t| event(t, 250, Polarity::On));
+    assert_eq!(run(&windows, &late).late, 1);
+}
+
+#[test]
+fn slices_of_any_size_and_a_little_disorder_give_what_each_event_gives() {
+    let windows = [
+        window(0, 3_000, 20_000, 60_000),
+        window(1, 50_000, 50_000, 90_000),
+        window(2, 90_000, 120_000, 150_000),
+    ];
+    // Every seventh event comes 4 ms late, and some lie outside the crop.
+    let events: Vec<CdEvent> = (0..5_000u64)
+        .map(|i| {
+            let t_us = 40 * i + 4_000 - if i % 7 == 0 { 4_000 } else { 0 };
+            event(t_us, 180 + (i % 11) as u16, Polarity::from_bit(i % 3 == 0))
+        })
+        .collect();
+    let settings = AnalysisSettings::default();
+    let seen = |size: usize| {
+        let wanted = Wanted {
+            windows: &windows,
+            rates: Some(RateHistogram::new(10_000)),
+            ..Wanted::default()
+        };
+        let mut all = Accumulator::new(CameraId::One, &settings, wanted);
+        events.chunks(size).for_each(|slice| all.take(slice));
+        let done = all.finish().unwrap();
+        assert_eq!(done.late, 0);
+        (done.views, done.rates, done.activity)
+    };
+    let whole = seen(events.len());
+    let inside = |from: u64, to: u64| {
+        let near = events.iter().filter(|e| (185..=360).contains(&e.y));
+        near.filter(|e| (from..to).contains(&e.t_us)).count() as u32
+    };
+    for ((row, view), w) in whole.0.iter().zip(&windows) {
+        assert_eq!(*row, w.row);
+        assert_eq!(view.events, inside(w.start_us, w.end_us));
+        let idle = view.idle_rate_per_s * view.idle_s;
+        assert!((idle - f64::from(inside(w.idle_start_us, w.start_us))).abs() < 1e-6);
+    }
+    for size in [1, 7, 1_000, 1_024] {
+        assert_eq!(seen(size), whole, "slices of {size}");
+    }
+}
