@@ -49,7 +49,12 @@ pub fn resume(args: &ResumeArgs, command_line: &str, json: bool) -> Outcome {
     }
     // From here on nobody else writes it.
     let writer = SessionWriter::resume(session).map_err(Failure::input)?;
+    // And what was read before may have been written since.
+    let found = read(session)?;
     let wanted = found.plan.wanted(&found.histories);
+    if let (Some(end), false) = (&found.end, wanted.contains(&true)) {
+        return Err(Failure::input(nothing_left(session, end)));
+    }
     if !json {
         outln!("{}", describe(session, &found, &wanted));
     }
@@ -66,6 +71,20 @@ pub fn resume(args: &ResumeArgs, command_line: &str, json: bool) -> Outcome {
         end_only(&found, header, writer)?
     };
     conclude(session, &report, args.no_analysis, None, json)
+}
+
+/// Every press has its outcome, and how the run ended is in the session: that is not made a better end afterwards.
+fn nothing_left(session: &Path, end: &RunEnd) -> String {
+    let reason = match end {
+        RunEnd::Completed => "completed".to_owned(),
+        RunEnd::Stopped(reason) | RunEnd::Faulted(reason) => {
+            format!("{}: {reason}", end.name())
+        }
+    };
+    format!(
+        "{0}: expected presses that are still to be made, found none; the run ended {reason}\n  next: see to that, then `skinrig analyze {0}`",
+        session.display()
+    )
 }
 
 /// Reads what a further leg needs, and refuses what none can have.
@@ -120,10 +139,6 @@ fn read(session: &Path) -> Result<Unfinished, Failure> {
         ))
     };
     let (histories, devices, end, legs) = all().map_err(Failure::input)?;
-    if end == Some(RunEnd::Completed) && reader.seal().map_err(Failure::input)?.is_some() {
-        let session = session.to_owned();
-        return Err(Failure::input(RecorderError::Completed { path: session }));
-    }
     Ok(Unfinished {
         header,
         document,

@@ -42,10 +42,12 @@ impl Operator {
                     hand.abort();
                 }
                 3 => {
-                    errln!("\nmotors off; closing the session");
+                    errln!("\nswitching the motors off where the tip is, and closing the session");
                     hand.halt();
                 }
-                _ => errln!("\nclosing the session"),
+                _ => errln!(
+                    "\nclosing the session; if nothing happens, press the force button of the robot"
+                ),
             }
         })?;
         Ok(Self { control, over })

@@ -25,6 +25,11 @@ impl Core<'_> {
         }
         let ready = self.shielded(|core| core.prepare(&header));
         self.conclude_preflight(ready)?;
+        // Whoever asked for an end in the meantime does not want the robot to be powered.
+        self.hear()?;
+        if self.machine.state() == State::Retracting {
+            return Err(Halt::Stopped);
+        }
         self.indenter.arm()?;
         self.await_pose()?;
         if self.machine.state() == State::Retracting {

@@ -101,6 +101,17 @@ impl Core<'_> {
             self.tick(None)?;
             self.collect(Collect::Flush)?;
         }
+        // Told once, and true of every press until the stream has caught up.
+        for camera in CameraId::ALL {
+            if self.continuity[camera.index()].late {
+                let text = format!("{camera}: expected data within {limit}, found them late");
+                self.with_open(|open| {
+                    if open.spoilt.is_empty() {
+                        open.spoilt.push(text);
+                    }
+                });
+            }
+        }
         if let Some(camera) = self.first_behind(end) {
             let arrived = self.continuity[camera.index()].arrived;
             let found = arrived.map_or("none".to_owned(), |t| format!("none after {t}"));

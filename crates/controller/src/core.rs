@@ -390,7 +390,7 @@ impl<'a> Core<'a> {
     }
 
     /// Listens to the operator.
-    fn hear(&mut self) -> Result<(), Halt> {
+    pub(crate) fn hear(&mut self) -> Result<(), Halt> {
         self.write_notes()?;
         let asked = self.control.asked();
         for request in self.control.take() {
@@ -407,10 +407,10 @@ impl<'a> Core<'a> {
                 Request::Pause => (Event::Pause, InterruptionKind::Pause, "operator: pause"),
                 Request::Resume => (Event::Resume, InterruptionKind::Resume, "operator: resume"),
             };
-            self.suspender.let_go();
+            let took_over = self.suspender.let_go();
             self.machine.fire(event);
             // A request without effect is not told.
-            if self.machine.state() != before {
+            if took_over || self.machine.state() != before {
                 let t = self.now();
                 self.journal.emit(Record::Interruption {
                     kind,

@@ -149,6 +149,8 @@ impl Core<'_> {
             end: end.clone(),
         });
         self.machine.fire(Event::Disarmed);
+        // Whatever is asked for from here on finds everything at rest already.
+        self.control.hear_up_to(self.control.asked());
         let [planned, valid, invalid, missed] = self.journal.counts();
         self.report = Some(RunReport {
             end,

@@ -4,8 +4,8 @@ use skinrig_device::{
     Clock, DeviceError, Indenter, IndenterCapabilities, MotionLimits, RobotSample,
 };
 use skinrig_model::{
-    DeviceIdentity, HostDuration, HostTime, Point3, PoseSample, RigidTransform, Robot, Setting,
-    Skin,
+    DeviceIdentity, HostDuration, HostTime, Point2, Point3, PoseSample, RigidTransform, Robot,
+    Setting, Skin,
 };
 use skinrig_protocol::area::Surroundings;
 use skinrig_protocol::plan::{OnTrip, RunLimits};
@@ -37,6 +37,8 @@ pub struct GuardedIndenter {
     watchdog: Watchdog,
     trip: Option<Trip>,
     target: Option<Point3<Skin>>,
+    /// Where the tip went below clearance height: it moves up and down there until it is clear again.
+    foot: Option<Point2>,
     samples: Vec<RobotSample>,
 }
 
@@ -61,6 +63,7 @@ impl GuardedIndenter {
             watchdog: Watchdog::new(WatchLimits::of(&limits, settings)),
             trip: None,
             target: None,
+            foot: None,
             samples: Vec::new(),
         }
     }
@@ -179,6 +182,11 @@ impl GuardedIndenter {
             .command(self.robot_from_skin.apply(target), speed_mm_s)
             .map_err(|e| self.failed(e))?;
         self.target = Some(target);
+        if target.z_mm < self.clear_height_mm() {
+            self.foot.get_or_insert(target.plane());
+        } else if self.is_clear() {
+            self.foot = None;
+        }
         Ok(())
     }
 
@@ -210,17 +218,28 @@ impl GuardedIndenter {
         };
         self.check_floor(last.measured, target)?;
         let lateral_mm = target.plane().distance_mm(last.measured.plane());
-        let rises = target.z_mm >= last.measured.z_mm && lateral_mm <= limits.position_tolerance_mm;
+        // Steeply: a long way aside in small steps would be no rise.
+        let rises = target.z_mm - last.measured.z_mm >= lateral_mm
+            && lateral_mm <= limits.position_tolerance_mm;
         if let Some(trip) = self.trip.as_ref().filter(|_| !rises) {
             return Err(GuardError::Tripped {
                 why: trip.to_string(),
             });
         }
         let height_mm = target.z_mm.min(last.measured.z_mm);
-        if lateral_mm > limits.position_tolerance_mm && height_mm < self.clear_height_mm() {
+        // From where the tip went down, too: many small steps are one large one.
+        let from_foot_mm = self
+            .foot
+            .map_or(0.0, |foot| target.plane().distance_mm(foot));
+        let aside_mm = if rises {
+            lateral_mm
+        } else {
+            lateral_mm.max(from_foot_mm)
+        };
+        if aside_mm > limits.position_tolerance_mm && height_mm < self.clear_height_mm() {
             return Err(GuardError::Lateral {
                 clearance_mm: limits.clearance_mm,
-                lateral_mm,
+                lateral_mm: aside_mm,
                 height_mm,
             });
         }

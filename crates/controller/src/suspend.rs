@@ -91,6 +91,8 @@ pub(crate) struct Suspender {
     window_from: Option<HostTime>,
     events: [u64; 2],
     lost: [u64; 2],
+    /// What tripped while the run was not running.
+    pending: Option<String>,
     /// The run waits because of this, since then.
     holding: Option<(HostTime, String)>,
 }
@@ -121,6 +123,7 @@ impl Suspender {
             window_from: None,
             events: [0; 2],
             lost: [0; 2],
+            pending: None,
             holding: None,
         }
     }
@@ -132,9 +135,9 @@ impl Suspender {
         self.lost[i] += chunk.lost_before;
     }
 
-    /// The operator paused or went on: whether the run waits is no longer for this to say.
-    pub(crate) fn let_go(&mut self) {
-        self.holding = None;
+    /// The operator paused or went on: whether the run waits is no longer for this to say. True when it was.
+    pub(crate) fn let_go(&mut self) -> bool {
+        self.holding.take().is_some()
     }
 
     /// Why the run waits because of this.
@@ -222,8 +225,15 @@ impl Core<'_> {
         if self.machine.state() == State::Running {
             self.suspender.holding = None; // the operator went on
         }
-        if let Some(words) = tripped
-            && self.machine.state() == State::Running
+        // What begins while the run waits for another reason holds it when it would go on.
+        if tripped.is_some() {
+            self.suspender.pending = tripped;
+        }
+        if self.suspender.is_calm() {
+            self.suspender.pending = None;
+        }
+        if self.machine.state() == State::Running
+            && let Some(words) = self.suspender.pending.take()
         {
             let reason = format!("{SUSPENDED}: {words}");
             let (event, kind) = match self.suspender.settings.press {

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use skinrig_model::Record;
 
@@ -11,6 +11,9 @@ use crate::query::Fault;
 
 /// Bytes of records that may wait to be written; beyond, [`accept`](crate::SessionWriter::accept) waits.
 const QUEUE_BYTES: usize = 64 << 20;
+
+/// Longest time for which a caller waits for the disk.
+const PATIENCE: Duration = Duration::from_secs(30);
 
 /// A record that can be written, or why it cannot. It keeps its place in the order either way.
 pub type Prepared = Result<Ready, Fault>;
@@ -75,6 +78,26 @@ impl Shared {
         self.queue.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    /// Waits for a change; gives up on a disk that took nothing since `since`: an arm must not wait for it in the skin.
+    fn wait_for_disk<'a>(
+        &self,
+        queue: MutexGuard<'a, Queue>,
+        since: Instant,
+    ) -> Result<MutexGuard<'a, Queue>, String> {
+        let left = PATIENCE.saturating_sub(since.elapsed());
+        if left.is_zero() {
+            return Err(format!(
+                "expected the disk to take a record within {} s, found that it did not",
+                PATIENCE.as_secs()
+            ));
+        }
+        let (queue, _) = self
+            .changed
+            .wait_timeout(queue, left)
+            .unwrap_or_else(PoisonError::into_inner);
+        Ok(queue)
+    }
+
     fn wait<'a>(&self, queue: MutexGuard<'a, Queue>) -> MutexGuard<'a, Queue> {
         self.changed
             .wait(queue)
@@ -88,8 +111,9 @@ impl Shared {
         let mut queue = self.lock();
         let full = |q: &Queue| q.failed.is_none() && q.bytes > 0 && q.bytes + bytes > QUEUE_BYTES;
         queue.waits += u64::from(full(&queue));
+        let since = Instant::now();
         while full(&queue) {
-            queue = self.wait(queue);
+            queue = self.wait_for_disk(queue, since)?;
         }
         if let Some(detail) = &queue.failed {
             return Err(detail.clone());
@@ -104,7 +128,7 @@ impl Shared {
             if let Some(detail) = &queue.failed {
                 return Err(detail.clone());
             }
-            queue = self.wait(queue);
+            queue = self.wait_for_disk(queue, since)?;
         }
         Ok(())
     }

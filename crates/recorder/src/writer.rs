@@ -178,7 +178,7 @@ impl SessionWriter {
     }
 
     /// Takes one record. `Started`, `Resumed`, `Intent`, `Outcome` and `Ended` return when they and all records before
-    /// them are on the disk; others return at once, or wait while 64 MiB of records wait to be written.
+    /// them are on the disk; others return at once, or wait while 64 MiB of records wait to be written. Nobody waits for longer than 30 s.
     ///
     /// The first record is `Started`, or `Resumed` in a further leg, the last is `Ended`. An `Outcome` needs its `Intent` before it.
     ///

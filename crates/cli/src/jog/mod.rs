@@ -155,7 +155,7 @@ pub fn jog(args: &JogArgs) -> Outcome {
             1 => errln!("\nholding, rising, disarming; ctrl-C twice more switches the motors off"),
             2 => errln!("\nctrl-C once more switches the motors off where the tip is"),
             3 => {
-                errln!("\nmotors off");
+                errln!("\nswitching the motors off");
                 hand.halt();
             }
             // Something hangs; the supervisor brakes an arm that nobody commands any more.

@@ -56,7 +56,7 @@ fn talk(stream: std::os::unix::net::UnixStream, request: &Request) -> Result<Rep
     /// Longest wait for an answer: others may be before us.
     const ANSWER_WITHIN: Duration = Duration::from_secs(5);
 
-    super::place::check_peer(&stream).map_err(Silence::Trouble)?;
+    super::place::check_peer(&stream, super::place::may_answer).map_err(Silence::Trouble)?;
     let mut said = Vec::new();
     let mut talked = || -> std::io::Result<()> {
         let mut stream = &stream;

@@ -52,37 +52,38 @@ fn me() -> u32 {
     rustix::process::geteuid().as_raw()
 }
 
-/// Whether the other end belongs to this user or to root, as the kernel knows it. On systems that do not tell, the
-/// permissions of the socket alone keep strangers out.
+/// Whether the other end may do what it does, by who it is as the kernel knows it. On systems that do not tell, the permissions of
+/// the socket alone keep strangers out.
 ///
 /// # Errors
 /// A message for the stranger.
-pub fn check_peer(stream: &UnixStream) -> Result<(), String> {
+pub fn check_peer(stream: &UnixStream, may: fn(u32, u32) -> bool) -> Result<(), String> {
     #[cfg(target_os = "linux")]
     {
         let peer = rustix::net::sockopt::socket_peercred(stream)
-            .map_err(|e| format!("cannot tell who asks: {e}"))?
+            .map_err(|e| format!("cannot tell who is at the other end: {e}"))?
             .uid
             .as_raw();
-        may_ask(peer, me())?;
+        let me = me();
+        if !may(peer, me) {
+            return Err(format!(
+                "expected user {me} at the other end, found user {peer}"
+            ));
+        }
     }
     #[cfg(not(target_os = "linux"))]
-    let _ = stream;
+    let _ = (stream, may);
     Ok(())
 }
 
-/// The rule of [`check_peer`].
-#[cfg_attr(
-    not(target_os = "linux"),
-    expect(dead_code, reason = "no peer is known")
-)]
-fn may_ask(peer: u32, me: u32) -> Result<(), String> {
-    if peer == me || peer == 0 || me == 0 {
-        return Ok(());
-    }
-    Err(format!(
-        "expected the user of the run (uid {me}), found uid {peer}"
-    ))
+/// Who may ask a run of `me`: its own user and root.
+pub const fn may_ask(peer: u32, me: u32) -> bool {
+    peer == me || peer == 0
+}
+
+/// Whose run `me` may ask: its own, and root any.
+pub const fn may_answer(peer: u32, me: u32) -> bool {
+    peer == me || me == 0
 }
 
 #[cfg(test)]
@@ -91,9 +92,10 @@ mod tests {
 
     #[test]
     fn strangers_are_refused() {
-        assert!(may_ask(1000, 1000).is_ok() && may_ask(0, 1000).is_ok());
-        let words = may_ask(1001, 1000).unwrap_err();
-        assert!(words.contains("1000") && words.contains("1001"), "{words}");
+        assert!(may_ask(1000, 1000) && may_ask(0, 1000));
+        assert!(!may_ask(1001, 1000) && !may_ask(1000, 0));
+        assert!(may_answer(1000, 1000) && may_answer(1000, 0));
+        assert!(!may_answer(1001, 1000) && !may_answer(0, 1000));
     }
 
     #[test]

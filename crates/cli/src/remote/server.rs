@@ -110,7 +110,7 @@ fn identity(path: &Path) -> io::Result<(u64, u64)> {
 
 /// Hears one request and answers it.
 fn serve(mut stream: UnixStream, answer: &mut impl FnMut(Request) -> Reply) -> io::Result<()> {
-    let reply = match place::check_peer(&stream) {
+    let reply = match place::check_peer(&stream, place::may_ask) {
         Err(refused) => Reply::Refused(refused),
         Ok(()) => match hear(&mut stream)? {
             Err(refused) => Reply::Refused(refused),

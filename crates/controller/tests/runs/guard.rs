@@ -175,3 +175,42 @@ fn refusals_say_what_was_expected() {
     );
     assert!(lock(&world).commands.is_empty());
 }
+
+/// Below clearance height the tip moves up and down where it went down, however small the steps aside are.
+#[test]
+fn many_small_steps_aside_are_one_large_one() {
+    let world = World::shared(Faults::default(), [0.0, 0.0, 10.0]);
+    let mut guard = GuardedIndenter::new(
+        Box::new(MockIndenter(world.clone())),
+        robot_from_skin(),
+        LIMITS,
+        &ControllerSettings::default(),
+    );
+    let mut poses = Vec::new();
+    assert!(guard.arm().is_ok());
+    let mut go = |x: f64, z: f64| {
+        lock(&world).t += 50 * MS;
+        assert!(guard.poll(&MockClock(world.clone()), &mut poses).is_ok());
+        let now = HostTime(lock(&world).t);
+        let answer = guard.command(Point3::new(x, 0.0, z), 50.0, now);
+        for _ in 0..10 {
+            lock(&world).t += 50 * MS;
+            assert!(guard.poll(&MockClock(world.clone()), &mut poses).is_ok());
+        }
+        answer
+    };
+    assert!(go(0.0, -1.0).is_ok());
+    assert!(go(0.04, -1.0).is_ok());
+    for z in [-1.0, -0.97, -1.5] {
+        let refused = go(0.08, z);
+        assert!(
+            matches!(
+                &refused,
+                Err(ControllerError::Guard(GuardError::Lateral { .. }))
+            ),
+            "{z}: {refused:?}"
+        );
+    }
+    // Up, along and down again is another place.
+    assert!(go(0.04, 6.0).is_ok() && go(5.0, 6.0).is_ok() && go(5.0, -1.0).is_ok());
+}

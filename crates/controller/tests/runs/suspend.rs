@@ -98,6 +98,7 @@ impl RecordSink for Disk {
 fn run(
     low_ms: std::ops::Range<i64>,
     press: UnderWay,
+    operator: Option<(u64, Press)>,
 ) -> (Vec<(InterruptionKind, i64, String)>, RunEnd, usize) {
     let mut plan = plan();
     plan.suspend = Suspend {
@@ -111,7 +112,13 @@ fn run(
         give_up_after: HostDuration::from_millis(20_000),
         ..Suspend::default()
     };
-    let world = World::shared(faults(), START);
+    let world = World::shared(
+        Faults {
+            operator,
+            ..faults()
+        },
+        START,
+    );
     let control = lock(&world).control.clone();
     let mut disk = Disk {
         sink: Sink::default(),
@@ -128,7 +135,7 @@ fn run(
 
 #[test]
 fn a_full_disk_suspends_and_the_run_goes_on() {
-    let (rows, end, valid) = run(500..5_000, UnderWay::Finish);
+    let (rows, end, valid) = run(500..5_000, UnderWay::Finish, None);
     assert_eq!((end, valid), (RunEnd::Completed, 3), "{rows:?}");
     let [(pause, at, why), (resume, then, because)] = rows.as_slice() else {
         panic!("{rows:?}");
@@ -153,7 +160,7 @@ fn a_full_disk_suspends_and_the_run_goes_on() {
 
 #[test]
 fn a_disk_that_stays_full_ends_the_run() {
-    let (rows, end, valid) = run(500..i64::MAX, UnderWay::BreakOff);
+    let (rows, end, valid) = run(500..i64::MAX, UnderWay::BreakOff, None);
     let RunEnd::Faulted(reason) = end else {
         panic!("{end:?}");
     };
@@ -161,4 +168,16 @@ fn a_disk_that_stays_full_ends_the_run() {
     assert!(reason.contains("20.000000 s"), "{reason}");
     assert_eq!(rows[0].0, InterruptionKind::PauseNow);
     assert!(valid < 3);
+}
+
+/// What begins while the operator has the run wait is not over when they let it go on.
+#[test]
+fn what_began_during_a_pause_suspends_after_it() {
+    let pause = Some((100, Press::Pause)); // at 0.5 s; a second later they resume
+    let (rows, end, valid) = run(600..8_000, UnderWay::Finish, pause);
+    assert_eq!((end, valid), (RunEnd::Completed, 3), "{rows:?}");
+    let words: Vec<&str> = rows.iter().map(|(_, _, why)| why.as_str()).collect();
+    assert_eq!(words[..2], ["operator: pause", "operator: resume"]);
+    assert!(words[2].starts_with("suspended: free space"), "{rows:?}");
+    assert!(words[3].starts_with("no longer suspended"), "{rows:?}");
 }
