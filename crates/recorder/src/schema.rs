@@ -1,7 +1,7 @@
 //! How a session file is opened, for writing and for reading, and which schema it has.
 
 use std::fs::File;
-use std::io::Read;
+use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -73,6 +73,7 @@ fn writable(path: &Path) -> SqliteConnectOptions {
 
 /// Opens an existing session for writing, in the journal mode that it is in: a sealed one is in rollback mode.
 pub async fn open_again(path: &Path) -> Result<SqliteConnection, RecorderError> {
+    refuse_super_journal(path)?;
     allow_writing(path).map_err(|source| RecorderError::Io {
         path: path.to_owned(),
         doing: "making it writable",
@@ -136,6 +137,7 @@ async fn roll_back(path: &Path) -> Result<(), RecorderError> {
 /// Opens a session file for reading, after a look at its first page.
 pub async fn open(path: &Path) -> Result<SqliteConnection, RecorderError> {
     refuse_links(path)?;
+    refuse_super_journal(path)?;
     let rollback = check_first_page(path)?;
     if rollback && beside(path, "-journal").exists() && crate::lock::writer_of(path).is_none() {
         roll_back(path).await?;
@@ -222,6 +224,50 @@ fn refuse_links(path: &Path) -> Result<(), RecorderError> {
                 found: format!("a link beside it, {}: remove it", file.display()),
             });
         }
+    }
+    Ok(())
+}
+
+/// The last bytes of a journal that names a super-journal, the one file of a transaction over several databases
+/// (sqlite.org/fileformat.html section 3).
+const SUPER_JOURNAL_END: [u8; 8] = [0xd9, 0xd5, 0x05, 0xf9, 0x20, 0xa1, 0x63, 0xd7];
+
+/// Once SQLite has played a journal it deletes the super-journal that is named in it, which from a stranger may be any file of the
+/// user. A session is one database and no transaction of its own has a super-journal.
+fn refuse_super_journal(path: &Path) -> Result<(), RecorderError> {
+    // SQLite follows a link and looks beside the file itself.
+    let file = std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+    let journal = beside(&file, "-journal");
+    let io = |source| RecorderError::Io {
+        path: journal.clone(),
+        doing: "reading its end",
+        source,
+    };
+    let mut opened = match File::open(&journal) {
+        Ok(opened) => opened,
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(()),
+        Err(e) => return Err(io(e)),
+    };
+    let bytes = opened.metadata().map_err(io)?.len();
+    let Some(last) = bytes.checked_sub(SUPER_JOURNAL_END.len() as u64) else {
+        return Ok(());
+    };
+    let mut end = [0; SUPER_JOURNAL_END.len()];
+    opened.seek(SeekFrom::Start(last)).map_err(io)?;
+    match opened.read_exact(&mut end) {
+        Ok(()) => {}
+        // Whoever writes the session has just cut it.
+        Err(e) if e.kind() == std::io::ErrorKind::UnexpectedEof => return Ok(()),
+        Err(e) => return Err(io(e)),
+    }
+    if end == SUPER_JOURNAL_END {
+        return Err(RecorderError::NotASession {
+            path: path.to_owned(),
+            found: format!(
+                "a journal beside it, {}, that names a further file for deletion: remove the journal, and do not trust the session",
+                journal.display()
+            ),
+        });
     }
     Ok(())
 }
@@ -364,6 +410,78 @@ mod tests {
                 assert!(refused.contains("a link beside it"), "{refused}");
             }
             assert_eq!(std::fs::read_to_string(&victim).unwrap(), "precious");
+        }
+    }
+
+    /// A journal that SQLite would play, of a transaction that changed nothing, with a super-journal's name at its end.
+    fn journal_naming(name: &str, pages: u32) -> Vec<u8> {
+        let mut journal = SUPER_JOURNAL_END.to_vec();
+        for number in [0, 1, pages, 512, PAGE_BYTES] {
+            journal.extend(u32::to_be_bytes(number));
+        }
+        journal.resize(512, 0);
+        let lock_page = 0x4000_0000 / PAGE_BYTES + 1;
+        journal.extend(lock_page.to_be_bytes());
+        journal.extend(name.as_bytes());
+        let sum: u32 = name.bytes().map(u32::from).sum();
+        for number in [name.len() as u32, sum] {
+            journal.extend(number.to_be_bytes());
+        }
+        journal.extend(SUPER_JOURNAL_END);
+        journal
+    }
+
+    #[test]
+    fn a_journal_that_names_another_file_is_not_played() {
+        let folder = tempfile::tempdir().unwrap();
+        let victim = folder.path().join("victim");
+        let path = folder.path().join("a.session.sqlite");
+        let runtime = tokio::runtime::Builder::new_current_thread()
+            .build()
+            .unwrap();
+        let unprotected = |path: &Path| {
+            runtime.block_on(async {
+                let mut conn = writable(path).connect().await.unwrap();
+                let count = "SELECT count(*) FROM sqlite_schema";
+                sqlx::query(count).execute(&mut conn).await.unwrap();
+                conn.close().await.unwrap();
+            });
+        };
+        let forge = || {
+            std::fs::write(&victim, "precious").unwrap();
+            let pages = std::fs::metadata(&path).unwrap().len() / u64::from(PAGE_BYTES);
+            let journal = journal_naming(victim.to_str().unwrap(), pages as u32);
+            std::fs::write(beside(&path, "-journal"), journal).unwrap();
+        };
+        for mode in ["DELETE", "WAL"] {
+            let _ = std::fs::remove_file(&path);
+            runtime.block_on(async {
+                let mut conn = create(&path).await.unwrap();
+                let mode = sqlx::AssertSqlSafe(format!("PRAGMA journal_mode = {mode}"));
+                sqlx::query(mode).execute(&mut conn).await.unwrap();
+                conn.close().await.unwrap();
+            });
+            forge();
+            for refused in [
+                crate::SessionReader::open(&path).map(drop),
+                crate::SessionWriter::resume(&path).map(drop),
+                crate::SessionWriter::ended(&path).map(drop),
+                runtime.block_on(open_again(&path)).map(drop),
+            ] {
+                let refused = refused.unwrap_err().to_string();
+                assert!(refused.contains("a journal beside it"), "{refused}");
+                assert_eq!(std::fs::read_to_string(&victim).unwrap(), "precious");
+            }
+            #[cfg(unix)]
+            {
+                let link = folder.path().join("link.session.sqlite");
+                std::os::unix::fs::symlink(&path, &link).unwrap();
+                assert!(crate::SessionReader::open(&link).is_err());
+                std::fs::remove_file(&link).unwrap();
+            }
+            // What the refusal is for: SQLite itself does delete it.
+            unprotected(&path);
+            assert!(!victim.exists(), "{mode}");
         }
     }
 
