@@ -13,7 +13,7 @@ mod legs;
 use crate::error::RecorderError;
 use crate::query::{each_row, int, num, sha, text};
 use crate::reader::SessionReader;
-use crate::rows::SessionTotals;
+use crate::rows::{AttemptRow, SessionTotals};
 use crate::seal::{self, TableDigest};
 use crate::writer::hex;
 
@@ -288,13 +288,19 @@ fn check_plan(header: &RunHeader, report: &mut VerifyReport) {
 /// The journal: moments in order, lineage without holes, no open attempt once the run has ended.
 fn check_journal(reader: &SessionReader, report: &mut VerifyReport) {
     let ended = report.take(reader.end()).flatten().is_some();
+    // A missing header, and with it no legs, is told elsewhere.
+    let legs = reader.legs().unwrap_or_default();
+    let leg_of = |attempt: &AttemptRow| {
+        let intent = attempt.intent?;
+        Some(legs.partition_point(|leg| leg.origin <= intent))
+    };
     for (planned, attempts) in report.take(reader.presses()).unwrap_or_default() {
         for (number, attempt) in (1u32..).zip(&attempts) {
             if attempt.id.number != number {
                 report.add(format!("{}: expected attempt {number}", attempt.id));
             }
             let verdict = attempt.outcome.as_ref().map(|o| &o.verdict);
-            if attempts.len() > number as usize {
+            if let Some(next) = attempts.get(number as usize) {
                 match verdict {
                     None => report.add(format!(
                         "{}: expected a verdict of an attempt that was repeated, found none",
@@ -302,7 +308,7 @@ fn check_journal(reader: &SessionReader, report: &mut VerifyReport) {
                     )),
                     // Sync presses are made again in every leg.
                     Some(PressVerdict::Valid | PressVerdict::Excluded(_))
-                        if planned.role != PressRole::Sync =>
+                        if planned.role != PressRole::Sync || leg_of(attempt) == leg_of(next) =>
                     {
                         report.add(format!(
                             "{}: expected no further attempt, found the press made twice",

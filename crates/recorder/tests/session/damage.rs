@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use crate::common::{Evt2, header, sealed, sha};
-use skinrig_model::{CameraId, HostTime, Record};
+use crate::common::{Evt2, header, outcome, sealed, sha};
+use skinrig_model::{AttemptId, CameraId, HostTime, PressId, PressVerdict, Record};
 use skinrig_recorder::{SessionReader, SessionWriter, list, verify};
 
 /// Bytes of a page of a session file.
@@ -71,6 +71,35 @@ fn planned_presses_are_those_of_the_plan_even_without_a_seal() {
     let problems = verify_with(5.0);
     assert_eq!(problems.len(), 1, "{problems:?}");
     assert!(problems[0].starts_with("press 1: expected what the stored plan says"));
+}
+
+#[test]
+fn a_sync_press_made_validly_twice_within_one_leg_is_found() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("x.session.sqlite");
+    let mut writer = SessionWriter::create(&path).unwrap();
+    let started = Record::Started(Box::new(header(1)));
+    let twice = [1, 2].into_iter().flat_map(|number| {
+        let attempt = AttemptId {
+            press: PressId(0),
+            number,
+        };
+        let t = HostTime(i64::from(number) * 20_000_000);
+        [
+            Record::Intent { attempt, t },
+            Record::Outcome(outcome(attempt, t.0, PressVerdict::Valid)),
+        ]
+    });
+    for record in std::iter::once(started).chain(twice) {
+        writer.accept(record).unwrap();
+    }
+    drop(writer);
+    let problems = verify(&path, &mut Evt2::default()).unwrap().problems;
+    assert_eq!(problems.len(), 1, "{problems:?}");
+    assert!(
+        problems[0].contains("found the press made twice"),
+        "{problems:?}"
+    );
 }
 
 #[test]
