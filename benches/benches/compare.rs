@@ -234,7 +234,12 @@ fn known(input: &SessionInput, done: &Analysis) -> Value {
     let spans = [0, 1].map(|k| {
         let clock = done.clocks[k].expect("a clock");
         let mut spans = vec![(0, 0); done.presses.len()];
-        for window in windows(timings().into_iter(), &clock, &input.settings) {
+        for window in windows(
+            timings().into_iter(),
+            &input.earlier,
+            &clock,
+            &input.settings,
+        ) {
             spans[window.row] = (window.start_us, window.end_us);
         }
         presses().map(|(row, _)| spans[row]).collect::<Vec<_>>()

@@ -199,6 +199,7 @@ pub fn input() -> SessionInput {
     SessionInput {
         planned,
         outcomes,
+        earlier: Vec::new(),
         edges: [Vec::new(), Vec::new()],
         marks: Vec::new(),
         gaps: [Vec::new(), Vec::new()],

@@ -331,7 +331,9 @@ fn camera_pass(
             }
         }
     };
-    let list = clock.map_or_else(Vec::new, |c| windows(timings(input), &c, settings));
+    let list = clock.map_or_else(Vec::new, |c| {
+        windows(timings(input), &input.earlier, &c, settings)
+    });
     let collected = match (clock, rates) {
         // Without a clock the events have been seen once already and there is nothing else to find.
         (None, rates) => Accumulated {

@@ -1,11 +1,20 @@
 //! What an analysis reads: plain values and one event source.
 
 use skinrig_model::{
-    AnalysisSettings, BoxReport, CameraId, CdEvent, PlannedPress, PressOutcome, RigGeometry,
-    SentMark, TriggerEdge,
+    AnalysisSettings, BoxReport, CameraId, CdEvent, HostTime, PlannedPress, PressOutcome,
+    RigGeometry, SentMark, TriggerEdge,
 };
 
 use crate::legs::LegStart;
+
+/// An attempt at a press that was made again: it counts nowhere, but it pressed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct EarlierAttempt {
+    /// When it was about to begin.
+    pub begun: HostTime,
+    /// When its tip was clear of the surface again; `None` when that was not measured.
+    pub clear: Option<HostTime>,
+}
 
 /// Everything but the events.
 #[derive(Debug, Clone, PartialEq)]
@@ -14,6 +23,8 @@ pub struct SessionInput {
     pub planned: Vec<PlannedPress>,
     /// The last outcome of each planned press, same order; `None` when it was never attempted.
     pub outcomes: Vec<Option<PressOutcome>>,
+    /// All attempts before the last one of their press, in any order.
+    pub earlier: Vec<EarlierAttempt>,
     /// Trigger edges of each camera, in stream order, all channels.
     pub edges: [Vec<TriggerEdge>; 2],
     /// The marks that the trigger box sent.

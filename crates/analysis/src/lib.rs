@@ -51,7 +51,7 @@ mod verdict;
 pub use analyze::{analyze, analyze_and_keep};
 pub use error::AnalysisError;
 pub use hash::results_hash;
-pub use input::{EventSource, SessionInput};
+pub use input::{EarlierAttempt, EventSource, SessionInput};
 pub use kept::{Keep, Kept};
 pub use legs::LegStart;
 pub use result::{ANALYSIS_VERSION, Analysis};

@@ -2,6 +2,7 @@
 
 use skinrig_model::{AnalysisSettings, PressTiming, WindowAnchor};
 
+use crate::input::EarlierAttempt;
 use crate::result::ClockFit;
 
 /// Longest idle time looked at before a press, µs.
@@ -18,8 +19,8 @@ pub struct Window {
     pub start_us: u64,
     /// `window_after_ms` after the release (or after the middle); at most `window_after_contact_ms` after the contact.
     pub end_us: u64,
-    /// The idle time before it: at most 0.5 s, up to the end of any earlier window. Equal to `start_us` when
-    /// less than 20 ms is free.
+    /// The idle time before it: at most 0.5 s, up to the end of any earlier window and of any earlier attempt. Equal to
+    /// `start_us` when less than 20 ms is free, or when the end of an attempt just before it is not known.
     pub idle_start_us: u64,
 }
 
@@ -44,13 +45,15 @@ impl Window {
     }
 }
 
-/// The windows of all presses with known timing, in order of their start.
+/// The windows of all presses with known timing, in order of their start. Attempts that were repeated have none, but their events
+/// are not idle time: `earlier` has all of them, in any order.
 ///
 /// Windows of a sane session do not overlap. If they do, each keeps all of its events, so that shared events
 /// count in both presses.
 #[must_use]
 pub fn windows(
     timings: impl Iterator<Item = (usize, PressTiming)>,
+    earlier: &[EarlierAttempt],
     clock: &ClockFit,
     settings: &AnalysisSettings,
 ) -> Vec<Window> {
@@ -79,8 +82,23 @@ pub fn windows(
         })
         .collect();
     windows.sort_by_key(|(w, _)| (w.start_us, w.row));
+    let mut repeated: Vec<(u64, Option<u64>)> = earlier
+        .iter()
+        .map(|attempt| {
+            let us = |t| tick(clock.camera_us_of_host(t));
+            (us(attempt.begun), attempt.clear.map(us))
+        })
+        .collect();
+    repeated.sort_unstable();
+    let mut repeated = repeated.into_iter().peekable();
     let mut earlier_end = 0;
     for (window, cut_us) in &mut windows {
+        while let Some((_, clear_us)) =
+            repeated.next_if(|(begun_us, _)| *begun_us <= window.start_us)
+        {
+            // Without a known end it lasts until the window.
+            earlier_end = earlier_end.max(clear_us.unwrap_or(window.start_us));
+        }
         let from = window.start_us.saturating_sub(IDLE_US).max(earlier_end);
         if window.start_us.saturating_sub(from) >= LEAST_IDLE_US {
             window.idle_start_us = from;
@@ -132,7 +150,7 @@ mod tests {
             (1, timing(1.7, 2.2)),
             (2, timing(2.31, 2.8)),
         ];
-        let w = windows(presses.into_iter(), &clock(250.0), &settings);
+        let w = windows(presses.into_iter(), &[], &clock(250.0), &settings);
         assert_eq!(
             (w[0].start_us, w[0].end_us, w[0].idle_start_us),
             (950_250, 1_550_250, 450_250)
@@ -143,6 +161,58 @@ mod tests {
     }
 
     #[test]
+    fn an_attempt_that_was_repeated_is_no_idle_time() {
+        let settings = AnalysisSettings::default();
+        let t = HostTime::from_secs_f64;
+        let presses = [
+            (0, timing(1.0, 1.5)),
+            (1, timing(4.0, 4.5)),
+            (2, timing(5.0, 5.5)),
+        ];
+        let idle = |earlier: &[EarlierAttempt]| {
+            windows(presses.into_iter(), earlier, &clock(0.0), &settings)
+                .iter()
+                .map(|w| (w.start_us, w.idle_start_us))
+                .collect::<Vec<_>>()
+        };
+        let free = [
+            (950_000, 450_000),
+            (3_950_000, 3_450_000),
+            (4_950_000, 4_550_000),
+        ];
+        assert_eq!(idle(&[]), free);
+        // Made again after its tip was clear at 3.8 s; a retake of the third that is long over changes nothing more.
+        let timed = EarlierAttempt {
+            begun: t(3.0),
+            clear: Some(t(3.8)),
+        };
+        let long_over = EarlierAttempt {
+            begun: t(2.0),
+            clear: Some(t(2.6)),
+        };
+        let [first, _, third] = free;
+        assert_eq!(
+            idle(&[timed, long_over]),
+            [first, (3_950_000, 3_800_000), third]
+        );
+        // Nobody knows when its tip was clear: no idle time before what follows it, and only there.
+        let unknown = EarlierAttempt {
+            clear: None,
+            ..timed
+        };
+        assert_eq!(
+            idle(&[unknown, long_over]),
+            [first, (3_950_000, 3_950_000), third]
+        );
+        // Cleared within the window of its retake.
+        let late = EarlierAttempt {
+            clear: Some(t(3.99)),
+            ..timed
+        };
+        assert_eq!(idle(&[late]), [first, (3_950_000, 3_950_000), third]);
+    }
+
+    #[test]
     fn a_window_about_the_middle_has_its_own_length() {
         let settings = AnalysisSettings {
             window_anchor: WindowAnchor::Middle,
@@ -150,19 +220,24 @@ mod tests {
             window_after_ms: 1400.0,
             ..AnalysisSettings::default()
         };
-        let w = windows([(0, timing(4.0, 4.5))].into_iter(), &clock(0.0), &settings)[0];
+        let w = windows(
+            [(0, timing(4.0, 4.5))].into_iter(),
+            &[],
+            &clock(0.0),
+            &settings,
+        )[0];
         assert_eq!((w.start_us, w.end_us), (2_750_000, 5_650_000));
     }
 
     #[test]
     fn a_window_cut_after_the_contact_leaves_the_idle_time_as_it_was() {
         let presses = || [(0, timing(1.0, 1.5)), (1, timing(1.7, 1.75))].into_iter();
-        let whole = windows(presses(), &clock(0.0), &AnalysisSettings::default());
+        let whole = windows(presses(), &[], &clock(0.0), &AnalysisSettings::default());
         let settings = AnalysisSettings {
             window_after_contact_ms: Some(200.0),
             ..AnalysisSettings::default()
         };
-        let cut = windows(presses(), &clock(0.0), &settings);
+        let cut = windows(presses(), &[], &clock(0.0), &settings);
         assert_eq!(cut[0].end_us, 1_200_000);
         assert_eq!((cut[0].start_us, cut[1]), (whole[0].start_us, whole[1]));
     }
@@ -170,14 +245,24 @@ mod tests {
     #[test]
     fn a_window_before_the_camera_clock_is_empty() {
         let settings = AnalysisSettings::default();
-        let w = windows([(0, timing(1.0, 1.5))].into_iter(), &clock(-9e6), &settings);
+        let w = windows(
+            [(0, timing(1.0, 1.5))].into_iter(),
+            &[],
+            &clock(-9e6),
+            &settings,
+        );
         assert_eq!((w[0].start_us, w[0].end_us, w[0].idle_start_us), (0, 0, 0));
     }
 
     #[test]
     fn gaps_touch_the_windows_that_they_reach_into() {
         let settings = AnalysisSettings::default();
-        let w = windows([(0, timing(1.0, 1.5))].into_iter(), &clock(0.0), &settings)[0];
+        let w = windows(
+            [(0, timing(1.0, 1.5))].into_iter(),
+            &[],
+            &clock(0.0),
+            &settings,
+        )[0];
         for (gap, touches) in [
             ((900_000, 949_999), false),
             ((900_000, 950_000), true),

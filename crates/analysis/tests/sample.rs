@@ -92,6 +92,7 @@ fn schedule(positions: &str) -> SessionInput {
     SessionInput {
         planned,
         outcomes,
+        earlier: Vec::new(),
         edges: [Vec::new(), Vec::new()],
         marks: Vec::new(),
         gaps: [Vec::new(), Vec::new()],

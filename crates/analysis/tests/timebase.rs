@@ -499,6 +499,7 @@ fn input(s: &InLegs) -> SessionInput {
     SessionInput {
         planned: Vec::new(),
         outcomes: Vec::new(),
+        earlier: Vec::new(),
         edges: s.joined.edges.clone(),
         marks: Vec::new(),
         box_reports: s.joined.reports.clone(),

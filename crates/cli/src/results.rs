@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 use skinrig_analysis::reference_code::reference_code;
-use skinrig_analysis::{Analysis, Keep, LegStart, SessionInput};
+use skinrig_analysis::{Analysis, EarlierAttempt, Keep, LegStart, SessionInput};
 use skinrig_model::{AnalysisSettings, CameraId, RigGeometry, RunHeader};
-use skinrig_recorder::{RecorderError, SessionReader};
+use skinrig_recorder::{AttemptRow, RecorderError, SessionReader};
 use skinrig_report::{Provenance, ReportInput};
 
 use crate::args::{AnalyzeArgs, ReportArgs};
@@ -159,12 +159,12 @@ fn session_input(
     settings: AnalysisSettings,
     rig: RigGeometry,
 ) -> Result<SessionInput, RecorderError> {
-    let planned = reader
-        .presses()?
-        .into_iter()
-        .map(|(planned, _)| planned)
-        .collect();
-    let outcomes = reader.last_outcomes()?;
+    let (mut planned, mut outcomes, mut earlier) = (Vec::new(), Vec::new(), Vec::new());
+    for (press, mut attempts) in reader.presses()? {
+        planned.push(press);
+        outcomes.push(attempts.pop().and_then(|last| last.outcome));
+        earlier.extend(attempts.iter().filter_map(earlier_attempt));
+    }
     let (pose_interval_us, crossing_se_us) = crate::contacts::timing(reader, &outcomes)?;
     let [one, two] = CameraId::ALL;
     let further = reader.legs()?.into_iter().skip(1);
@@ -173,6 +173,7 @@ fn session_input(
     Ok(SessionInput {
         planned,
         outcomes,
+        earlier,
         edges: [reader.trigger_edges(one)?, reader.trigger_edges(two)?],
         marks: reader.marks_sent()?,
         box_reports: reader
@@ -186,6 +187,15 @@ fn session_input(
         legs,
         rig,
         settings,
+    })
+}
+
+/// `None` of one that never began.
+fn earlier_attempt(attempt: &AttemptRow) -> Option<EarlierAttempt> {
+    let timing = attempt.outcome.as_ref().and_then(|o| o.timing);
+    Some(EarlierAttempt {
+        begun: attempt.intent.or(timing.map(|t| t.approach))?,
+        clear: timing.map(|t| t.clear),
     })
 }
 

@@ -87,7 +87,12 @@ fn windows_begin_and_end_on_the_right_microsecond_as_long_as_doubles_have_one() 
                     release: at(400_000_000),
                     clear: at(500_000_000),
                 };
-                let found = windows([(0, timing)].into_iter(), &clock(offset, drift), &settings)[0];
+                let found = windows(
+                    [(0, timing)].into_iter(),
+                    &[],
+                    &clock(offset, drift),
+                    &settings,
+                )[0];
                 for (edge, host) in [
                     (found.start_us, start_ns + 100_000_000),
                     (found.end_us, start_ns + 400_000_000),

@@ -57,6 +57,7 @@ fn session() -> SessionInput {
     let mut input = SessionInput {
         planned: Vec::new(),
         outcomes: Vec::new(),
+        earlier: Vec::new(),
         edges: [Vec::new(), Vec::new()],
         marks: Vec::new(),
         gaps: [Vec::new(), Vec::new()],

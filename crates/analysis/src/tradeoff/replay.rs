@@ -84,7 +84,8 @@ impl<'a> Replay<'a> {
     }
 
     fn windows(&self, camera: CameraId, settings: &AnalysisSettings) -> Vec<Window> {
-        windows(timings(self.input), &self.clocks[camera.index()], settings)
+        let clock = &self.clocks[camera.index()];
+        windows(timings(self.input), &self.input.earlier, clock, settings)
     }
 
     /// The windows of the rows that have one.

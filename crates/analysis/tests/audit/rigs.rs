@@ -204,6 +204,7 @@ pub fn session(seed: u64, wishes: Wishes) -> Session {
     let mut input = SessionInput {
         planned: Vec::new(),
         outcomes: Vec::new(),
+        earlier: Vec::new(),
         edges: [Vec::new(), Vec::new()],
         marks: Vec::new(),
         gaps: [Vec::new(), Vec::new()],

@@ -79,6 +79,7 @@ pub fn session() -> (SessionInput, Memory) {
     let mut input = SessionInput {
         planned: Vec::new(),
         outcomes: Vec::new(),
+        earlier: Vec::new(),
         edges: [Vec::new(), Vec::new()],
         marks: Vec::new(),
         gaps: [Vec::new(), Vec::new()],
