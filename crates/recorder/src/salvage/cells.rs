@@ -2,12 +2,17 @@
 //!
 //! Layout: sqlite.org/fileformat.html, sections 1.6 and 2.
 
+use std::collections::HashSet;
 use std::io;
 
 use super::pages::{Image, Pages};
 
 /// No row of a session is longer: a chunk has at most 64 MiB, a protocol and its plan a few.
 const MOST_BYTES: u64 = 256 << 20;
+/// SQLite knows no smaller page.
+const LEAST_PAGE: usize = 512;
+/// How many times its own size the rows of a page may have: they lie beside each other, but where each begins may be damaged.
+const OVERLAP: usize = 4;
 
 /// A value as it is stored.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,12 +32,17 @@ pub struct Cell {
     /// Of a table's rows; `None` on pages of rows that are kept in key order.
     pub rowid: Option<i64>,
     at: usize,
+    /// All bytes of the row, and those on its own page.
     payload: u64,
+    local: usize,
 }
 
 /// The rows of a page, when it is one that holds rows.
 pub fn cells(image: Image, page: &[u8]) -> Vec<Cell> {
     let start = if image.page == 1 { 100 } else { 0 };
+    if page.len() < LEAST_PAGE {
+        return Vec::new();
+    }
     // Leaf of a table; leaf and inner page of rows in key order.
     let (keyed, header, child) = match page.get(start) {
         Some(0x0D) => (false, 8, 0),
@@ -47,7 +57,7 @@ pub fn cells(image: Image, page: &[u8]) -> Vec<Cell> {
         ])))
     };
     let count = two(start + 3).unwrap_or(0);
-    let mut out = Vec::new();
+    let (mut out, mut filled) = (Vec::new(), 0);
     for i in 0..count {
         let Some(mut at) = two(start + header + 2 * i) else {
             break;
@@ -65,14 +75,30 @@ pub fn cells(image: Image, page: &[u8]) -> Vec<Cell> {
             rowid = Some(id as i64);
             at += n;
         }
-        if (2..=MOST_BYTES).contains(&payload) {
-            out.push(Cell { rowid, at, payload });
+        if !(2..=MOST_BYTES).contains(&payload) {
+            continue;
         }
+        let local = local_bytes(page.len(), payload as usize, keyed);
+        filled += local;
+        if filled > OVERLAP * page.len() {
+            break;
+        }
+        out.push(Cell {
+            rowid,
+            at,
+            payload,
+            local,
+        });
     }
     out
 }
 
 impl Cell {
+    /// Whether it is too long to be kept in memory.
+    pub const fn is_long(&self) -> bool {
+        self.payload > 64 << 10
+    }
+
     /// All bytes of the row, from its page and those on which it goes on; `None` when they do not hang together. `most` cuts
     /// long rows off: their first bytes tell what they are.
     pub fn payload(
@@ -81,21 +107,25 @@ impl Cell {
         pages: &mut Pages,
         most: usize,
     ) -> io::Result<Option<Vec<u8>>> {
-        let usable = pages.usable();
+        if self.payload > pages.most_bytes() {
+            return Ok(None);
+        }
         let (whole, wanted) = (self.payload as usize, (self.payload as usize).min(most));
-        let local = local_bytes(usable, whole, self.rowid.is_none());
-        let Some(first) = page.get(self.at..self.at + local) else {
+        let Some(first) = page.get(self.at..self.at + self.local) else {
             return Ok(None);
         };
         let mut bytes = first.to_vec();
-        let mut next = number(page, self.at + local);
-        let mut image = Vec::new();
+        let mut next = number(page, self.at + self.local);
+        let (mut image, mut seen) = (Vec::new(), HashSet::new());
         while bytes.len() < wanted {
-            let Some(found) = next.filter(|n| *n > 1).and_then(|n| pages.latest(n)) else {
+            // A row never comes by a page twice.
+            let Some(n) = next.filter(|n| *n > 1 && seen.insert(*n)) else {
                 return Ok(None);
             };
-            pages.read(found, &mut image)?;
-            let left = (whole - bytes.len()).min(usable - 4);
+            if !pages.follow(n, &mut image)? {
+                return Ok(None);
+            }
+            let left = (whole - bytes.len()).min(pages.page_bytes() - 4);
             bytes.extend_from_slice(&image[4..4 + left]);
             next = number(&image, 0);
         }
@@ -243,6 +273,7 @@ mod tests {
         #[test]
         fn any_bytes_give_rows_or_nothing(bytes: Vec<u8>, page in 1u32..3, kind in 0usize..4) {
             let mut bytes = bytes;
+            bytes.resize(LEAST_PAGE, 0xFF);
             let start = if page == 1 { 100 } else { 0 };
             if let Some(first) = bytes.get_mut(start) {
                 *first = [0x0D, 0x0A, 0x02, 0x05][kind];

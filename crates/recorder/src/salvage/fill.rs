@@ -91,6 +91,7 @@ impl Filling<'_> {
             }
         }
         self.compare_with_seal().await?;
+        self.compare_with_each_other().await?;
         self.note(name).await?;
         sqlx::query("COMMIT").execute(&mut *self.conn).await?;
         Ok(())
@@ -117,13 +118,16 @@ impl Filling<'_> {
                 table.missing += 1;
             }
         }
-        // Ids count from 1 (presses from 0) without gaps.
+        // Ids count without gaps.
         if let (Some([Part::Int(first)]), Some([Part::Int(last)])) = (
             rows.rows.keys().next().map(Vec::as_slice),
             rows.rows.keys().next_back().map(Vec::as_slice),
         ) {
-            let begin =
-                i64::from(*first > 0 && !matches!(shape.kind.name, "press" | "robot_from_skin"));
+            let begin = match shape.kind.name {
+                "press" | "robot_from_skin" => 0,
+                "leg" => 2,
+                _ => i64::from(*first > 0),
+            };
             let there = rows.rows.len() as i64;
             table.missing += last.saturating_sub(begin).saturating_add(1 - there).max(0) as u64;
         }
@@ -163,8 +167,10 @@ impl Filling<'_> {
             rows: 0,
             missing: rows.torn,
         };
+        let (mut fillers, mut beyond) = (MOST_MISSING, 0u64);
         for camera in CameraId::ALL {
             let (mut next, mut host_ns, mut hole) = (0i64, 0i64, None::<Hole>);
+            let legs = self.legs(camera);
             let of_camera = |key: &Vec<Part>| match key[..] {
                 [Part::Int(c), Part::Int(seq)] if c == camera.index() as i64 + 1 => Some(seq),
                 _ => None,
@@ -178,10 +184,11 @@ impl Filling<'_> {
                     self.commit().await?;
                 }
                 // A number far beyond all others is no chunk's.
-                if seq < next || seq - next > MOST_MISSING {
-                    table.missing += 1;
+                if seq < next || seq - next > fillers {
+                    beyond += 1;
                     continue;
                 }
+                fillers -= seq - next;
                 if seq > next {
                     widen(&mut hole, camera, next, seq - 1, 0, false);
                 }
@@ -208,11 +215,11 @@ impl Filling<'_> {
                     );
                     continue;
                 };
+                if let Some(hole) = hole.take() {
+                    table.missing += self.close(shape, &hole, host_ns, &legs).await?;
+                }
                 if let Some(Value::Int(t)) = row.get(HOST_NS) {
                     host_ns = *t;
-                }
-                if let Some(hole) = hole.take() {
-                    table.missing += self.close(shape, &hole, host_ns).await?;
                 }
                 if self.insert(shape, row).await? {
                     table.rows += 1;
@@ -221,16 +228,49 @@ impl Filling<'_> {
                 }
             }
             if let Some(hole) = hole.take() {
-                table.missing += self.close(shape, &hole, host_ns).await?;
+                table.missing += self.close(shape, &hole, host_ns, &legs).await?;
             }
+        }
+        if beyond > 0 {
+            table.missing += beyond;
+            self.report.findings.push(format!(
+                "chunk: {beyond} row(s) numbered too far from the others to belong to a stream were left out"
+            ));
         }
         Ok(table)
     }
 
-    /// Puts empty chunks where some are missing, the first after the bytes that were lost.
-    async fn close(&mut self, shape: &Shape, hole: &Hole, host_ns: i64) -> Result<u64, Failed> {
+    /// The first chunk of each further leg and the host time at which the leg begins.
+    fn legs(&self, camera: CameraId) -> Vec<(i64, i64)> {
+        let mut legs = self.shapes.iter().zip(self.rows);
+        let rows = legs.find(|(shape, _)| shape.kind.name == "leg");
+        let rows = rows.into_iter().flat_map(|(_, rows)| rows.rows.values());
+        rows.filter_map(|found| match found {
+            Found::Row(row) => match (
+                row.get(LEG_FIRST_SEQ[camera.index()]),
+                row.get(LEG_ORIGIN_NS),
+            ) {
+                (Some(Value::Int(seq)), Some(Value::Int(origin_ns))) => Some((*seq, *origin_ns)),
+                _ => None,
+            },
+            Found::Place(..) => None,
+        })
+        .collect()
+    }
+
+    /// Puts empty chunks where some are missing, the first after the bytes that were lost. They came when the last chunk before
+    /// them did, but not before their leg began.
+    async fn close(
+        &mut self,
+        shape: &Shape,
+        hole: &Hole,
+        mut host_ns: i64,
+        legs: &[(i64, i64)],
+    ) -> Result<u64, Failed> {
         let empty = Sha256::digest([]).to_vec();
         for seq in hole.first_seq..=hole.last_seq {
+            let begun = legs.iter().filter(|(first, _)| *first == seq);
+            host_ns = begun.fold(host_ns, |t, (_, origin_ns)| t.max(*origin_ns));
             let lost = if seq == hole.first_seq {
                 hole.bytes.max(1)
             } else {
@@ -295,6 +335,24 @@ impl Filling<'_> {
         Ok(())
     }
 
+    /// What rows that came back say of rows that did not: an unsealed session has no digests to hold against.
+    async fn compare_with_each_other(&mut self) -> Result<(), Failed> {
+        for (missing, what) in ABSENT {
+            let count: i64 = sqlx::query_scalar(missing)
+                .fetch_one(&mut *self.conn)
+                .await?;
+            if count > 0 {
+                self.report.findings.push(format!("{count} {what}"));
+            }
+        }
+        if self.pages.is_exhausted() {
+            self.report.findings.push(
+                "rows go on to the same pages over and over: not all of them were read".to_owned(),
+            );
+        }
+        Ok(())
+    }
+
     /// The new file tells where it comes from.
     async fn note(&mut self, name: &str) -> Result<(), Failed> {
         let lost = self.report.tables.iter().filter(|t| t.missing > 0);
@@ -321,11 +379,41 @@ impl Filling<'_> {
     }
 }
 
+/// Counts what must be there and is not, each with its words.
+const ABSENT: [(&str, &str); 6] = [
+    (
+        "SELECT 1 - count(*) FROM session",
+        "row of session missing: what the session is",
+    ),
+    (
+        "SELECT 3 - count(*) FROM robot_from_skin",
+        "row(s) of robot_from_skin missing: where the skin lies",
+    ),
+    (
+        "SELECT coalesce(max(json_array_length(plan_json, '$.presses')), 0) - (SELECT count(*) FROM press) FROM session",
+        "press(es) of the plan missing",
+    ),
+    (
+        "SELECT count(*) FROM (SELECT press FROM attempt UNION SELECT press FROM mark) WHERE press NOT IN (SELECT id FROM press)",
+        "press(es) missing that an attempt or a mark names",
+    ),
+    (
+        "SELECT count(DISTINCT press) FROM mark WHERE press NOT IN (SELECT press FROM attempt)",
+        "press(es) with a mark and without an attempt",
+    ),
+    (
+        "SELECT count(*) FROM (SELECT press FROM attempt GROUP BY press HAVING max(number) <> count(*))",
+        "press(es) of which an earlier attempt is missing",
+    ),
+];
+/// Columns of `leg`.
+const LEG_ORIGIN_NS: usize = 6;
+const LEG_FIRST_SEQ: [usize; 2] = [9, 10];
 /// Columns of `chunk`.
 const HOST_NS: usize = 2;
 const LOST_BEFORE: usize = 3;
 const RAW_BYTES: usize = 5;
-/// A stream with more chunks missing in a row is no stream.
+/// A session with more chunks missing between others is none.
 const MOST_MISSING: i64 = 1 << 20;
 /// No chunk has more bytes, and no gap that a damaged row tells of is believed beyond.
 const MOST_BYTES: i64 = 1 << 40;

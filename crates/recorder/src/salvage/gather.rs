@@ -75,7 +75,12 @@ pub fn gather(pages: &mut Pages, shapes: &[Shape]) -> io::Result<Vec<Rows>> {
                 && matches!(rows.get(&key), Some(Found::Row(old)) if old[VERDICT] != Value::Null)
                 && row[VERDICT] == Value::Null;
             if !undone {
-                rows.insert(key, Found::Row(row));
+                let found = if cell.is_long() {
+                    Found::Place(image, cell)
+                } else {
+                    Found::Row(row)
+                };
+                rows.insert(key, found);
             }
         }
     }

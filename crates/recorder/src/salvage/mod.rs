@@ -112,9 +112,9 @@ pub fn salvage(from: &Path, to: &Path) -> Result<SalvageReport, RecorderError> {
         };
         if pages.damaged_frames > 0 {
             let n = pages.damaged_frames;
-            report
-                .findings
-                .push(format!("the log: {n} page(s) with a wrong checksum"));
+            report.findings.push(format!(
+                "the log: {n} page(s) with a wrong checksum, damaged or left of a transaction that was never committed"
+            ));
         }
         if pages.cut_bytes > 0 {
             report.findings.push(format!(

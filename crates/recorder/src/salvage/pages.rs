@@ -12,6 +12,9 @@ const PAGE_BYTES: u64 = 65536;
 /// Bytes before the first frame of a log, and before the page of each frame.
 const LOG_HEADER: u64 = 32;
 const FRAME_HEADER: u64 = 24;
+/// How often, on average, a page is read because a row goes on there. Twice is usual; a file made to keep its reader busy
+/// has all its rows go on to the same pages.
+const FOLLOWED: u64 = 32;
 
 /// Where one image of a page lies. Later ones supersede earlier ones.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -39,13 +42,14 @@ pub struct Pages {
     file: File,
     log: Option<File>,
     size: usize,
-    usable: usize,
     images: Vec<Image>,
     latest: HashMap<u32, usize>,
     /// Frames of the log whose checksum is wrong.
     pub damaged_frames: u64,
     /// Bytes after the last whole page of the file, and after the last whole frame of the log.
     pub cut_bytes: u64,
+    /// Pages that rows may still go on to.
+    follow: u64,
 }
 
 impl Pages {
@@ -62,16 +66,15 @@ impl Pages {
             n if n.is_power_of_two() && n >= 512 => u64::from(n),
             _ => PAGE_BYTES,
         };
-        let reserved = if known { usize::from(head[20]) } else { 0 };
         let mut pages = Self {
             file,
             log: None,
             size: size as usize,
-            usable: (size as usize).saturating_sub(reserved).max(480),
             images: Vec::new(),
             latest: HashMap::new(),
             damaged_frames: 0,
             cut_bytes: bytes % size,
+            follow: 0,
         };
         // A page that was cut off may still hold whole rows.
         for n in 0..bytes.div_ceil(size) {
@@ -80,6 +83,7 @@ impl Pages {
         if let Ok(file) = File::open(log) {
             pages.read_log(file)?;
         }
+        pages.follow = FOLLOWED * pages.images.len() as u64;
         Ok(pages)
     }
 
@@ -88,8 +92,10 @@ impl Pages {
         self.images.push(Image { page, in_log, at });
     }
 
-    /// Takes every frame whose own checksum holds. It is chained to the one before by the sum stored there, so that a frame
-    /// can be judged although the page before it is damaged.
+    /// Takes the frames of every transaction that was committed. A frame is chained to the one before by the sum stored there, so
+    /// that it can be judged although the page before it is damaged. What no commit follows was never part of the session:
+    /// SQLite writes pages of a large transaction ahead of its commit, and a later life of the process writes over
+    /// the beginning of what such a one left only.
     fn read_log(&mut self, mut log: File) -> io::Result<()> {
         let bytes = log.metadata()?.len();
         let mut head = [0u8; LOG_HEADER as usize];
@@ -97,29 +103,43 @@ impl Pages {
             self.cut_bytes += bytes;
             return Ok(());
         }
-        let word = |b: &[u8], i: usize| u32::from_be_bytes([b[i], b[i + 1], b[i + 2], b[i + 3]]);
-        let big_endian = word(&head, 0) & 1 == 1;
-        let salts = [word(&head, 16), word(&head, 20)];
-        let mut sum = [word(&head, 24), word(&head, 28)];
         let stride = FRAME_HEADER + self.size as u64;
+        let salts = self.salts(&mut log, &head, bytes)?;
+        let mut big_endian = word(&head, 0) & 1 == 1;
+        let first = checksum(big_endian, [0, 0], &head[..24]);
+        // The sums that the next frame may go on from: as stored and as computed, for either may be damaged.
+        let mut sums = [[word(&head, 24), word(&head, 28)], first];
         let mut frame = vec![0u8; stride as usize];
+        let mut uncommitted = Vec::new();
         let mut at = LOG_HEADER;
         while at + stride <= bytes {
             read_at(&mut log, at, &mut frame)?;
             let stored = [word(&frame, 16), word(&frame, 20)];
+            let sum = |big_endian, from| {
+                let sum = checksum(big_endian, from, &frame[..8]);
+                checksum(big_endian, sum, &frame[FRAME_HEADER as usize..])
+            };
+            let mut computed = stored;
             // Frames of an earlier turn of the log have other salts: they are in the file already.
             if [word(&frame, 8), word(&frame, 12)] != salts {
-                self.damaged_frames += u64::from(self.is_damaged(&frame[8..16], salts));
-            } else {
-                let mut found = checksum(big_endian, sum, &frame[..8]);
-                found = checksum(big_endian, found, &frame[FRAME_HEADER as usize..]);
-                if found == stored {
-                    self.add(word(&frame, 0), true, at + FRAME_HEADER);
-                } else {
-                    self.damaged_frames += 1;
+                self.damaged_frames += u64::from(is_damaged(&frame[8..16], salts));
+            } else if let Some(order) = [big_endian, !big_endian]
+                .into_iter()
+                .find(|order| sums.iter().any(|from| sum(*order, *from) == stored))
+            {
+                big_endian = order;
+                uncommitted.push((word(&frame, 0), at + FRAME_HEADER));
+                let is_commit = word(&frame, 4) != 0;
+                if is_commit {
+                    for (page, at) in uncommitted.drain(..) {
+                        self.add(page, true, at);
+                    }
                 }
+            } else {
+                self.damaged_frames += 1;
+                computed = sum(big_endian, sums[0]);
             }
-            sum = stored;
+            sums = [stored, computed];
             at += stride;
         }
         self.cut_bytes += bytes - at;
@@ -127,14 +147,58 @@ impl Pages {
         Ok(())
     }
 
-    /// Whether foreign salts are damage: an earlier turn differs in both, a flipped byte in one.
-    fn is_damaged(&self, found: &[u8], salts: [u32; 2]) -> bool {
-        found[..4] == salts[0].to_be_bytes() || found[4..] == salts[1].to_be_bytes()
+    /// What marks the frames of the log's last turn: as its header says, when the header is whole, else as the first two frames
+    /// in a row that agree say.
+    fn salts(&self, log: &mut File, head: &[u8], bytes: u64) -> io::Result<[u32; 2]> {
+        let stored = [word(head, 24), word(head, 28)];
+        let is_whole = [false, true]
+            .iter()
+            .any(|order| checksum(*order, [0, 0], &head[..24]) == stored);
+        let mut salts = [word(head, 16), word(head, 20)];
+        if is_whole {
+            return Ok(salts);
+        }
+        let stride = FRAME_HEADER + self.size as u64;
+        let (mut at, mut before) = (LOG_HEADER, None);
+        while at + stride <= bytes {
+            let mut frame = [0u8; FRAME_HEADER as usize];
+            read_at(log, at, &mut frame)?;
+            let found = [word(&frame, 8), word(&frame, 12)];
+            if before.is_none() {
+                salts = found;
+            }
+            if before == Some(found) && found != [0, 0] {
+                return Ok(found);
+            }
+            before = Some(found);
+            at += stride;
+        }
+        Ok(salts)
     }
 
-    /// Bytes of a page that SQLite uses.
-    pub const fn usable(&self) -> usize {
-        self.usable
+    /// Bytes of a page. SQLite uses all of them: sessions are made with none reserved.
+    pub const fn page_bytes(&self) -> usize {
+        self.size
+    }
+
+    /// No row is longer than all pages together.
+    pub const fn most_bytes(&self) -> u64 {
+        self.size as u64 * self.images.len() as u64
+    }
+
+    /// Reads the page on which a row goes on; false when there is none, or rows went on to more pages than those of a session do.
+    pub fn follow(&mut self, page: u32, bytes: &mut Vec<u8>) -> io::Result<bool> {
+        let Some(image) = self.latest(page).filter(|_| self.follow > 0) else {
+            return Ok(false);
+        };
+        self.follow -= 1;
+        self.read(image, bytes)?;
+        Ok(true)
+    }
+
+    /// Whether some row was not read to its end because rows went on to too many pages.
+    pub const fn is_exhausted(&self) -> bool {
+        self.follow == 0
     }
 
     /// Every image, earlier ones first.
@@ -172,6 +236,15 @@ impl Pages {
 fn read_at(file: &mut File, at: u64, bytes: &mut [u8]) -> io::Result<()> {
     file.seek(SeekFrom::Start(at))?;
     file.read_exact(bytes)
+}
+
+fn word(bytes: &[u8], at: usize) -> u32 {
+    u32::from_be_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]])
+}
+
+/// Whether foreign salts are damage: an earlier turn differs in both, a flipped byte in one.
+fn is_damaged(found: &[u8], salts: [u32; 2]) -> bool {
+    found[..4] == salts[0].to_be_bytes() || found[4..] == salts[1].to_be_bytes()
 }
 
 /// The log's checksum over `bytes`, going on from `sum` (sqlite.org/fileformat.html section 4.2).

@@ -9,7 +9,7 @@ use skinrig_recorder::{
 };
 use sqlx::{ConnectOptions, Row};
 
-use crate::common::{Evt2, records, sealed};
+use crate::common::{Evt2, further_leg, records, sealed};
 
 const PAGE: usize = 65536;
 
@@ -241,54 +241,170 @@ fn more_comes_back_of_a_longer_piece() {
     assert_eq!(before, all + case.chunks.len());
 }
 
+#[test]
+fn a_damaged_byte_of_the_file_header_costs_nothing() {
+    let (case, original) = Case::new(3);
+    for at in 0..100 {
+        let mut bytes = original.clone();
+        bytes[at] ^= 0xFF;
+        let (report, _, hurt) = case.check(&bytes, &format!("byte {at}"));
+        let report = report.unwrap();
+        assert!(report.is_whole() && hurt == 0, "byte {at}: {report:?}");
+    }
+}
+
+/// A run as a killed process leaves it: the last outcome is on the disk, nothing is moved out of the log.
+struct Cut {
+    folder: tempfile::TempDir,
+    file: Vec<u8>,
+    log: Vec<u8>,
+    attempts: BTreeSet<String>,
+}
+
+const FRAME: usize = PAGE + 24;
+
+impl Cut {
+    fn new() -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("x.session.sqlite");
+        let mut writer = SessionWriter::create(&path).unwrap();
+        let before_end = |r: &Record| !matches!(r, Record::Interruption { .. });
+        for record in records(6).into_iter().take_while(before_end) {
+            writer.accept(record).unwrap();
+        }
+        let file = std::fs::read(&path).unwrap();
+        let log = std::fs::read(folder.path().join("x.session.sqlite-wal")).unwrap();
+        drop(writer);
+        assert!(log.len() > 8 * FRAME, "{} bytes", log.len());
+        Self {
+            attempts: tables(&path)["attempt"].clone(),
+            folder,
+            file,
+            log,
+        }
+    }
+
+    fn salvage(
+        &self,
+        log: &[u8],
+        name: &str,
+    ) -> (SalvageReport, BTreeMap<&'static str, BTreeSet<String>>) {
+        let from = self.folder.path().join("cut.session.sqlite");
+        std::fs::write(&from, &self.file).unwrap();
+        std::fs::write(self.folder.path().join("cut.session.sqlite-wal"), log).unwrap();
+        let to = self.folder.path().join(name);
+        let report = salvage(&from, &to).unwrap();
+        (report, tables(&to))
+    }
+
+    /// A frame of the log for page `number`, chained to `before`, with `commit` as its size after the commit.
+    fn frame(&self, before: [u32; 2], number: u32, commit: u32, page: &[u8]) -> Vec<u8> {
+        let head = [number.to_be_bytes(), commit.to_be_bytes()].concat();
+        let [mut a, mut b] = before;
+        let both = [head.as_slice(), page].concat();
+        for pair in both.chunks_exact(8) {
+            let word = |i: usize| {
+                let four: [u8; 4] = pair[i..i + 4].try_into().unwrap();
+                if self.log[3] & 1 == 1 {
+                    u32::from_be_bytes(four)
+                } else {
+                    u32::from_le_bytes(four)
+                }
+            };
+            a = a.wrapping_add(word(0)).wrapping_add(b);
+            b = b.wrapping_add(word(4)).wrapping_add(a);
+        }
+        let sum = [a.to_be_bytes(), b.to_be_bytes()].concat();
+        [head.as_slice(), &self.log[16..24], &sum, page].concat()
+    }
+}
+
+fn word(bytes: &[u8], at: usize) -> u32 {
+    u32::from_be_bytes(bytes[at..at + 4].try_into().unwrap())
+}
+
+#[test]
+fn a_damaged_byte_of_the_log_header_costs_nothing() {
+    let cut = Cut::new();
+    let (_, whole) = cut.salvage(&cut.log, "whole");
+    for (at, bits) in (0..32).flat_map(|at| [(at, 0xFF), (at, 1)]) {
+        let mut log = cut.log.clone();
+        log[at] ^= bits;
+        let (report, left) = cut.salvage(&log, &format!("{at}.{bits}"));
+        assert!(report.is_whole(), "byte {at}: {report:?}");
+        assert_eq!(left, whole, "byte {at}");
+    }
+}
+
+#[test]
+fn what_was_never_committed_is_not_taken() {
+    let cut = Cut::new();
+    let (_, whole) = cut.salvage(&cut.log, "whole");
+    // The page with the answers of the preflight, altered: in the log its last image, in the file its only one.
+    let holds = |page: &[u8]| page.windows(4).any(|w| w == b"2 GB");
+    let in_log = cut.log[32..]
+        .chunks_exact(FRAME)
+        .map(|f| (word(f, 0), &f[24..]));
+    let in_file = (1..).zip(cut.file.chunks_exact(PAGE));
+    let (number, page) = in_file
+        .chain(in_log)
+        .filter(|(_, p)| holds(p))
+        .last()
+        .unwrap();
+    let mut page = page.to_vec();
+    let at = page.windows(4).position(|w| w == b"2 GB").unwrap();
+    page[at] = b'9';
+    let last = &cut.log[cut.log.len() - FRAME..];
+    let end = [word(last, 16), word(last, 20)];
+    let with = |before, commits: [u32; 3]| {
+        let (mut log, mut before) = (cut.log.clone(), before);
+        for commit in commits {
+            let frame = cut.frame(before, number, commit, &page);
+            before = [word(&frame, 16), word(&frame, 20)];
+            log.extend(frame);
+        }
+        log
+    };
+    // Written ahead of a commit that never came.
+    let (report, left) = cut.salvage(&with(end, [0, 0, 0]), "ahead");
+    assert!(report.is_whole(), "{report:?}");
+    assert_eq!(left, whole);
+    // The same, when its beginning was written over since: what is there now does not lead to it.
+    let (report, left) = cut.salvage(&with([1, 2], [0, 0, 0]), "over");
+    assert_eq!(report.findings.len(), 1, "{report:?}");
+    assert_eq!(left, whole);
+    // A commit makes it part of the session.
+    let (report, left) = cut.salvage(&with(end, [0, 0, 40]), "committed");
+    assert!(report.is_whole(), "{report:?}");
+    assert_ne!(left["preflight"], whole["preflight"]);
+}
+
 /// A run that was cut off lies partly in the log. A damaged page there costs what it held, not what was written after it.
 #[test]
 fn a_damaged_log_costs_a_page() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("x.session.sqlite");
-    let log = folder.path().join("x.session.sqlite-wal");
-    let mut writer = SessionWriter::create(&path).unwrap();
-    let all = records(6);
-    for record in all
-        .into_iter()
-        .take_while(|r| !matches!(r, Record::Interruption { .. }))
-    {
-        writer.accept(record).unwrap();
-    }
-    // As a killed process leaves it: the last outcome is on the disk, nothing is moved out of the log.
-    let (file, logged) = (std::fs::read(&path).unwrap(), std::fs::read(&log).unwrap());
-    drop(writer);
-    let attempts = tables(&path)["attempt"].clone();
-    let frame = PAGE + 24;
-    assert!(logged.len() > 8 * frame, "{} bytes", logged.len());
-    let from = folder.path().join("cut.session.sqlite");
-    let try_with = |logged: &[u8], name: &str| {
-        std::fs::write(&from, &file).unwrap();
-        std::fs::write(folder.path().join("cut.session.sqlite-wal"), logged).unwrap();
-        let to = folder.path().join(name);
-        let report = salvage(&from, &to).unwrap();
-        (report, tables(&to))
-    };
-    let (report, whole) = try_with(&logged, "whole");
+    let cut = Cut::new();
+    let (report, whole) = cut.salvage(&cut.log, "whole");
     assert!(report.findings.is_empty(), "{report:?}");
-    assert_eq!(whole["attempt"], attempts);
-    for n in (0..logged.len() / frame).step_by(5) {
-        let mut damaged = logged.clone();
-        damaged[32 + n * frame + 24 + 77] ^= 1;
-        let (report, left) = try_with(&damaged, &format!("damaged{n}"));
-        assert_eq!(report.findings.len(), 1, "{report:?}");
+    assert_eq!(whole["attempt"], cut.attempts);
+    for n in (0..cut.log.len() / FRAME).step_by(5) {
+        let mut damaged = cut.log.clone();
+        damaged[32 + n * FRAME + 24 + 77] ^= 1;
+        let (report, left) = cut.salvage(&damaged, &format!("damaged{n}"));
+        assert!(!report.findings.is_empty(), "{report:?}");
         let differ = left
             .iter()
             .filter(|(name, rows)| whole[*name] != **rows)
             .count();
-        assert!(differ <= 1, "frame {n} cost {differ} tables");
+        // The last one is the commit of all that was written with it.
+        let is_commit = n + 1 == cut.log.len() / FRAME;
+        assert!(differ <= 1 || is_commit, "frame {n} cost {differ} tables");
     }
-    let (report, cut) = try_with(&logged[..logged.len() - 1000], "cut");
+    let (report, left) = cut.salvage(&cut.log[..cut.log.len() - 1000], "cut");
     assert!(
         report.findings[0].contains("after the last whole page"),
         "{report:?}"
     );
-    assert!(cut["attempt"].len() + 1 >= attempts.len());
+    assert!(left["attempt"].len() + 1 >= cut.attempts.len());
 }
 
 #[test]
@@ -313,4 +429,176 @@ fn what_is_no_session_gives_nothing() {
         );
         assert!(!to.exists());
     }
+}
+
+/// Runs statements on a session that is not sealed, and moves everything from the log to the file.
+fn alter(path: &Path, statements: &[&'static str]) {
+    let runtime = tokio::runtime::Builder::new_current_thread()
+        .build()
+        .unwrap();
+    runtime.block_on(async {
+        let options = sqlx::sqlite::SqliteConnectOptions::new().filename(path);
+        let mut conn = options.foreign_keys(false).connect().await.unwrap();
+        for statement in ["DELETE FROM seal", "DELETE FROM table_digest"]
+            .iter()
+            .chain(statements)
+        {
+            sqlx::query(*statement).execute(&mut conn).await.unwrap();
+        }
+        sqlx::Connection::close(conn).await.unwrap();
+    });
+}
+
+#[test]
+fn rows_that_others_speak_of_are_told_to_be_missing() {
+    let (case, bytes) = Case::new(5);
+    let [from, to] = ["from", "to"].map(|n| case.folder.path().join(n));
+    for (statement, finding) in [
+        ("DELETE FROM session", "1 row of session"),
+        ("DELETE FROM robot_from_skin", "3 row(s) of robot_from_skin"),
+        (
+            "DELETE FROM robot_from_skin WHERE axis = 2",
+            "1 row(s) of robot_from_skin",
+        ),
+        (
+            "UPDATE session SET plan_json = '{\"presses\":[1,2,3,4,5,6]}'",
+            "1 press(es) of the plan",
+        ),
+        (
+            "DELETE FROM press WHERE id = 4",
+            "1 press(es) missing that an attempt or a mark names",
+        ),
+        (
+            "DELETE FROM attempt WHERE press = 2",
+            "1 press(es) with a mark and without an attempt",
+        ),
+        (
+            "DELETE FROM attempt WHERE press = 3 AND number = 1",
+            "1 press(es) of which an earlier attempt",
+        ),
+        (
+            "UPDATE chunk SET seq = 9999999999 WHERE seq = 4",
+            "chunk: 2 row(s) numbered too far",
+        ),
+    ] {
+        std::fs::write(&from, &bytes).unwrap();
+        let _ = std::fs::remove_file(&to);
+        alter(&from, &[statement]);
+        let report = salvage(&from, &to).unwrap();
+        let told = report.findings.iter().filter(|f| f.starts_with(finding));
+        assert_eq!(told.count(), 1, "{statement}: {report:?}");
+        assert!(!report.is_whole());
+    }
+}
+
+#[test]
+fn missing_chunks_came_when_the_one_before_them_did_but_not_before_their_leg() {
+    let folder = tempfile::tempdir().unwrap();
+    let [from, to] = ["from", "to"].map(|n| folder.path().join(n));
+    sealed(&from, 5);
+    let known = SessionReader::open(&from).unwrap().history().unwrap();
+    let mut writer = SessionWriter::resume(&from).unwrap();
+    for record in further_leg(&known) {
+        writer.accept(record).unwrap();
+    }
+    writer.finish().unwrap();
+    let reader = SessionReader::open(&from).unwrap();
+    let before = reader.chunk_index(CameraId::One).unwrap();
+    // Of the five chunks of the first leg and those of the second: one within, and two where the legs meet.
+    alter(
+        &from,
+        &["DELETE FROM chunk WHERE camera = 1 AND seq IN (2, 4, 5)"],
+    );
+    let report = salvage(&from, &to).unwrap();
+    let told = report.tables.iter().filter(|t| t.missing > 0);
+    let told: Vec<_> = told.map(|t| (t.name.as_str(), t.missing)).collect();
+    assert_eq!(told, [("chunk", 3)]);
+    let after = SessionReader::open(&to).unwrap();
+    let after = after.chunk_index(CameraId::One).unwrap();
+    assert_eq!(after[2].host_time, before[1].host_time);
+    assert_eq!(after[4].host_time, before[3].host_time);
+    assert!(after[5].host_time > before[4].host_time, "{after:?}");
+    assert!(after[5].host_time <= before[5].host_time, "{after:?}");
+    let problems = verify(&to, &mut Evt2::default()).unwrap().problems;
+    assert!(
+        !problems.iter().any(|p| p.contains("host time")),
+        "{problems:?}"
+    );
+}
+
+/// A page of a table with one row of `note` in it, of which most goes on to page `next`.
+fn note_that_goes_on(id: u8, text_bytes: u32, next: u32) -> Vec<u8> {
+    let varint = |n: u32| {
+        [21, 14, 7]
+            .map(|s| (n >> s) as u8 | 0x80)
+            .into_iter()
+            .chain([n as u8 & 0x7F])
+    };
+    let mut record = vec![7, 0, 1];
+    record.extend(varint(2 * text_bytes + 13));
+    record.push(0);
+    let payload = record.len() as u32 + text_bytes;
+    let least = (PAGE - 12) * 32 / 255 - 23;
+    let even = least + (payload as usize - least) % (PAGE - 4);
+    let local = if even <= PAGE - 35 { even } else { least };
+    record.resize(local, b'a');
+    let mut cell: Vec<u8> = varint(payload).collect();
+    cell.push(id);
+    cell.extend(record);
+    cell.extend(next.to_be_bytes());
+    let mut page = vec![0; PAGE];
+    let at = PAGE - cell.len();
+    page[..8].copy_from_slice(&[0x0D, 0, 0, 0, 1, (at >> 8) as u8, at as u8, 0]);
+    page[8..10].copy_from_slice(&(at as u16).to_be_bytes());
+    page[at..].copy_from_slice(&cell);
+    page
+}
+
+/// A page on which a row goes on, and then on page `next`.
+fn goes_on(next: u32) -> Vec<u8> {
+    let mut page = vec![b'a'; PAGE];
+    page[..4].copy_from_slice(&next.to_be_bytes());
+    page
+}
+
+#[test]
+fn rows_that_go_on_without_an_end_are_left_out() {
+    let (case, sound) = Case::new(3);
+    let [from, to] = ["from", "to"].map(|n| case.folder.path().join(n));
+    let pages = (sound.len() / PAGE) as u32;
+    let last_note = |extra: Vec<Vec<u8>>| {
+        std::fs::write(&from, [sound.clone(), extra.concat()].concat()).unwrap();
+        let _ = std::fs::remove_file(&to);
+        let report = salvage(&from, &to).unwrap();
+        let notes = SessionReader::open(&to).unwrap().notes().unwrap();
+        let longest = notes.iter().map(|n| n.text.len()).max();
+        (report, longest.unwrap())
+    };
+    let whole = vec![
+        note_that_goes_on(9, 150_000, pages + 2),
+        goes_on(pages + 3),
+        goes_on(0),
+    ];
+    assert_eq!(last_note(whole).1, 150_000);
+    let text_bytes = 30 << 16;
+    let looping = vec![
+        note_that_goes_on(9, 10 << 16, pages + 2),
+        goes_on(pages + 2),
+    ];
+    assert!(last_note(looping).1 < 1000);
+    let huge = vec![
+        note_that_goes_on(9, 100 << 20, pages + 2),
+        goes_on(pages + 2),
+    ];
+    assert!(last_note(huge).1 < 1000);
+    // A hundred rows that share a chain of thirty pages.
+    let mut shared: Vec<_> = (0..100)
+        .map(|i| note_that_goes_on(9 + i, text_bytes, pages + 101))
+        .collect();
+    shared.extend((1..=31).map(|i| goes_on(pages + 101 + i)));
+    let (report, _) = last_note(shared);
+    assert!(
+        report.findings.iter().any(|f| f.contains("over and over")),
+        "{report:?}"
+    );
 }
