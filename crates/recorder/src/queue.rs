@@ -13,7 +13,7 @@ use crate::query::Fault;
 const QUEUE_BYTES: usize = 64 << 20;
 
 /// Longest time for which a caller waits for the disk.
-const PATIENCE: Duration = Duration::from_secs(30);
+const PATIENCE: Duration = Duration::from_secs(if cfg!(test) { 2 } else { 30 });
 
 /// A record that can be written, or why it cannot. It keeps its place in the order either way.
 pub type Prepared = Result<Ready, Fault>;
@@ -293,5 +293,22 @@ mod tests {
         });
         let after = shared.load();
         assert_eq!((after.most_bytes, after.waits), (before.most_bytes, 1));
+    }
+
+    /// A disk that hangs ends the run while the arm can still be retracted.
+    #[test]
+    fn nobody_waits_for_a_disk_for_ever() {
+        let shared = Shared::default();
+        let end = Record::Ended {
+            t: HostTime::ZERO,
+            end: skinrig_model::RunEnd::Completed,
+        };
+        let refused = shared.accept(end);
+        assert!(
+            refused
+                .as_ref()
+                .is_err_and(|e| e.contains("expected the disk")),
+            "{refused:?}"
+        );
     }
 }
