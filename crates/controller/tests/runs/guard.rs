@@ -38,7 +38,7 @@ fn around() -> Surroundings {
 /// What the surroundings allow, in words of its own: by points on the way.
 fn allows(from: [f64; 3], to: [f64; 3]) -> bool {
     let sideways = (from[0] - to[0]).hypot(from[1] - to[1]);
-    if sideways <= 0.05 && to[2] >= from[2] {
+    if sideways <= 0.05 && to[2] - from[2] >= sideways {
         return true;
     }
     if to[2] < 4.95 && SkinOutline::PAPER.clearance_mm(Point2::new(to[0], to[1])) < -0.05 {
@@ -84,6 +84,8 @@ proptest! {
             Box::new(MockIndenter(world.clone())), robot_from_skin(), LIMITS, &ControllerSettings::default(),
         ).within(Some(around()));
         let mut poses = Vec::new();
+        // Where the tip went down below clearance height.
+        let mut foot: Option<[f64; 2]> = None;
         guard.arm().map_err(|e| TestCaseError::fail(e.to_string()))?;
         for act in acts {
             match act {
@@ -103,7 +105,10 @@ proptest! {
                     let fresh = last.is_some_and(|p| now - p.t.0 <= 100 * MS);
                     let sideways = last.is_none_or(|p| {
                         let [a, b, c] = p.measured.to_array();
-                        (x - a).hypot(y - b) > 0.05 && z.min(c) < 4.95
+                        let aside = (x - a).hypot(y - b);
+                        let steep = aside <= 0.05 && z - c >= aside;
+                        let off = foot.map_or(0.0, |[u, v]| (x - u).hypot(y - v));
+                        (aside > 0.05 || (!steep && off > 0.05)) && z.min(c) < 4.95
                     });
                     let allowed = [x, y, z, speed].iter().all(|v| v.is_finite())
                         && speed > 0.0 && speed <= 100.0
@@ -113,6 +118,11 @@ proptest! {
                         && last.is_none_or(|p| allows(p.measured.to_array(), [x, y, z]));
                     prop_assert_eq!(answer.is_ok(), allowed, "{:?} at {} -> {:?}", target, speed, answer);
                     prop_assert_eq!(w.commands.len() - heard, usize::from(allowed));
+                    if allowed && z < 4.95 {
+                        foot.get_or_insert([x, y]);
+                    } else if allowed && last.is_some_and(|p| p.measured.z_mm >= 4.95) {
+                        foot = None;
+                    }
                 }
                 Act::Look(ms) => {
                     lock(&world).t += ms * MS;

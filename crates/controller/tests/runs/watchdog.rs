@@ -37,8 +37,8 @@ fn trip_of(samples: impl IntoIterator<Item = ([f64; 3], f64)>) -> Option<(i64, T
     None
 }
 
-/// What a position may change by within the 5 ms over which a speed is taken.
-const JUMP_MM: f64 = 1.25 * LIMITS.max_speed_mm_s * 5e-3 + LIMITS.position_tolerance_mm;
+/// What a position may change by within the 5 ms over which a speed is taken, and the sample before them.
+const JUMP_MM: f64 = 1.25 * LIMITS.max_speed_mm_s * 6e-3 + LIMITS.position_tolerance_mm;
 
 proptest! {
     #![proptest_config(ProptestConfig { cases: 256, ..ProptestConfig::default() })]
