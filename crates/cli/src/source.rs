@@ -39,16 +39,65 @@ impl EventSource for SessionEvents {
     ) -> Result<(), String> {
         let reader = SessionReader::open(&self.path).map_err(|e| e.to_string())?;
         let moves = &self.moves[camera.index()];
-        let mut decoder = Decoder::new(self.formats[camera.index()]);
+        let mut legs = LegDecoder::new(self.formats[camera.index()]);
         reader
             .for_each_chunk(camera, 0, |meta, bytes| {
                 if let Some(origin_us) = meta.restart_us {
-                    let by = moves.get(&origin_us).copied().unwrap_or_default();
-                    decoder.restart(origin_us.saturating_add_signed(by));
+                    legs.restart(
+                        origin_us,
+                        moves.get(&origin_us).copied().unwrap_or_default(),
+                    );
                 }
-                decoder.for_each_slice(bytes, &mut *each)
+                legs.for_each_slice(bytes, each);
             })
             .map_err(|e| e.to_string())
+    }
+}
+
+/// Decodes leg after leg and moves each event by what the edges of its leg are moved by.
+struct LegDecoder {
+    decoder: Decoder,
+    /// What is left to move: 0 but for a leg that would begin below zero, where no decoder can begin.
+    by_us: i64,
+    moved: Vec<CdEvent>,
+}
+
+impl LegDecoder {
+    fn new(format: StreamFormat) -> Self {
+        Self {
+            decoder: Decoder::new(format),
+            by_us: 0,
+            moved: Vec::new(),
+        }
+    }
+
+    /// The next leg was recorded from `origin_us` on and is moved by `by_us`.
+    fn restart(&mut self, origin_us: u64, by_us: i64) {
+        let (begin_us, rest_us) = match origin_us.checked_add_signed(by_us) {
+            Some(moved_us) => (moved_us, 0),
+            None => (origin_us, by_us),
+        };
+        self.decoder.restart(begin_us);
+        self.by_us = rest_us;
+    }
+
+    fn for_each_slice(&mut self, bytes: &[u8], each: &mut dyn FnMut(&[CdEvent])) {
+        let Self {
+            decoder,
+            by_us,
+            moved,
+        } = self;
+        decoder.for_each_slice(bytes, |events| {
+            if *by_us == 0 {
+                return each(events);
+            }
+            moved.clear();
+            moved.extend(events.iter().map(|event| CdEvent {
+                t_us: event.t_us.saturating_add_signed(*by_us),
+                ..*event
+            }));
+            each(moved);
+        });
     }
 }
 
@@ -74,5 +123,42 @@ impl ChunkScanner for Rescan {
         self.scanners[camera.index()]
             .get_or_insert_with(|| Scanner::new(format))
             .restart(origin_us);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Times of the events of an EVT2 leg, which come at 100, 700 and 200 000 µs of its own.
+    fn times(restart: impl Fn(&mut LegDecoder)) -> Vec<u64> {
+        let word = |t: u64| [0x8000_0000 | (t >> 6) as u32, ((t & 63) as u32) << 22];
+        let words = [100, 700, 200_000].into_iter().flat_map(word);
+        let bytes: Vec<u8> = words.flat_map(u32::to_le_bytes).collect();
+        let mut legs = LegDecoder::new(StreamFormat::Evt2);
+        restart(&mut legs);
+        let mut times = Vec::new();
+        legs.for_each_slice(&bytes, &mut |events| {
+            times.extend(events.iter().map(|e| e.t_us))
+        });
+        times
+    }
+
+    #[test]
+    fn events_are_moved_as_the_edges_of_their_leg() {
+        let recorded_us = times(|legs| legs.restart(5_000_000, 0));
+        assert_eq!(recorded_us, [5_000_100, 5_000_700, 5_200_000]);
+        // The last three would begin below zero.
+        for by in [7, -7, -5_000_000, -5_000_001, -5_000_300, -9_000_000] {
+            let edges = recorded_us.iter().map(|t| t.saturating_add_signed(by));
+            let events = times(|legs| legs.restart(5_000_000, by));
+            assert!(events.iter().copied().eq(edges), "by {by}: {events:?}");
+        }
+        // What was left to move ends with the leg.
+        let next = times(|legs| {
+            legs.restart(5_000_000, -5_000_300);
+            legs.restart(6_000_000, 1);
+        });
+        assert_eq!(next, [6_000_101, 6_000_701, 6_200_001]);
     }
 }
