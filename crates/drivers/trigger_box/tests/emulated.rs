@@ -147,6 +147,11 @@ fn without_skew(edges: &[Edge]) -> Vec<Edge> {
 
 /// The train of `mark`, exact to the cycle.
 fn assert_train(edges: &[Edge], mark: Mark) {
+    assert_train_within(edges, mark, 0);
+}
+
+/// The train of `mark`, each edge late by at most so many cycles.
+fn assert_train_within(edges: &[Edge], mark: Mark, slack: u64) {
     let start = edges[0].cycle;
     let found: Vec<(u64, bool)> = edges.iter().map(|e| (e.cycle - start, e.high)).collect();
     let wanted: Vec<(u64, bool)> = PulseTrain::new(mark)
@@ -159,7 +164,11 @@ fn assert_train(edges: &[Edge], mark: Mark) {
             ]
         })
         .collect();
-    assert_eq!(found, wanted, "the train of {mark:?}");
+    let close = |(f, w): (&(u64, bool), &(u64, bool))| f.1 == w.1 && f.0.abs_diff(w.0) <= slack;
+    assert!(
+        found.len() == wanted.len() && found.iter().zip(&wanted).all(close),
+        "the train of {mark:?}: expected {wanted:?} within {slack} cycles, found {found:?}"
+    );
 }
 
 fn run_marks(n: u32) {
@@ -638,7 +647,8 @@ fn a_noisy_input_takes_nothing_from_the_trains() {
                     outputs.push(edge);
                 }
             }
-            assert_train(&without_skew(&outputs), mark(marks));
+            // An edge may wait for the end of an interrupt of the input: 1 us.
+            assert_train_within(&without_skew(&outputs), mark(marks), CYCLES_PER_US);
             // A slow host takes six events for each mark, while the input would fill all that is free.
             let events = Events::parse(&ask(Request::Events { from }).answers).unwrap();
             from = events.first + events.events.len() as u32;
