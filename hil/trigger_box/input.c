@@ -13,6 +13,7 @@ static struct input_counts counts;
 volatile bool input_muted;
 static uint8_t turn; // of the clock, in which the last edge came
 static uint8_t edges_left = EDGES_PER_TURN; // in this turn
+static bool stale; // what is latched came while the input was not looked at
 
 static inline void count(uint16_t *n)
 {
@@ -65,14 +66,8 @@ static inline bool within_bounds(void)
     return true;
 }
 
-ISR(TIMER1_CAPT_vect)
+static inline void take_edge(uint16_t timer)
 {
-    uint16_t timer = ICR1;
-    if (!within_bounds())
-        return;
-    // The edge of a train that has become due comes before the next edge of the input, whose interrupt ranks higher.
-    if (TIFR1 & _BV(OCF1A))
-        TIMSK1 &= (uint8_t)~_BV(ICIE1);
     bool level = TCCR1B & _BV(ICES1);
     if (is_high() != level) {
         // Over before it could be looked at (or raised by the change of polarity itself): not an edge to rely on.
@@ -86,6 +81,23 @@ ISR(TIMER1_CAPT_vect)
         record(!level, TCNT1);
         wait_for(level);
     }
+}
+
+ISR(TIMER1_CAPT_vect)
+{
+    uint16_t timer = ICR1;
+    if (stale) {
+        stale = false;
+        wait_for(!is_high());
+        return;
+    }
+    if (!within_bounds())
+        return;
+    take_edge(timer);
+    // The edge of a train that has become due comes before the next edge of the input, whose interrupt ranks higher. The
+    // last thing looked at, so that at most one interrupt of the input is between the two (see LEAD_TICKS).
+    if (TIFR1 & _BV(OCF1A))
+        TIMSK1 &= (uint8_t)~_BV(ICIE1);
 }
 
 void input_setup(void)
@@ -104,7 +116,8 @@ void input_tend(void)
     {
         if (input_muted && (uint8_t)clock_overflows != turn) {
             wait_for(!is_high());
-            TIFR1 = _BV(ICF1); // what came meanwhile
+            // Left to the interrupt to clear: simavr 1.6 would clear the trains' flag in the same register too.
+            stale = TIFR1 & _BV(ICF1);
             input_muted = false;
             TIMSK1 |= _BV(ICIE1);
         }

@@ -3,7 +3,7 @@
 
 #define FIRMWARE_MAJOR 1
 #define FIRMWARE_MINOR 1
-#define FIRMWARE_PATCH 0
+#define FIRMWARE_PATCH 1
 
 // Changes with any change of a frame's meaning. The layout of HELLO never changes.
 #define PROTOCOL_VERSION 2

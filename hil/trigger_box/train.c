@@ -14,9 +14,11 @@
 #include "pins.h"
 #include "protocol.h"
 
-// How long before an edge its interrupt is due: longer than the longest stretch without interrupts. Half a microsecond
-// off the grid of the edges, so that no match falls on the timer's overflow, where simavr 1.6 misses it.
-#define LEAD_TICKS (40UL * TICKS_PER_US + TICKS_PER_US / 2)
+// How long before an edge its interrupt is due: longer than all that can come before the look at the clock in it. That is
+// one interrupt of the input with two edges (440 cycles), which begins last in the other's last instructions (50) or after
+// any other stretch without interrupts (110 at most), and the interrupt's own beginning (130): 700 cycles, 44 us. Half a
+// microsecond off the grid of the edges, so that no match falls on the timer's overflow, where simavr 1.6 misses it.
+#define LEAD_TICKS (52UL * TICKS_PER_US + TICKS_PER_US / 2)
 // From "now" to the first edge of a train that need not wait.
 #define START_LEAD_TICKS (100UL * TICKS_PER_US)
 // Cycles between the reading of Timer1 in `write_at` and the change of the port, besides the wait itself.
@@ -96,7 +98,7 @@ ISR(TIMER1_COMPA_vect)
         return;
     // A match of an old setting, or an edge more than a turn of the timer away: it will come again.
     int32_t left = (int32_t)(due - clock_low());
-    if (left > (int32_t)(2 * LEAD_TICKS))
+    if (left > (int32_t)(LEAD_TICKS + LEAD_TICKS / 2))
         return;
     uint8_t value = high ? PORTB & (uint8_t)~OUTPUTS : PORTB | OUTPUTS;
     bool late = left < 0;

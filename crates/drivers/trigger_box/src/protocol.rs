@@ -9,7 +9,7 @@ pub const PROTOCOL_VERSION: u8 = 2;
 pub const FIRMWARE_VERSION: Firmware = Firmware {
     major: 1,
     minor: 1,
-    patch: 0,
+    patch: 1,
 };
 /// How a box names itself.
 pub const BOX_NAME: &str = "skinrig-trigger-box";

@@ -59,7 +59,7 @@ struct Script {
 impl Default for Script {
     fn default() -> Self {
         Self {
-            firmware: [1, 1, 0],
+            firmware: [1, 1, 1],
             protocol: 2,
             name: "skinrig-trigger-box",
             boot: 7,

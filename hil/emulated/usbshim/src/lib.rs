@@ -1,7 +1,7 @@
 //! A preload library that sends a process's USB system calls to an emulated bus.
 //!
 //! ```text
-//! LD_PRELOAD=libusbshim.so UMOCKDEV_DIR=/tmp/usbXXXX program
+//! LD_PRELOAD=libusbshim.so UMOCKDEV_DIR=FOLDER program
 //! ```
 //!
 //! libusb reaches the kernel through files: it reads descriptors below `/sys/bus/usb` and `/sys/devices`, opens
