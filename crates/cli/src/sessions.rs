@@ -17,9 +17,7 @@ use crate::exit::{Exit, Failure, Outcome};
 pub fn sessions(args: &SessionsArgs, json: bool) -> Outcome {
     let mut found = list(&args.folder).map_err(Failure::input)?;
     if let Some(wanted) = &args.prototype {
-        found.retain(
-            |s| matches!(&s.state, SessionState::Readable { prototype, .. } if prototype == wanted),
-        );
+        found.retain(|s| s.prototype() == Some(wanted));
     }
     if json {
         crate::print_json(&serde_json::to_value(&found).map_err(Failure::internal)?);
@@ -96,6 +94,30 @@ pub fn find_running(place: &Path) -> Result<PathBuf, Failure> {
     }))
 }
 
+/// The sessions of `prototype` in `folder`, oldest first: its name exactly as the protocols write it.
+///
+/// # Errors
+/// [`Failure::input`] when the folder cannot be read, or has none of them: then which prototypes there are.
+pub fn of_prototype(folder: &Path, prototype: &str) -> Result<Vec<PathBuf>, Failure> {
+    let all = list(folder).map_err(Failure::input)?;
+    let of = |s: &&SessionSummary| s.prototype() == Some(prototype);
+    let found: Vec<PathBuf> = all.iter().filter(of).map(|s| s.path.clone()).collect();
+    if !found.is_empty() {
+        return Ok(found);
+    }
+    let mut known: Vec<&str> = all.iter().filter_map(SessionSummary::prototype).collect();
+    known.sort_unstable();
+    known.dedup();
+    let known = match known[..] {
+        [] => "no sessions".to_owned(),
+        _ => format!("sessions of {}", known.join(", ")),
+    };
+    Err(Failure::input(format!(
+        "{}: expected sessions of the prototype `{prototype}`, found {known}\n  next: `skinrig prototypes {0}` lists them",
+        folder.display()
+    )))
+}
+
 fn none_in(folder: &Path) -> Failure {
     Failure::input(format!(
         "{}: expected a session, found none\n  next: `skinrig run` records one; name another folder or a file",
@@ -138,7 +160,7 @@ fn line(session: &SessionSummary) -> String {
             rig_name,
             end,
             sealed,
-            totals,
+            presses,
             ..
         } => {
             let protocol = protocol_name.rsplit('/').next().unwrap_or_default();
@@ -155,7 +177,7 @@ fn line(session: &SessionSummary) -> String {
                 clip(prototype, 14),
                 clip(protocol, 22),
                 clip(rig_name, 24),
-                format!("{}/{}", totals.presses.valid, totals.presses.planned),
+                format!("{}/{}", presses.valid, presses.planned),
                 session.size_bytes as f64 / 1e6,
             )
         }

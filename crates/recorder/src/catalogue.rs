@@ -1,4 +1,4 @@
-//! What a folder of sessions holds, without reading camera bytes.
+//! What a folder of sessions holds, from the head of each file: neither plans nor camera bytes are read.
 
 use std::path::{Path, PathBuf};
 
@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use crate::error::RecorderError;
 use crate::reader::SessionReader;
-use crate::rows::SessionTotals;
+use crate::rows::{PressTally, SessionTotals};
 
 /// How session files end.
 pub const SESSION_SUFFIX: &str = ".session.sqlite";
@@ -47,8 +47,12 @@ pub enum SessionState {
         end: Option<String>,
         /// Whether it is sealed.
         sealed: bool,
-        /// Its counts: the seal's, or counted now.
-        totals: Box<SessionTotals>,
+        /// How its calibrating and scored presses ended so far.
+        presses: PressTally,
+        /// How its sync presses ended so far.
+        sync: PressTally,
+        /// The counts of its seal; `None` for one that is not sealed, of which the whole file would have to be read.
+        totals: Option<Box<SessionTotals>>,
     },
     /// It cannot.
     Broken {
@@ -91,6 +95,17 @@ pub fn list(folder: impl AsRef<Path>) -> Result<Vec<SessionSummary>, RecorderErr
     Ok(sessions)
 }
 
+impl SessionSummary {
+    /// Which prototype was pressed; `None` of a broken file.
+    #[must_use]
+    pub fn prototype(&self) -> Option<&str> {
+        match &self.state {
+            SessionState::Readable { prototype, .. } => Some(prototype),
+            SessionState::Broken { .. } => None,
+        }
+    }
+}
+
 fn key(summary: &SessionSummary) -> (bool, &str, &Path) {
     match &summary.state {
         SessionState::Readable { started_at, .. } => (false, started_at, &summary.path),
@@ -102,9 +117,10 @@ fn summarise(path: &Path) -> Result<SessionState, RecorderError> {
     let reader = SessionReader::open(path)?;
     let brief = reader.brief()?;
     let seal = reader.seal()?;
-    let totals = match &seal {
-        Some(seal) => seal.totals,
-        None => reader.totals()?,
+    let totals = seal.map(|seal| Box::new(seal.totals));
+    let (presses, sync) = match &totals {
+        Some(totals) => (totals.presses, totals.sync),
+        None => reader.tallies()?,
     };
     Ok(SessionState::Readable {
         session_id: brief.session_id,
@@ -115,7 +131,9 @@ fn summarise(path: &Path) -> Result<SessionState, RecorderError> {
         rig_kind: brief.rig_kind,
         rig_name: brief.rig_name,
         end: reader.end()?.map(|(_, end)| end.name().to_owned()),
-        sealed: seal.is_some(),
-        totals: Box::new(totals),
+        sealed: totals.is_some(),
+        presses,
+        sync,
+        totals,
     })
 }

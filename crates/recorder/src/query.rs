@@ -173,9 +173,9 @@ pub async fn schema_version(conn: &mut SqliteConnection) -> Result<u32, Fault> {
     num(&version, "user_version")
 }
 
-/// Sizes and counts as the rows have them.
-pub async fn totals(conn: &mut SqliteConnection) -> Result<SessionTotals, Fault> {
-    let mut totals = SessionTotals::default();
+/// How the presses ended, the sync presses apart, each counted by its last attempt.
+pub async fn tallies(conn: &mut SqliteConnection) -> Result<(PressTally, PressTally), Fault> {
+    let (mut scored, mut sync) = (PressTally::default(), PressTally::default());
     let presses = sqlx::query(
         "SELECT p.role = 'sync' AS sync, a.verdict AS verdict, count(*) AS n
          FROM press p LEFT JOIN attempt a
@@ -183,11 +183,10 @@ pub async fn totals(conn: &mut SqliteConnection) -> Result<SessionTotals, Fault>
          GROUP BY 1, 2",
     );
     each_row(presses, conn, |row| {
-        let sync = int(row, "sync")? != 0;
-        let tally = if sync {
-            &mut totals.sync
+        let tally = if int(row, "sync")? != 0 {
+            &mut sync
         } else {
-            &mut totals.presses
+            &mut scored
         };
         let n: u64 = num(row, "n")?;
         tally.planned += n;
@@ -201,6 +200,17 @@ pub async fn totals(conn: &mut SqliteConnection) -> Result<SessionTotals, Fault>
         Ok(())
     })
     .await?;
+    Ok((scored, sync))
+}
+
+/// Sizes and counts as the rows have them.
+pub async fn totals(conn: &mut SqliteConnection) -> Result<SessionTotals, Fault> {
+    let (presses, sync) = tallies(conn).await?;
+    let mut totals = SessionTotals {
+        presses,
+        sync,
+        ..SessionTotals::default()
+    };
     let row = sqlx::query(
         "SELECT count(*) AS chunks, coalesce(sum(raw_bytes), 0) AS raw_bytes,
            coalesce(sum(length(stored)), 0) AS stored_bytes, coalesce(sum(lost_before), 0) AS lost_bytes,

@@ -10,7 +10,7 @@ use tokio::runtime::Runtime;
 use crate::error::RecorderError;
 use crate::from_row::{header_from, planned_from};
 use crate::query::{self, Fault, each_row, int, named, real, sha, text};
-use crate::rows::{DeviceRow, Seal, SessionTotals};
+use crate::rows::{DeviceRow, PressTally, Seal, SessionTotals};
 use crate::schema;
 
 mod journal;
@@ -246,6 +246,14 @@ impl SessionReader {
             }
         }
         Ok(devices.into_iter().map(|(_, device)| device).collect())
+    }
+
+    /// How the presses ended so far, from the journal alone: calibrating and scored ones, then sync presses.
+    ///
+    /// # Errors
+    /// When the file is damaged.
+    pub fn tallies(&self) -> Result<(PressTally, PressTally), RecorderError> {
+        self.ask("counting presses", query::tallies)
     }
 
     /// Counts and sizes, from the rows themselves.
