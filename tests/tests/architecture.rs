@@ -40,7 +40,11 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ),
     ("skinrig-recorder", &["skinrig-model"]),
     ("skinrig-analysis", &["skinrig-model"]),
-    ("skinrig-report", &["skinrig-analysis", "skinrig-model"]),
+    ("skinrig-compare", &["skinrig-analysis", "skinrig-model"]),
+    (
+        "skinrig-report",
+        &["skinrig-compare", "skinrig-analysis", "skinrig-model"],
+    ),
     (
         "skinrig",
         &[
@@ -56,6 +60,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "skinrig-controller",
             "skinrig-recorder",
             "skinrig-analysis",
+            "skinrig-compare",
             "skinrig-report",
         ],
     ),

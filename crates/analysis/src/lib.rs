@@ -39,7 +39,7 @@ pub mod rates;
 pub mod reduction;
 pub mod reference_code;
 pub mod result;
-mod seeded;
+pub mod seeded;
 pub mod segment;
 pub mod sets;
 pub mod sums;

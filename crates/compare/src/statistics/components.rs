@@ -1,0 +1,72 @@
+//! Where the variance of a difference comes from: between locations, and between repetitions at one location.
+
+use super::comparison::Components;
+use super::influence::Influences;
+use super::question::Pairing;
+
+/// Components by the method of moments (analysis of variance with locations as groups; Searle, Casella and McCulloch
+/// 1992). A negative estimate between locations counts 0.
+pub(super) fn of(samples: &[Influences; 2], pairing: Pairing) -> Components {
+    let within = [within(&samples[0]), within(&samples[1])];
+    let inverse = [0, 1].map(|i| inverse_repetitions(&samples[i]));
+    let means = [means(&samples[0]), means(&samples[1])];
+    let between = match pairing {
+        Pairing::SharedLocations => {
+            let pairs = means[0].iter().zip(&means[1]);
+            let differences: Vec<f64> = pairs.map(|(a, b)| b - a).collect();
+            variance(&differences)
+        }
+        Pairing::Independent => variance(&means[0]) + variance(&means[1]),
+    };
+    let noise = match within {
+        [Some(a), Some(b)] => a * inverse[0] + b * inverse[1],
+        _ => 0.0,
+    };
+    Components {
+        between: (between - noise).max(0.0),
+        within: within[0].zip(within[1]).map(|(a, b)| [a, b]),
+        repetitions: inverse.map(|i| 1.0 / i),
+    }
+}
+
+fn means(of: &Influences) -> Vec<f64> {
+    of.places.iter().map(|(_, u)| mean(u)).collect()
+}
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
+/// Sample variance; 0 of fewer than two.
+pub(super) fn variance(values: &[f64]) -> f64 {
+    if values.len() < 2 {
+        return 0.0;
+    }
+    let centre = mean(values);
+    let squares: f64 = values.iter().map(|v| (v - centre).powi(2)).sum();
+    squares / (values.len() as f64 - 1.0)
+}
+
+/// Pooled variance at one location.
+fn within(of: &Influences) -> Option<f64> {
+    let (mut squares, mut free) = (0.0, 0usize);
+    for (_, values) in &of.places {
+        let centre = mean(values);
+        squares += values.iter().map(|v| (v - centre).powi(2)).sum::<f64>();
+        free += values.len() - 1;
+    }
+    (free > 0).then(|| squares / free as f64)
+}
+
+/// Mean of one over the presses at a location.
+fn inverse_repetitions(of: &Influences) -> f64 {
+    let each = of.places.iter().map(|(_, u)| 1.0 / u.len() as f64);
+    each.sum::<f64>() / of.places.len() as f64
+}
+
+/// Variance of one sample between and within locations.
+pub(super) fn alone(of: &Influences) -> (f64, Option<f64>) {
+    let within = within(of);
+    let noise = within.map_or(0.0, |w| w * inverse_repetitions(of));
+    ((variance(&means(of)) - noise).max(0.0), within)
+}

@@ -1,0 +1,87 @@
+//! How many more presses would decide.
+
+use super::compare::direction;
+use super::comparison::{Components, Enough, Needed, Verdict};
+use super::distributions::student_quantile;
+use super::influence::Influences;
+use super::question::{Question, Settings};
+
+/// More locations than anybody presses.
+const MOST: u32 = 100_000;
+
+/// What would decide if the difference is what it seems and the variance what was measured.
+pub(super) fn needed(
+    verdict: Verdict,
+    difference: f64,
+    question: &Question,
+    components: &Components,
+    of: &[Influences; 2],
+    settings: &Settings,
+) -> Needed {
+    if verdict != Verdict::Undecided {
+        return Needed::Nothing;
+    }
+    let apart = direction(of[0].value, of[1].value, question.better);
+    let tails = [1.0 - 0.5 * settings.alpha, 1.0 - settings.alpha];
+    let powers = [settings.power, 0.5 * (1.0 + settings.power)];
+    let room = question.margin.map(|margin| margin - difference.abs());
+    let goals = [
+        (apart, Some(difference.abs()), 0),
+        (Verdict::Equivalent, room.filter(|r| *r > 0.0), 1),
+    ];
+    let now = of.each_ref().map(|i| i.places.len() as u32);
+    let locations = now[0].min(now[1]);
+    let best = goals.iter().filter_map(|(towards, distance, i)| {
+        let distance = (*distance)?;
+        let need = |k: u32| {
+            let df = f64::from(k - 1);
+            let times = student_quantile(tails[*i], df) + student_quantile(powers[*i], df);
+            // The variance that one location may have.
+            f64::from(k) * (distance / times).powi(2)
+        };
+        enough(*towards, need, locations, components, of)
+    });
+    best.min_by_key(|e| e.more_presses_by_locations)
+        .map_or(Needed::OutOfReach, Needed::More)
+}
+
+fn enough(
+    towards: Verdict,
+    allowed: impl Fn(u32) -> f64,
+    now: u32,
+    components: &Components,
+    of: &[Influences; 2],
+) -> Option<Enough> {
+    let within = components.within.unwrap_or_default();
+    let [ra, rb] = components.repetitions;
+    let variance = components.between + within[0] / ra + within[1] / rb;
+    if allowed(MOST) < variance {
+        return None;
+    }
+    let (mut low, mut high) = (now.max(2), MOST);
+    while low < high {
+        let middle = low.midpoint(high);
+        if allowed(middle) >= variance {
+            high = middle;
+        } else {
+            low = middle + 1;
+        }
+    }
+    let presses = of.iter().map(Influences::presses).max().unwrap_or(0);
+    let each = f64::from(presses) / f64::from(now);
+    let room = allowed(now.max(2)) - components.between;
+    let both = within[0] + within[1];
+    let repetitions = components
+        .within
+        .filter(|_| room > 0.0 && both > 0.0)
+        .map(|_| (both / room).ceil())
+        .filter(|r| *r < f64::from(MOST))
+        .map(|r| (r as u32).max(each.ceil() as u32));
+    Some(Enough {
+        towards,
+        locations: low,
+        repetitions,
+        more_presses_by_locations: (f64::from(low - now) * each).ceil() as u32,
+        more_presses_by_repetitions: repetitions.map(|r| (r * now).saturating_sub(presses)),
+    })
+}
