@@ -8,8 +8,9 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use skinrig_analysis::SessionInput;
 use skinrig_model::{
-    AnalysisSettings, AttemptId, CdEvent, HostTime, PlannedPress, Point2, Polarity, PressId,
-    PressOutcome, PressRole, PressTiming, PressVerdict, RigGeometry, SkinOutline, StereoGeometry,
+    AnalysisSettings, AttemptId, CdEvent, HostTime, Mark, MarkKind, PlannedPress, Point2, Polarity,
+    PressId, PressOutcome, PressRole, PressTiming, PressVerdict, PulseTrain, RigGeometry, SentMark,
+    SkinOutline, StereoGeometry, TriggerEdge,
 };
 
 /// Presses of one repetition.
@@ -214,6 +215,47 @@ pub fn input() -> SessionInput {
         },
         settings: AnalysisSettings::default(),
     }
+}
+
+/// The same with the trigger marks of a bench, as skinrig records them: the clocks are known without a look at the events.
+#[must_use]
+pub fn marked_input() -> SessionInput {
+    let mut input = input();
+    input.rig.trigger_channel = Some(0);
+    let timings: Vec<(PressId, PressTiming)> = input
+        .outcomes
+        .iter()
+        .flatten()
+        .filter_map(|o| Some((o.attempt.press, o.timing?)))
+        .collect();
+    for (press, timing) in timings {
+        for (kind, t) in [
+            (MarkKind::Contact, timing.contact),
+            (MarkKind::Release, timing.release),
+        ] {
+            let mark = Mark { kind, press };
+            let uncertainty_ns = 500;
+            input.marks.push(SentMark {
+                mark,
+                t,
+                uncertainty_ns,
+            });
+            for (edges, lead_s) in input.edges.iter_mut().zip(CLOCK_LEADS_S) {
+                let begins_us = (t.0 as f64 * 1e-3 + 1e6 * lead_s).round() as u64;
+                let pulses = PulseTrain::new(mark).into_iter().flat_map(|p| p.pulses());
+                for (t_us, rising) in
+                    pulses.flat_map(|(rise, width)| [(rise, true), (rise + width, false)])
+                {
+                    edges.push(TriggerEdge {
+                        t_us: begins_us + t_us,
+                        channel: 0,
+                        rising,
+                    });
+                }
+            }
+        }
+    }
+    input
 }
 
 /// The events of both cameras, by time.
