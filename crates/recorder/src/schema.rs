@@ -18,7 +18,7 @@ pub const SCHEMA_VERSION: u32 = 5;
 /// `skrg` in ASCII (`PRAGMA application_id`).
 pub const APPLICATION_ID: u32 = u32::from_be_bytes(*b"skrg");
 
-static MIGRATOR: Migrator = sqlx::migrate!("../../migrations");
+pub(crate) static MIGRATOR: Migrator = sqlx::migrate!("../../migrations");
 
 /// Bytes of a page, the largest that SQLite knows. Every page of camera bytes costs three system calls on its way
 /// through the log: 64 KiB took in 500 MB/s where 16 KiB took in 380 (`cargo bench -p skinrig-bench --bench ingest`).

@@ -244,8 +244,7 @@ fn check_chunks(
 
 fn check_poses(reader: &SessionReader, report: &mut VerifyReport) -> Result<(), RecorderError> {
     let (mut after, mut last) = (0, HostTime(i64::MIN));
-    let all = (HostTime(i64::MIN), HostTime(i64::MAX));
-    while let Some((id, samples)) = reader.pose_block_after(after, all.0, all.1)? {
+    while let Some((id, samples)) = reader.pose_block_after(after)? {
         if let (Some(first), Some(end)) = (samples.first(), samples.last()) {
             if first.t < last {
                 report.add(format!(

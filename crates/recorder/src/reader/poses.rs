@@ -6,6 +6,11 @@ use super::SessionReader;
 use crate::error::RecorderError;
 use crate::from_row::pose_block_from;
 
+/// Found by the index over the blocks' ends: a session has a block every few seconds of a night, between the chunks.
+const BLOCK_ENDING_AFTER: &str = "SELECT id, first_ns, last_ns, samples, sha256, data FROM pose_block
+     WHERE id = (SELECT id FROM pose_block WHERE last_ns >= ?1 AND (last_ns > ?1 OR id > ?2) ORDER BY last_ns, id LIMIT 1)
+     AND first_ns <= ?3";
+
 impl SessionReader {
     /// Calls `each` with the pose samples of `from <= t <= to` in time order, a block at a time.
     ///
@@ -17,33 +22,50 @@ impl SessionReader {
         to: HostTime,
         mut each: impl FnMut(&[PoseSample]),
     ) -> Result<(), RecorderError> {
-        let mut after = 0;
-        while let Some((id, samples)) = self.pose_block_after(after, from, to)? {
+        let mut after = (from, i64::MIN);
+        while let Some((id, samples)) = self.pose_block_ending_after(after, to)? {
             let start = samples.partition_point(|s| s.t < from);
             let end = samples.partition_point(|s| s.t <= to);
             if start < end {
                 each(&samples[start..end]);
             }
-            after = id;
+            let Some(last) = samples.last() else {
+                break;
+            };
+            after = (last.t, id);
         }
         Ok(())
     }
 
-    /// The first pose block with an id above `after` that overlaps the span, checked.
+    /// The first pose block that ends at an instant or later, past the block of this id when both end in the same one; checked.
+    /// `None` when that block begins after `to`: blocks are in order of time.
+    fn pose_block_ending_after(
+        &self,
+        (end, id): (HostTime, i64),
+        to: HostTime,
+    ) -> Result<Option<(i64, Vec<PoseSample>)>, RecorderError> {
+        self.ask("reading poses", async |conn| {
+            let row = sqlx::query(BLOCK_ENDING_AFTER)
+                .bind(end.0)
+                .bind(id)
+                .bind(to.0)
+                .fetch_optional(conn)
+                .await?;
+            row.map(|row| pose_block_from(&row)).transpose()
+        })
+    }
+
+    /// The first pose block with an id above `after`, checked.
     pub(crate) fn pose_block_after(
         &self,
         after: i64,
-        from: HostTime,
-        to: HostTime,
     ) -> Result<Option<(i64, Vec<PoseSample>)>, RecorderError> {
         self.ask("reading poses", async |conn| {
             let row = sqlx::query(
                 "SELECT id, first_ns, last_ns, samples, sha256, data FROM pose_block
-                 WHERE id = (SELECT min(id) FROM pose_block WHERE id > ? AND last_ns >= ? AND first_ns <= ?)",
+                 WHERE id > ? ORDER BY id LIMIT 1",
             )
             .bind(after)
-            .bind(from.0)
-            .bind(to.0)
             .fetch_optional(conn)
             .await?;
             row.map(|row| pose_block_from(&row)).transpose()
@@ -59,5 +81,39 @@ impl SessionReader {
         let mut poses = Vec::new();
         self.for_each_pose_block(from, to, |block| poses.extend_from_slice(block))?;
         Ok(poses)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use sqlx::{Connection as _, Row as _, SqliteConnection};
+
+    use super::BLOCK_ENDING_AFTER;
+    use crate::schema::MIGRATOR;
+
+    #[test]
+    fn a_block_is_found_without_a_walk_over_the_others() {
+        let plan = tokio::runtime::Builder::new_current_thread()
+            .enable_all()
+            .build()
+            .unwrap()
+            .block_on(async {
+                let mut conn = SqliteConnection::connect("sqlite::memory:").await?;
+                MIGRATOR.run(&mut conn).await?;
+                sqlx::query(sqlx::AssertSqlSafe(format!(
+                    "EXPLAIN QUERY PLAN {BLOCK_ENDING_AFTER}"
+                )))
+                .fetch_all(&mut conn)
+                .await
+            })
+            .unwrap();
+        let steps: Vec<String> = plan.iter().map(|row| row.get("detail")).collect();
+        assert!(
+            steps
+                .iter()
+                .any(|s| s.contains("pose_block_by_time (last_ns>?)")),
+            "{steps:?}"
+        );
+        assert!(!steps.iter().any(|s| s.contains("SCAN")), "{steps:?}");
     }
 }
