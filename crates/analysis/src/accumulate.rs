@@ -20,6 +20,7 @@ use crate::kept::KeptEvent;
 use crate::rates::RateHistogram;
 use crate::result::{Activity, PicturePixel, PressPicture, PressView, RateZoom};
 use crate::segment::Window;
+use crate::width::width_u;
 
 /// How far an event may lie before the newest one seen and still find its window open, µs.
 pub const SLACK_US: u64 = 10_000;
@@ -112,7 +113,7 @@ struct Open {
 }
 
 /// How many events a press has in one camera.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Tally {
     /// In its window.
     pub events: u32,
@@ -120,6 +121,8 @@ pub struct Tally {
     pub on: u32,
     /// In the idle time before it.
     pub idle: u64,
+    /// See [`PressView::width_u`].
+    pub width_u: Option<f64>,
 }
 
 /// What one camera saw of a press.
@@ -135,6 +138,8 @@ pub fn press_view(window: &Window, tally: Tally, sighting: &Sighting) -> PressVi
         rate_per_s: per_s(f64::from(tally.events), window.length_s()),
         idle_rate_per_s: per_s(tally.idle as f64, window.idle_s()),
         idle_s: window.idle_s(),
+        spread_u: sighting.spread_u,
+        width_u: tally.width_u,
     }
 }
 
@@ -426,6 +431,7 @@ impl<'a> Accumulator<'a> {
             events: done.grid.events(),
             on: done.on_events,
             idle: done.idle_events,
+            width_u: width_u(&done.grid, done.idle_events, &done.window),
         };
         let window = done.window;
         self.views

@@ -47,6 +47,7 @@ pub mod timebase;
 pub mod tradeoff;
 pub mod triangulate;
 mod verdict;
+mod width;
 
 pub use analyze::{analyze, analyze_and_keep};
 pub use error::AnalysisError;

@@ -378,6 +378,8 @@ mod tests {
                 rate_per_s: f64::from(events) / 0.5,
                 idle_rate_per_s: 20.0,
                 idle_s: 0.5,
+                spread_u: None,
+                width_u: None,
             })
         };
         let judge = |role, first, second| {

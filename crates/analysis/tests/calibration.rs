@@ -21,6 +21,8 @@ fn view(u: f64) -> Option<PressView> {
         rate_per_s: 1e3,
         idle_rate_per_s: 10.0,
         idle_s: 0.5,
+        spread_u: None,
+        width_u: None,
     })
 }
 

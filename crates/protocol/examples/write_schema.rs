@@ -1,6 +1,6 @@
 //! Writes the JSON Schemas that ship beside the files: `cargo run -p skinrig-protocol --example write_schema`.
 
-use skinrig_protocol::{rig_schema_json, schedule_schema_json, schema_json};
+use skinrig_protocol::{limits_schema_json, rig_schema_json, schedule_schema_json, schema_json};
 
 fn main() -> std::io::Result<()> {
     let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
@@ -10,6 +10,7 @@ fn main() -> std::io::Result<()> {
             "protocols/skinrig-schedule.schema.json",
             schedule_schema_json(),
         ),
+        ("protocols/skinrig-limits.schema.json", limits_schema_json()),
         ("hil/rigs/skinrig-rig.schema.json", rig_schema_json()),
     ] {
         std::fs::write(root.join(path), schema)?;

@@ -6,9 +6,9 @@
 //! 3. [`check()`] holds every segment of the plan against workspace, skin outline, keep-outs and limits.
 //! 4. [`Plan::summary`] and [`path_svg`] show it to people.
 //!
-//! [`Schedule`] describes a recording that was made without skinrig, for imports; [`RigFile`] a bench. The keys of each
-//! language stand in a table, which also yields its JSON Schema ([`schema_json`], [`schedule_schema_json`],
-//! [`rig_schema_json`]).
+//! [`Schedule`] describes a recording that was made without skinrig, for imports; [`RigFile`] a bench; [`Limits`] how much
+//! is a difference in a comparison. The keys of each language stand in a table, which also yields its JSON Schema
+//! ([`schema_json`], [`schedule_schema_json`], [`rig_schema_json`], [`limits_schema_json`]).
 
 pub mod area;
 mod build;
@@ -18,6 +18,7 @@ pub mod diagnostic;
 pub mod faults;
 mod findings;
 mod keys;
+pub mod limits;
 mod overrides;
 pub mod plan;
 pub mod protocol;
@@ -43,6 +44,7 @@ pub use area::{Area, KeepOut, Surroundings};
 pub use check::{Segment, Violation, check};
 pub use diagnostic::{Diagnostic, Diagnostics};
 pub use faults::{FaultKind, FaultPhase, FaultTime, NoFault, PlantedFault};
+pub use limits::Limits;
 pub use plan::{OnTrip, Plan, PressStep, RunLimits, Step};
 pub use protocol::{CameraRequest, Loader, Motion, Pace, Protocol, Prototype, Scene, Sync};
 pub use reference_code::REFERENCE_CODE;
@@ -50,7 +52,7 @@ pub use remaining::Route;
 pub use retakes::Retakes;
 pub use rig::{RigFile, RigKind};
 pub use schedule::{PressPhases, Schedule};
-pub use schema::{rig_schema_json, schedule_schema_json, schema_json};
+pub use schema::{limits_schema_json, rig_schema_json, schedule_schema_json, schema_json};
 pub use source::Location;
 pub use summary::PlanSummary;
 pub use surface::{Surface, TouchSearch};

@@ -35,6 +35,8 @@ pub enum Dimension {
     Data,
     /// Bytes per second.
     DataRate,
+    /// Percent of a whole.
+    Share,
 }
 
 impl Dimension {
@@ -78,11 +80,12 @@ impl Dimension {
                 ("TB", 1e12),
             ],
             Self::DataRate => &[("B/s", 1.0), ("kB/s", 1e3), ("MB/s", 1e6), ("GB/s", 1e9)],
+            Self::Share => &[("%", 1.0)],
         }
     }
 
     /// All dimensions.
-    const ALL: [Self; 13] = [
+    const ALL: [Self; 14] = [
         Self::Length,
         Self::Time,
         Self::Speed,
@@ -96,6 +99,7 @@ impl Dimension {
         Self::EventRate,
         Self::Data,
         Self::DataRate,
+        Self::Share,
     ];
 
     /// `a length`, `a time`, ...
@@ -115,6 +119,7 @@ impl Dimension {
             Self::EventRate => "an event rate",
             Self::Data => "an amount of data",
             Self::DataRate => "a data rate",
+            Self::Share => "a share",
         }
     }
 
@@ -141,6 +146,7 @@ impl Dimension {
             Self::EventRate => "50 kev/s",
             Self::Data => "2 GB",
             Self::DataRate => "20 MB/s",
+            Self::Share => "2 %",
         }
     }
 }

@@ -26,6 +26,12 @@ pub fn rig_schema_json() -> String {
     render(&crate::rig::keys::RIG, "skinrig rig")
 }
 
+/// The JSON Schema of the limits for `skinrig compare`.
+#[must_use]
+pub fn limits_schema_json() -> String {
+    render(&crate::limits::LIMITS, "skinrig limits")
+}
+
 fn render(table: &'static Table, title: &str) -> String {
     let mut definitions = BTreeMap::new();
     let mut root = object(table, &mut definitions);

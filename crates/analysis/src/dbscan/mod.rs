@@ -32,6 +32,8 @@ pub struct Cluster {
     pub sum_u: u64,
     /// Sum of their rows on the sensor, px.
     pub sum_v: u64,
+    /// Sum of the squares of their columns, px².
+    pub sum_uu: u64,
 }
 
 impl Cluster {
@@ -44,6 +46,15 @@ impl Cluster {
         })
     }
 
+    /// Standard deviation of the columns, px; `None` without events.
+    #[must_use]
+    pub fn spread_u(&self) -> Option<f64> {
+        let n = u128::from(self.events);
+        // Whole numbers: nothing cancels.
+        let squares = n * u128::from(self.sum_uu) - u128::from(self.sum_u).pow(2);
+        (n > 0).then(|| (squares as f64).sqrt() / n as f64)
+    }
+
     /// Both together.
     #[must_use]
     pub const fn merged(self, other: Self) -> Self {
@@ -51,6 +62,7 @@ impl Cluster {
             events: self.events + other.events,
             sum_u: self.sum_u + other.sum_u,
             sum_v: self.sum_v + other.sum_v,
+            sum_uu: self.sum_uu + other.sum_uu,
         }
     }
 }
@@ -341,16 +353,20 @@ impl Dbscan {
             let (row, column) = self.tiles.corner(index);
             let corner = row * WIDTH + column;
             let mut add = |label: u32, pixels: u64| {
-                let (mut n, mut right, mut down) = (0, 0, 0);
+                let (mut n, mut right, mut squares, mut down) = (0, 0, 0, 0);
                 for at in ones(pixels) {
                     let count = u64::from(grid.count((corner + offset(at)) as u32));
+                    let aside = (at % SIDE) as u64;
                     n += count;
-                    right += count * (at % SIDE) as u64;
+                    right += count * aside;
+                    squares += count * aside * aside;
                     down += count * (at / SIDE) as u64;
                 }
                 let cluster = &mut clusters[label as usize];
                 cluster.events += n;
-                cluster.sum_u += n * column as u64 + right;
+                let first = column as u64;
+                cluster.sum_u += n * first + right;
+                cluster.sum_uu += (n * first + 2 * right) * first + squares;
                 cluster.sum_v += n * (row as u64 + top) + down;
             };
             for group in self.groups_of(index) {

@@ -59,6 +59,9 @@ impl Sighting {
             clusters: dbscan.clusters().len() as u32,
             // The grid holds at most u32::MAX events.
             events: chosen.map_or(0, |c| c.events) as u32,
+            spread_u: chosen
+                .and_then(|c| c.spread_u())
+                .map(|spread| spread * f64::from(side_px)),
         }
     }
 }

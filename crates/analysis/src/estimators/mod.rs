@@ -35,6 +35,8 @@ pub struct Sighting {
     pub clusters: u32,
     /// Events that the column stands on; a running histogram: its weight, in events.
     pub events: u32,
+    /// Standard deviation of their columns, px, where the estimator clusters.
+    pub spread_u: Option<f64>,
 }
 
 impl Sighting {
@@ -44,6 +46,7 @@ impl Sighting {
             row: None,
             clusters: 1,
             events,
+            spread_u: None,
         }
     }
 }

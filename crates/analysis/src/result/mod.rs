@@ -25,7 +25,7 @@ use skinrig_model::{
 };
 
 /// Version of this layout and of the algorithms behind it; part of every result.
-pub const ANALYSIS_VERSION: u32 = 4;
+pub const ANALYSIS_VERSION: u32 = 5;
 
 /// The result of analysing one session.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -308,6 +308,14 @@ pub struct PressView {
     pub idle_rate_per_s: f64,
     /// Length of the idle time that the idle rate stands on, s; 0 when the presses leave none.
     pub idle_s: f64,
+    /// Standard deviation of the columns of the events in the cluster(s) that make the centroid, px; `None` without
+    /// clusters.
+    #[serde(default)]
+    pub spread_u: Option<f64>,
+    /// Columns of the narrowest stretch that holds half of the events that the press added to the idle rate, px; `None`
+    /// when it added too few to tell.
+    #[serde(default)]
+    pub width_u: Option<f64>,
 }
 
 /// The events of one press in one camera, counted per pixel: columns all, rows of the crop.

@@ -214,6 +214,7 @@ impl<'a> Replay<'a> {
                 events: events.len() as u32,
                 on: events.iter().filter(|e| e.is_on()).count() as u32,
                 idle: filter.idle(view, &window),
+                width_u: None,
             };
             let sighting = estimator.sight(&events, after(view, window.start_us));
             out.push((press.row, press_view(&window, tally, &sighting)));

@@ -87,7 +87,7 @@ pub(crate) fn open(
 }
 
 /// Our languages: name of the table, key of the version, and what a file of it is in another one's place.
-const LANGUAGES: [(&str, &str, &str); 3] = [
+const LANGUAGES: [(&str, &str, &str); 4] = [
     ("protocol", "skinrig", "a protocol"),
     (
         "schedule",
@@ -95,6 +95,11 @@ const LANGUAGES: [(&str, &str, &str); 3] = [
         "a schedule, which only `skinrig import` reads",
     ),
     ("rig", "skinrig_rig", "a rig file, which belongs to `--rig`"),
+    (
+        "limits",
+        "skinrig_limits",
+        "a file of limits, which only `skinrig compare` reads",
+    ),
 ];
 
 /// The key by which a file of `table` says which language it is in.

@@ -4,6 +4,7 @@
 mod common;
 mod errors;
 mod laws;
+mod limits;
 mod remaining;
 mod rig;
 mod schedules;

@@ -19,7 +19,12 @@ fn every_shipped_file_is_known_here() {
     let mut names: Vec<String> = std::fs::read_dir(folder())
         .unwrap()
         .map(|e| e.unwrap().file_name().into_string().unwrap())
-        .filter(|n| n.ends_with(".yaml") && !n.ends_with(".schedule.yaml"))
+        .filter(|n| {
+            n.ends_with(".yaml")
+                && ![".schedule.yaml", ".limits.yaml"]
+                    .iter()
+                    .any(|e| n.ends_with(e))
+        })
         .map(|n| n.trim_end_matches(".yaml").to_owned())
         .collect();
     names.sort();

@@ -289,6 +289,8 @@ fn press(
                 rate_per_s: f64::from(events) / 0.9,
                 idle_rate_per_s: 2100.0,
                 idle_s: 0.8,
+                spread_u: Some(14.0),
+                width_u: Some(19.0),
             }
         })
     };

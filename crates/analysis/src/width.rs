@@ -1,0 +1,132 @@
+//! How wide a touch is in a camera's picture, whatever the noise.
+
+use crate::grid::PixelGrid;
+use crate::segment::Window;
+
+/// A press must add this many standard errors of its count to tell a width.
+const LEAST_SIGMAS: f64 = 10.0;
+
+/// Columns of the narrowest stretch that holds half of the events that a press added to the idle rate, px.
+///
+/// The idle rate is taken to be spread evenly over the columns. `None` when the press added fewer events than ten standard
+/// errors of the count.
+pub(crate) fn width_u(grid: &PixelGrid, idle_events: u64, window: &Window) -> Option<f64> {
+    let mut columns = vec![0.0; PixelGrid::WIDTH];
+    for row in 0..grid.height() {
+        let occupied = grid.occupied(row);
+        for (column, count) in grid.row(row).iter().enumerate() {
+            if occupied[column / 64] >> (column % 64) & 1 == 1 {
+                columns[column] += f64::from(*count);
+            }
+        }
+    }
+    let idle = if window.idle_s() > 0.0 {
+        idle_events as f64 * window.length_s() / window.idle_s()
+    } else {
+        0.0
+    };
+    let events = f64::from(grid.events());
+    let added = events - idle;
+    if added < LEAST_SIGMAS * (events + idle).sqrt().max(1.0) {
+        return None;
+    }
+    let each = idle / PixelGrid::WIDTH as f64;
+    columns.iter_mut().for_each(|count| *count -= each);
+    shortest(&columns, added / 2.0).map(|columns| columns as f64)
+}
+
+/// Length of the shortest stretch whose sum is at least `wanted`, above 0.
+///
+/// Candidates for its beginning are kept by rising sums before them: a later beginning with a smaller sum before it beats
+/// every earlier one.
+fn shortest(values: &[f64], wanted: f64) -> Option<usize> {
+    let mut sums = Vec::with_capacity(values.len() + 1);
+    let mut sum = 0.0;
+    sums.push(sum);
+    for value in values {
+        sum += value;
+        sums.push(sum);
+    }
+    let mut begins = std::collections::VecDeque::new();
+    let mut best: Option<usize> = None;
+    for (end, sum) in sums.iter().enumerate() {
+        while let Some(&begin) = begins.front()
+            && sum - sums[begin] >= wanted
+        {
+            best = Some(best.map_or(end - begin, |b| b.min(end - begin)));
+            begins.pop_front();
+        }
+        while begins
+            .back()
+            .is_some_and(|&begin: &usize| sums[begin] >= *sum)
+        {
+            begins.pop_back();
+        }
+        begins.push_back(end);
+    }
+    best
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn window() -> Window {
+        Window {
+            row: 0,
+            start_us: 1_000_000,
+            end_us: 1_500_000,
+            idle_start_us: 500_000,
+        }
+    }
+
+    /// 2,000 events in columns 300..320, and noise in every fourth pixel of some rows.
+    fn touched(noise: u32) -> PixelGrid {
+        let mut grid = PixelGrid::new((100, 199));
+        for column in 300..320 {
+            assert!(grid.add_many(column, 150, 100));
+        }
+        for column in 0..640 {
+            assert!(grid.add_many(column, 120, noise));
+        }
+        grid
+    }
+
+    #[test]
+    fn noise_does_not_widen_a_touch() {
+        assert_eq!(width_u(&touched(0), 0, &window()), Some(10.0));
+        // As many events again per column as the noise brings, in an idle time as long as the window.
+        assert_eq!(width_u(&touched(20), 640 * 20, &window()), Some(10.0));
+        // Without the idle rate the noise takes part.
+        assert!(width_u(&touched(20), 0, &window()).unwrap() > 100.0);
+    }
+
+    #[test]
+    fn a_press_that_adds_next_to_nothing_has_no_width() {
+        let mut grid = PixelGrid::new((100, 199));
+        (0..90).for_each(|k| assert!(grid.add(300 + k % 9, 150)));
+        assert_eq!(width_u(&grid, 0, &window()), None);
+        assert_eq!(width_u(&PixelGrid::new((1, 2)), 0, &window()), None);
+    }
+
+    #[test]
+    fn the_shortest_stretch_is_found_past_negative_values() {
+        let slow = |values: &[f64], wanted: f64| {
+            let all = (0..values.len()).flat_map(|a| (a + 1..=values.len()).map(move |b| (a, b)));
+            let enough = all.filter(|(a, b)| values[*a..*b].iter().sum::<f64>() >= wanted);
+            enough.map(|(a, b)| b - a).min()
+        };
+        let mut state = 7u64;
+        for _ in 0..200 {
+            let values: Vec<f64> = (0..12)
+                .map(|_| {
+                    state = state
+                        .wrapping_mul(6_364_136_223_846_793_005)
+                        .wrapping_add(1);
+                    ((state >> 60) as f64) - 5.0
+                })
+                .collect();
+            assert_eq!(shortest(&values, 9.0), slow(&values, 9.0), "{values:?}");
+        }
+    }
+}
