@@ -1,12 +1,12 @@
 //! Where the variance of a difference comes from: between locations, and between repetitions at one location.
 
 use super::comparison::Components;
-use super::influence::Influences;
+use super::measure::Measure;
 use super::question::Pairing;
 
 /// Components by the method of moments (analysis of variance with locations as groups; Searle, Casella and McCulloch
 /// 1992). A negative estimate between locations counts 0.
-pub(super) fn of(samples: &[Influences; 2], pairing: Pairing) -> Components {
+pub(super) fn of(samples: &[Measure; 2], pairing: Pairing) -> Components {
     let within = [within(&samples[0]), within(&samples[1])];
     let inverse = [0, 1].map(|i| inverse_repetitions(&samples[i]));
     let means = [means(&samples[0]), means(&samples[1])];
@@ -29,7 +29,7 @@ pub(super) fn of(samples: &[Influences; 2], pairing: Pairing) -> Components {
     }
 }
 
-fn means(of: &Influences) -> Vec<f64> {
+fn means(of: &Measure) -> Vec<f64> {
     of.places.iter().map(|(_, u)| mean(u)).collect()
 }
 
@@ -48,7 +48,7 @@ pub(super) fn variance(values: &[f64]) -> f64 {
 }
 
 /// Pooled variance at one location.
-fn within(of: &Influences) -> Option<f64> {
+fn within(of: &Measure) -> Option<f64> {
     let (mut squares, mut free) = (0.0, 0usize);
     for (_, values) in &of.places {
         let centre = mean(values);
@@ -59,13 +59,13 @@ fn within(of: &Influences) -> Option<f64> {
 }
 
 /// Mean of one over the presses at a location.
-fn inverse_repetitions(of: &Influences) -> f64 {
+fn inverse_repetitions(of: &Measure) -> f64 {
     let each = of.places.iter().map(|(_, u)| 1.0 / u.len() as f64);
     each.sum::<f64>() / of.places.len() as f64
 }
 
 /// Variance of one sample between and within locations.
-pub(super) fn alone(of: &Influences) -> (f64, Option<f64>) {
+pub(super) fn alone(of: &Measure) -> (f64, Option<f64>) {
     let within = within(of);
     let noise = within.map_or(0.0, |w| w * inverse_repetitions(of));
     ((variance(&means(of)) - noise).max(0.0), within)

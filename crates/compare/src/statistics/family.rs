@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::compare::verdict;
 use super::comparison::{Comparison, Interval, Verdict};
 use super::question::{Question, Settings};
 use super::refusal::Refusal;
@@ -55,11 +56,7 @@ pub fn compare_all(
     question: &Question,
     settings: &Settings,
 ) -> Result<Vec<Pair>, Refusal> {
-    let setting = |name: &str, expected: &str, found: usize| Refusal::Setting {
-        name: name.to_owned(),
-        expected: expected.to_owned(),
-        found: found as f64,
-    };
+    let setting = |name, expected, found| Refusal::setting(name, expected, found as f64);
     if samples.len() < 2 {
         return Err(setting("samples", "2 at the least", samples.len()));
     }
@@ -99,13 +96,8 @@ pub fn compare_all(
         .map(|(i, (&(a, b), alone))| {
             let adjusted = alone.as_ref().ok().and_then(|c| {
                 let p_difference = differences[i]?;
-                let verdict = if tosts[i].is_some_and(|p| p <= settings.alpha) {
-                    Verdict::Equivalent
-                } else if p_difference <= settings.alpha {
-                    super::compare::direction(c.a.value, c.b.value, question.better)
-                } else {
-                    Verdict::Undecided
-                };
+                let values = [c.a.value, c.b.value];
+                let verdict = verdict(values, p_difference, tosts[i], question, settings);
                 Some(Adjusted {
                     family: family as u32,
                     p_difference,

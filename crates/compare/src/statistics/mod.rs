@@ -8,17 +8,24 @@
 //! difference between two, [`compare_all`] the differences between several, corrected for their number, and
 //! [`power::plan`] what to press to find a difference of a given size.
 
+mod bootstrap;
 mod compare;
 mod comparison;
 mod components;
 mod distributions;
 mod family;
-mod influence;
+mod inference;
+mod measure;
+mod mover;
 mod needed;
+mod notes;
 pub mod power;
+mod quantiles;
 mod question;
 mod refusal;
 mod sample;
+mod scores;
+mod spread;
 
 pub use compare::{compare, estimate};
 pub use comparison::{

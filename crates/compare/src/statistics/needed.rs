@@ -3,8 +3,8 @@
 use super::compare::direction;
 use super::comparison::{Components, Enough, Needed, Verdict};
 use super::distributions::student_quantile;
-use super::influence::Influences;
-use super::question::{Question, Settings};
+use super::measure::Measure;
+use super::question::{Better, Question, Settings};
 
 /// More locations than anybody presses.
 const MOST: u32 = 100_000;
@@ -12,10 +12,9 @@ const MOST: u32 = 100_000;
 /// What would decide if the difference is what it seems and the variance what was measured.
 pub(super) fn needed(
     verdict: Verdict,
-    difference: f64,
     question: &Question,
     components: &Components,
-    of: &[Influences; 2],
+    of: &[Measure; 2],
     settings: &Settings,
 ) -> Needed {
     if verdict != Verdict::Undecided {
@@ -24,9 +23,15 @@ pub(super) fn needed(
     let apart = direction(of[0].value, of[1].value, question.better);
     let tails = [1.0 - 0.5 * settings.alpha, 1.0 - settings.alpha];
     let powers = [settings.power, 0.5 * (1.0 + settings.power)];
+    let difference = of[1].value - of[0].value;
+    // Two numbers of different sign may be equally far from zero, and still differ.
+    let distance = match question.better {
+        Better::NearerZero => of[1].value.abs() - of[0].value.abs(),
+        _ => difference,
+    };
     let room = question.margin.map(|margin| margin - difference.abs());
     let goals = [
-        (apart, Some(difference.abs()), 0),
+        (apart, Some(distance.abs()), 0),
         (Verdict::Equivalent, room.filter(|r| *r > 0.0), 1),
     ];
     let now = of.each_ref().map(|i| i.places.len() as u32);
@@ -50,7 +55,7 @@ fn enough(
     allowed: impl Fn(u32) -> f64,
     now: u32,
     components: &Components,
-    of: &[Influences; 2],
+    of: &[Measure; 2],
 ) -> Option<Enough> {
     let within = components.within.unwrap_or_default();
     let [ra, rb] = components.repetitions;
@@ -67,7 +72,7 @@ fn enough(
             low = middle + 1;
         }
     }
-    let presses = of.iter().map(Influences::presses).max().unwrap_or(0);
+    let presses = of.iter().map(Measure::presses).max().unwrap_or(0);
     let each = f64::from(presses) / f64::from(now);
     let room = allowed(now.max(2)) - components.between;
     let both = within[0] + within[1];

@@ -3,9 +3,10 @@
 use serde::{Deserialize, Serialize};
 
 use super::distributions::student_quantile;
-use super::influence::{Influences, influences};
+use super::measure::measure as measured;
 use super::refusal::{Refusal, Side};
 use super::sample::Sample;
+use super::spread::Repeats;
 
 /// Where the variance of one skin's metric comes from. With `k` locations pressed `r` times each its value has variance
 /// `between / k + within / (k r)`.
@@ -75,13 +76,12 @@ const MOST: u32 = 100_000;
 /// # Errors
 /// [`Refusal`].
 pub fn measure(sample: &Sample) -> Result<Measured, Refusal> {
-    let of = influences(sample.data(), Side::A, |_| true)?;
+    let of = measured(sample.data(), Repeats::All, Side::A, |_| true)?;
     let locations = of.places.len() as u32;
     if locations < 2 {
         return Err(Refusal::TooFewLocations { locations });
     }
-    let alone = |of: &Influences| super::components::alone(of);
-    let (between, within) = alone(&of);
+    let (between, within) = super::components::alone(&of);
     Ok(Measured {
         value: of.value,
         between,
@@ -125,11 +125,7 @@ pub fn plan(measured: &Measured, target: &Target) -> Result<PowerPlan, Refusal> 
         ),
     ] {
         if !good {
-            return Err(Refusal::Setting {
-                name: name.to_owned(),
-                expected: expected.to_owned(),
-                found,
-            });
+            return Err(Refusal::setting(name, expected, found));
         }
     }
     let between = 2.0 * (1.0 - target.common) * measured.between;
@@ -146,10 +142,9 @@ pub fn plan(measured: &Measured, target: &Target) -> Result<PowerPlan, Refusal> 
         })
         .collect();
     let cheapest = (0..proposals.len()).min_by_key(|i| proposals[*i].presses);
-    let cheapest = cheapest.ok_or_else(|| Refusal::Setting {
-        name: "difference".to_owned(),
-        expected: "one that 100000 locations can show".to_owned(),
-        found: target.difference,
+    let cheapest = cheapest.ok_or_else(|| {
+        let expected = format!("one that {MOST} locations can show");
+        Refusal::setting("difference", &expected, target.difference)
     })?;
     Ok(PowerPlan {
         target: *target,

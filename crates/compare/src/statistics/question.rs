@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::refusal::Refusal;
+
 /// Which direction of a metric is better.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -60,5 +62,39 @@ impl Default for Settings {
             resamples: 3999,
             seed: 1,
         }
+    }
+}
+
+impl Question {
+    pub(super) fn check(&self) -> Result<(), Refusal> {
+        match self.margin {
+            Some(margin) if !(margin > 0.0 && margin.is_finite()) => {
+                Err(Refusal::setting("margin", "a number above 0", margin))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+impl Settings {
+    pub(super) fn check(&self) -> Result<(), Refusal> {
+        if !(self.alpha > 0.0 && self.alpha < 0.5) {
+            let expected = "a probability between 0 and 0.5";
+            return Err(Refusal::setting("alpha", expected, self.alpha));
+        }
+        if !(self.power > 0.0 && self.power < 1.0) {
+            let expected = "a probability between 0 and 1";
+            return Err(Refusal::setting("power", expected, self.power));
+        }
+        // An interval leaves at least one draw outside on each side.
+        if (f64::from(self.resamples) + 1.0) * 0.5 * self.alpha < 1.0 {
+            let expected = format!("{:.0} at the least", (2.0 / self.alpha).ceil());
+            return Err(Refusal::setting(
+                "resamples",
+                &expected,
+                f64::from(self.resamples),
+            ));
+        }
+        Ok(())
     }
 }

@@ -105,3 +105,13 @@ pub enum Refusal {
         found: f64,
     },
 }
+
+impl Refusal {
+    pub(super) fn setting(name: &str, expected: &str, found: f64) -> Self {
+        Self::Setting {
+            name: name.to_owned(),
+            expected: expected.to_owned(),
+            found,
+        }
+    }
+}

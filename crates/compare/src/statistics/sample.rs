@@ -1,6 +1,6 @@
 //! Owns [`Sample`]: what one prototype contributes for one metric, by location.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde::{Deserialize, Serialize};
 
@@ -91,6 +91,19 @@ pub(super) enum Data {
     Median(Clusters<Option<f64>>),
     Width(Clusters<Option<f64>>),
     CountRate(Clusters<Count>),
+}
+
+impl Data {
+    /// The locations with a value.
+    pub(super) fn locations(&self) -> BTreeSet<u32> {
+        match self {
+            Self::Mean(c) | Self::Rms(c) | Self::Taxels(_, c) => c.keys().copied().collect(),
+            Self::RepeatStd(c) => c.keys().copied().collect(),
+            Self::Share(c) => c.keys().copied().collect(),
+            Self::Median(c) | Self::Width(c) => c.keys().copied().collect(),
+            Self::CountRate(c) => c.keys().copied().collect(),
+        }
+    }
 }
 
 impl Sample {

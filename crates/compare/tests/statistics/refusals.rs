@@ -1,5 +1,4 @@
-//! What two samples say about each other.
-#![expect(clippy::unwrap_used, reason = "a test that cannot compare must fail")]
+//! What two samples say about each other, and why they may say nothing.
 
 use skinrig_compare::statistics::{
     Better, Question, Refusal, Sample, Settings, Verdict, compare, estimate,

@@ -1,0 +1,210 @@
+//! From an estimate to its interval and its one-sided p values, each the other's inverse.
+
+use super::bootstrap;
+use super::comparison::Interval;
+use super::distributions::{student_cdf, student_quantile};
+use super::measure::{Measure, Ratio, Shape, correlation, error};
+use super::mover::{Limits, recovered};
+use super::question::{Pairing, Settings};
+
+/// Fewer locations than this leave too few different draws: Student's distribution serves instead.
+pub(super) const BOOTSTRAP_FROM: usize = 8;
+
+/// An estimate and how it errs.
+pub(super) struct Inference {
+    value: f64,
+    how: How,
+}
+
+enum How {
+    /// By its standard error times Student's t.
+    Student { error: f64, df: f64 },
+    /// By its standard error times what the draws erred by.
+    Drawn { error: f64, draws: Vec<f64> },
+    /// As the limits of what it is made of do, at quantiles of Student's t.
+    Limits { of: Made, df: f64 },
+}
+
+enum Made {
+    One(Limits),
+    /// The second less the first.
+    Two([(f64, Limits); 2], f64),
+}
+
+impl Inference {
+    /// Of one sample alone, or of the larger design that it is part of.
+    pub fn alone(of: &Measure, settings: &Settings) -> Self {
+        let totals = of.totals();
+        let (error, df) = (error(&totals), totals.len() as f64 - 1.0);
+        let how = match &of.shape {
+            Shape::Ratio(_) if totals.len() < BOOTSTRAP_FROM => How::Student { error, df },
+            Shape::Ratio(ratio) => How::Drawn {
+                error,
+                draws: bootstrap::paired(None, ratio, settings.resamples, settings.seed),
+            },
+            _ => How::Limits {
+                of: Made::One(Limits::of(of, None)),
+                df,
+            },
+        };
+        let value = of.value;
+        Self { value, how }
+    }
+
+    /// Of `b - sign * a`; `sign` is 1 or, for ratios only, -1.
+    pub fn difference(a: &Measure, b: &Measure, sign: f64, settings: &Settings) -> Self {
+        let totals = [a.totals(), b.totals()];
+        let value = b.value - sign * a.value;
+        let (error, df) = spread(&totals, sign, settings.pairing);
+        let how = match (&a.shape, &b.shape) {
+            (Shape::Ratio(a), Shape::Ratio(b)) => {
+                if totals[0].len().min(totals[1].len()) < BOOTSTRAP_FROM {
+                    How::Student { error, df }
+                } else {
+                    let draws = draws(a, b, sign, settings);
+                    How::Drawn { error, draws }
+                }
+            }
+            _ => {
+                let together = match settings.pairing {
+                    Pairing::SharedLocations => correlation(&totals[0], &totals[1]),
+                    Pairing::Independent => 0.0,
+                };
+                let parts = [
+                    (a.value, Limits::of(a, Some(b))),
+                    (b.value, Limits::of(b, Some(a))),
+                ];
+                How::Limits {
+                    of: Made::Two(parts, together),
+                    df,
+                }
+            }
+        };
+        Self { value, how }
+    }
+
+    /// The interval that leaves `alpha` outside, half on each side.
+    pub fn interval(&self, alpha: f64) -> Interval {
+        let (low, high) = match &self.how {
+            How::Student { error, df } => {
+                let half = student_quantile(1.0 - 0.5 * alpha, *df) * error;
+                (self.value - half, self.value + half)
+            }
+            How::Drawn { error, draws } => {
+                let outside = 0.5 * alpha * (draws.len() as f64 + 1.0);
+                // A share such as 0.05 has no exact binary form: a whole number stays whole.
+                let outside = ((outside + 1e-9).floor() as usize).clamp(1, draws.len());
+                let (least, most) = (draws[outside - 1], draws[draws.len() - outside]);
+                (self.value - most * error, self.value - least * error)
+            }
+            How::Limits { df, .. } => self.limits(student_quantile(1.0 - 0.5 * alpha, *df)),
+        };
+        let finite = |v: f64| v.is_finite().then_some(v);
+        Interval {
+            value: self.value,
+            low: finite(low),
+            high: finite(high),
+        }
+    }
+
+    /// p value of the truth being at most `border`: small when it is above.
+    pub fn p_above(&self, border: f64) -> f64 {
+        match &self.how {
+            How::Student { error, df } => 1.0 - student_cdf((self.value - border) / error, *df),
+            How::Drawn { error, draws } => {
+                let t = (self.value - border) / error;
+                let as_far = draws.len() - draws.partition_point(|d| *d < t);
+                (as_far as f64 + 1.0) / (draws.len() as f64 + 1.0)
+            }
+            How::Limits { df, .. } => 1.0 - student_cdf(self.reach(border), *df),
+        }
+    }
+
+    /// p value of the truth being at least `border`: small when it is below.
+    pub fn p_below(&self, border: f64) -> f64 {
+        match &self.how {
+            How::Student { error, df } => student_cdf((self.value - border) / error, *df),
+            How::Drawn { error, draws } => {
+                let t = (self.value - border) / error;
+                let as_far = draws.partition_point(|d| *d <= t);
+                (as_far as f64 + 1.0) / (draws.len() as f64 + 1.0)
+            }
+            How::Limits { df, .. } => student_cdf(self.reach(border), *df),
+        }
+    }
+
+    fn limits(&self, c: f64) -> (f64, f64) {
+        match &self.how {
+            How::Limits { of, .. } => match of {
+                Made::One(limits) => limits.at(c),
+                Made::Two([a, b], together) => {
+                    recovered((a.0, a.1.at(c)), (b.0, b.1.at(c)), *together)
+                }
+            },
+            How::Student { error, .. } | How::Drawn { error, .. } => {
+                (self.value - c * error, self.value + c * error)
+            }
+        }
+    }
+
+    /// How many standard errors the value lies above `border`: where a limit passes it.
+    fn reach(&self, border: f64) -> f64 {
+        let above = border <= self.value;
+        let passed = |c: f64| {
+            let (low, high) = self.limits(c);
+            if above { low <= border } else { high >= border }
+        };
+        let (mut near, mut far) = (0.0, 1.0);
+        while !passed(far) && far < 1e6 {
+            far *= 2.0;
+        }
+        for _ in 0..60 {
+            let middle = 0.5 * (near + far);
+            if passed(middle) {
+                far = middle;
+            } else {
+                near = middle;
+            }
+        }
+        if above { near } else { -near }
+    }
+}
+
+/// The standard error of `b - sign * a` and its degrees of freedom (Welch 1947 for independent samples).
+fn spread(totals: &[Vec<f64>; 2], sign: f64, pairing: Pairing) -> (f64, f64) {
+    let free = |i: usize| totals[i].len() as f64 - 1.0;
+    match pairing {
+        Pairing::SharedLocations => {
+            let pairs = totals[0].iter().zip(&totals[1]);
+            let both: Vec<f64> = pairs.map(|(a, b)| b - sign * a).collect();
+            (error(&both), free(0))
+        }
+        Pairing::Independent => {
+            let [a, b] = [0, 1].map(|i| error(&totals[i]).powi(2));
+            let both = a + b;
+            let df = if both > 0.0 {
+                both * both / (a * a / free(0) + b * b / free(1))
+            } else {
+                free(0).min(free(1))
+            };
+            (both.sqrt(), df)
+        }
+    }
+}
+
+fn draws(a: &Ratio, b: &Ratio, sign: f64, settings: &Settings) -> Vec<f64> {
+    let (resamples, seed) = (settings.resamples, settings.seed);
+    if settings.pairing == Pairing::SharedLocations {
+        return bootstrap::paired(Some((a, sign)), b, resamples, seed);
+    }
+    // The smaller ratio draws first, so that exchanging the two mirrors the draws.
+    if a.ratio <= b.ratio {
+        return bootstrap::independent((a, sign), b, resamples, seed);
+    }
+    let mut draws = bootstrap::independent((b, sign), a, resamples, seed);
+    if sign > 0.0 {
+        draws.iter_mut().for_each(|d| *d = -*d);
+        draws.reverse();
+    }
+    draws
+}

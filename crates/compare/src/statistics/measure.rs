@@ -1,0 +1,203 @@
+//! What each press contributes to a metric, to first order, and what its inference needs besides.
+//!
+//! Every metric here is, near its value, its value plus the mean of one number per press. That number (the empirical
+//! influence function: Hampel 1974; for surveys the linearised variable: Deville 1999) gives standard errors over
+//! locations and variance components alike for all kinds.
+
+use super::quantiles::{self, Ranked};
+use super::refusal::{Refusal, Side};
+use super::sample::{Clusters, Count, Data};
+use super::spread::{self, Repeats};
+
+/// A metric's value, the influence of its presses, and its shape.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Measure {
+    /// The metric's value.
+    pub value: f64,
+    /// By location, ascending: the influence of each press; their mean over all presses is 0.
+    pub places: Vec<(u32, Vec<f64>)>,
+    /// What it is besides.
+    pub shape: Shape,
+}
+
+/// What the inference of a metric stands on besides influences.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Shape {
+    /// A function of a ratio of sums over locations.
+    Ratio(Ratio),
+    /// A share of so many trials.
+    Share(u32),
+    /// Events during an exposure.
+    Counts(u32, f64),
+    /// A rank among times.
+    Ranked(Ranked),
+    /// The distance between two ranks, low and high, and the correlation of their estimates.
+    Width(Ranked, Ranked, f64),
+}
+
+/// A ratio of sums over locations and what is made of it.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Ratio {
+    /// The ratio.
+    pub ratio: f64,
+    /// (sum - ratio * weight, weight) of each location, in the order of the places.
+    pub terms: Vec<(f64, f64)>,
+    /// What it is mapped to.
+    pub scale: Scale,
+}
+
+/// From a ratio to the metric.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Scale {
+    /// The ratio itself.
+    Same,
+    /// Its square root.
+    Root,
+    /// An area in circles of that mean square radius.
+    Circles(f64),
+}
+
+impl Scale {
+    /// The metric and its derivative by the ratio; the derivative at an end of the range is 0.
+    pub fn of(self, ratio: f64) -> (f64, f64) {
+        match self {
+            Self::Same => (ratio, 1.0),
+            Self::Root if ratio > 0.0 => (ratio.sqrt(), 0.5 / ratio.sqrt()),
+            Self::Root => (0.0, 0.0),
+            Self::Circles(area) => {
+                let value = area / (std::f64::consts::PI * ratio);
+                (value, -value / ratio)
+            }
+        }
+    }
+}
+
+impl Measure {
+    /// Presses.
+    pub fn presses(&self) -> u32 {
+        self.places.iter().map(|p| p.1.len() as u32).sum()
+    }
+
+    /// Locations.
+    pub fn locations(&self) -> usize {
+        self.places.len()
+    }
+
+    /// What each location contributes to the error of the value.
+    pub fn totals(&self) -> Vec<f64> {
+        let n = f64::from(self.presses());
+        let sums = self.places.iter().map(|p| p.1.iter().sum::<f64>());
+        sums.map(|s| s / n).collect()
+    }
+}
+
+/// Standard error of a sum over locations whose terms add up to 0 (Taylor linearisation with locations as primary
+/// units: Cochran 1977, 9A.3).
+pub(super) fn error(totals: &[f64]) -> f64 {
+    let k = totals.len() as f64;
+    (k / (k - 1.0) * totals.iter().map(|e| e * e).sum::<f64>()).sqrt()
+}
+
+/// Correlation of two sums over the same locations; 0 where one does not vary.
+pub(super) fn correlation(a: &[f64], b: &[f64]) -> f64 {
+    let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let size = (product(a, a) * product(b, b)).sqrt();
+    if size > 0.0 {
+        (product(a, b) / size).clamp(-1.0, 1.0)
+    } else {
+        0.0
+    }
+}
+
+/// Measures the values at the locations that `keep` keeps.
+///
+/// # Errors
+/// [`Refusal::Empty`], and what keeps the metric from having a value.
+pub(super) fn measure(
+    data: &Data,
+    repeats: Repeats,
+    side: Side,
+    keep: impl Fn(u32) -> bool,
+) -> Result<Measure, Refusal> {
+    let empty = Refusal::Empty { side };
+    let found = match data {
+        Data::Mean(c) => ratio(c, &keep, Scale::Same, |v| (*v, 1.0)),
+        Data::Rms(c) => ratio(c, &keep, Scale::Root, |v| (v * v, 1.0)),
+        Data::Taxels(area_mm2, c) => {
+            let found = ratio(c, &keep, Scale::Circles(*area_mm2), |v| (v * v, 1.0));
+            if found.as_ref().is_some_and(|m| !m.value.is_finite()) {
+                return Err(Refusal::NoError { side });
+            }
+            found
+        }
+        Data::RepeatStd(c) => spread::repeat_std(c, repeats, &keep),
+        Data::Share(c) => {
+            let share = ratio(c, &keep, Scale::Same, |v| (f64::from(u8::from(*v)), 1.0));
+            share.map(|m| Measure {
+                shape: Shape::Share(m.presses()),
+                ..m
+            })
+        }
+        Data::CountRate(c) => {
+            let rate = ratio(c, &keep, Scale::Same, |v| (f64::from(v.events), v.exposure));
+            let kept = || c.iter().filter(|(k, _)| keep(**k)).flat_map(|(_, v)| v);
+            let events = kept()
+                .map(|v: &Count| v.events)
+                .fold(0, u32::saturating_add);
+            let exposure = kept().map(|v| v.exposure).sum();
+            rate.map(|m| Measure {
+                shape: Shape::Counts(events, exposure),
+                ..m
+            })
+        }
+        Data::Median(c) => return quantiles::quantile(c, &keep, 0.5, side),
+        Data::Width(c) => return quantiles::width(c, &keep, side),
+    };
+    found.ok_or(empty)
+}
+
+fn ratio<T>(
+    clusters: &Clusters<T>,
+    keep: impl Fn(u32) -> bool,
+    scale: Scale,
+    term: impl Fn(&T) -> (f64, f64),
+) -> Option<Measure> {
+    let kept = clusters.iter().filter(|(k, _)| keep(**k));
+    let places = kept.map(|(k, v)| (*k, v.iter().map(&term).collect()));
+    from_terms(places.collect(), scale)
+}
+
+/// From (sum, weight) of each press; `None` without any.
+pub(super) fn from_terms(places: Vec<(u32, Vec<(f64, f64)>)>, scale: Scale) -> Option<Measure> {
+    let all = || places.iter().flat_map(|(_, v)| v);
+    let n = all().count();
+    if n == 0 {
+        return None;
+    }
+    let (mut sum, mut weight) = (0.0, 0.0);
+    for (s, w) in all() {
+        sum += s;
+        weight += w;
+    }
+    let ratio = sum / weight;
+    let (value, slope) = scale.of(ratio);
+    let each = slope * n as f64 / weight;
+    let residual = |(s, w): &(f64, f64)| s - ratio * w;
+    let total = |v: &[(f64, f64)]| {
+        let residuals = v.iter().map(residual).sum();
+        (residuals, v.iter().map(|t| t.1).sum())
+    };
+    let terms = places.iter().map(|(_, v)| total(v)).collect();
+    let places = places
+        .iter()
+        .map(|(k, v)| (*k, v.iter().map(|t| each * residual(t)).collect()));
+    Some(Measure {
+        value,
+        places: places.collect(),
+        shape: Shape::Ratio(Ratio {
+            ratio,
+            terms,
+            scale,
+        }),
+    })
+}

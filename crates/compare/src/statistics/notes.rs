@@ -1,0 +1,38 @@
+//! What a reader of a comparison must keep in mind.
+
+use super::comparison::Note;
+use super::inference::BOOTSTRAP_FROM;
+use super::measure::{Measure, Shape};
+use super::refusal::Side;
+use super::sample::Data;
+use super::spread::Repeats;
+
+/// Of what was compared.
+pub(super) fn notes(data: [&Data; 2], of: &[Measure; 2]) -> Vec<Note> {
+    let mut notes = Vec::new();
+    let locations = of.iter().map(Measure::locations).min().unwrap_or(0);
+    if locations < BOOTSTRAP_FROM {
+        let locations = locations as u32;
+        notes.push(Note::FewLocations { locations });
+    }
+    if Repeats::fair(data) == Repeats::Pairs {
+        notes.push(Note::UnequalRepetitions);
+    }
+    for (side, of) in [Side::A, Side::B].into_iter().zip(of) {
+        match &of.shape {
+            Shape::Ranked(at) | Shape::Width(at, ..) if at.missed() > 0 => {
+                notes.push(Note::Missed {
+                    side,
+                    missed: at.missed(),
+                    trials: of.presses(),
+                });
+            }
+            Shape::Share(_) if of.value <= 0.0 || of.value >= 1.0 => {
+                notes.push(Note::AtTheBorder { side });
+            }
+            Shape::Counts(0, _) => notes.push(Note::AtTheBorder { side }),
+            _ => {}
+        }
+    }
+    notes
+}

@@ -1,0 +1,99 @@
+//! The standard deviation between repetitions, mean over series.
+
+use super::measure::{Measure, Scale, from_terms};
+use super::sample::{Clusters, Data, Position};
+
+/// How the standard deviation of a series is made.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Repeats {
+    /// Of all its repetitions.
+    All,
+    /// Of each two of them, on average: what two repetitions would have given, whatever their number. The standard deviation
+    /// of few repetitions is too small on average, that of fewer more so.
+    Pairs,
+}
+
+impl Repeats {
+    /// The way that does justice to samples whose series differ in length.
+    pub fn fair<'a>(samples: impl IntoIterator<Item = &'a Data>) -> Self {
+        let clusters = samples.into_iter().filter_map(|data| match data {
+            Data::RepeatStd(clusters) => Some(clusters),
+            _ => None,
+        });
+        let mut lengths = clusters.flat_map(Clusters::values).flat_map(|places| {
+            let series = places.chunk_by(|a, b| a.series == b.series);
+            series.map(<[Position]>::len)
+        });
+        let first = lengths.next();
+        if lengths.all(|l| Some(l) == first) {
+            Self::All
+        } else {
+            Self::Pairs
+        }
+    }
+}
+
+/// Sample standard deviation of positions about their mean (Euclid), mm.
+fn of_all(series: &[Position], without: Option<usize>) -> f64 {
+    let kept = || {
+        let all = series.iter().enumerate();
+        all.filter(|(i, _)| Some(*i) != without).map(|(_, p)| p)
+    };
+    let n = kept().count() as f64;
+    let mean = |f: fn(&Position) -> f64| kept().map(f).sum::<f64>() / n;
+    let (x, y) = (mean(|p| p.x_mm), mean(|p| p.y_mm));
+    let squares = kept().map(|p| (p.x_mm - x).powi(2) + (p.y_mm - y).powi(2));
+    (squares.sum::<f64>() / (n - 1.0)).sqrt()
+}
+
+/// Mean of [`of_all`] over all pairs: half the diagonal of each.
+fn of_pairs(series: &[Position], without: Option<usize>) -> f64 {
+    let (mut sum, mut pairs) = (0.0, 0u32);
+    for (i, a) in series.iter().enumerate() {
+        for (j, b) in series.iter().enumerate().skip(i + 1) {
+            if Some(i) != without && Some(j) != without {
+                sum += libm::hypot(a.x_mm - b.x_mm, a.y_mm - b.y_mm);
+                pairs += 1;
+            }
+        }
+    }
+    sum * std::f64::consts::FRAC_1_SQRT_2 / f64::from(pairs)
+}
+
+/// What each repetition adds to the spread of its series: pseudo-values of the jackknife (Tukey 1958), centred on the
+/// spread. Two repetitions share one spread.
+fn pseudo_values(series: &[Position], spread: fn(&[Position], Option<usize>) -> f64) -> Vec<f64> {
+    let whole = spread(series, None);
+    let n = series.len();
+    if n < 3 {
+        return vec![whole; n];
+    }
+    let pseudo = |i| n as f64 * whole - (n as f64 - 1.0) * spread(series, Some(i));
+    let values: Vec<f64> = (0..n).map(pseudo).collect();
+    let shift = whole - values.iter().sum::<f64>() / n as f64;
+    values.iter().map(|v| v + shift).collect()
+}
+
+/// The mean over series of their spread; each series counts alike, however often it was repeated.
+pub(super) fn repeat_std(
+    clusters: &Clusters<Position>,
+    repeats: Repeats,
+    keep: impl Fn(u32) -> bool,
+) -> Option<Measure> {
+    let spread = match repeats {
+        Repeats::All => of_all,
+        Repeats::Pairs => of_pairs,
+    };
+    let kept = clusters.iter().filter(|(k, _)| keep(**k));
+    let terms = |places: &[Position]| {
+        let series = places.chunk_by(|a, b| a.series == b.series);
+        let one = |series: &[Position]| {
+            let weight = 1.0 / series.len() as f64;
+            let values = pseudo_values(series, spread).into_iter();
+            values.map(|v| (v * weight, weight)).collect::<Vec<_>>()
+        };
+        series.flat_map(one).collect()
+    };
+    let places = kept.map(|(k, v)| (*k, terms(v)));
+    from_terms(places.collect(), Scale::Same)
+}

@@ -1,0 +1,6 @@
+//! The statistics of comparing skins, on skins whose truth is known.
+#![expect(clippy::unwrap_used, reason = "a test that cannot compare must fail")]
+
+mod levels;
+mod populations;
+mod refusals;
