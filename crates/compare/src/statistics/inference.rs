@@ -3,7 +3,7 @@
 use super::bootstrap;
 use super::comparison::Interval;
 use super::distributions::{student_cdf, student_quantile};
-use super::measure::{Measure, Ratio, Shape, correlation, error};
+use super::measure::{Measure, Ratio, correlation, error};
 use super::mover::{Limits, recovered};
 use super::question::{Pairing, Settings};
 
@@ -19,8 +19,12 @@ pub(super) struct Inference {
 enum How {
     /// By its standard error times Student's t.
     Student { error: f64, df: f64 },
-    /// By its standard error times what the draws erred by.
-    Drawn { error: f64, draws: Vec<f64> },
+    /// By its standard error times what the draws erred by, or Student's t if that is more.
+    Drawn {
+        error: f64,
+        df: f64,
+        draws: Vec<f64>,
+    },
     /// As the limits of what it is made of do, at quantiles of Student's t.
     Limits { of: Made, df: f64 },
 }
@@ -36,13 +40,14 @@ impl Inference {
     pub fn alone(of: &Measure, settings: &Settings) -> Self {
         let totals = of.totals();
         let (error, df) = (error(&totals), totals.len() as f64 - 1.0);
-        let how = match &of.shape {
-            Shape::Ratio(_) if totals.len() < BOOTSTRAP_FROM => How::Student { error, df },
-            Shape::Ratio(ratio) => How::Drawn {
+        let how = match of.shape.ratio() {
+            Some(_) if totals.len() < BOOTSTRAP_FROM => How::Student { error, df },
+            Some(ratio) => How::Drawn {
                 error,
+                df,
                 draws: bootstrap::paired(None, ratio, settings.resamples, settings.seed),
             },
-            _ => How::Limits {
+            None => How::Limits {
                 of: Made::One(Limits::of(of, None)),
                 df,
             },
@@ -56,13 +61,13 @@ impl Inference {
         let totals = [a.totals(), b.totals()];
         let value = b.value - sign * a.value;
         let (error, df) = spread(&totals, sign, settings.pairing);
-        let how = match (&a.shape, &b.shape) {
-            (Shape::Ratio(a), Shape::Ratio(b)) => {
+        let how = match (a.shape.ratio(), b.shape.ratio()) {
+            (Some(a), Some(b)) => {
                 if totals[0].len().min(totals[1].len()) < BOOTSTRAP_FROM {
                     How::Student { error, df }
                 } else {
                     let draws = draws(a, b, sign, settings);
-                    How::Drawn { error, draws }
+                    How::Drawn { error, df, draws }
                 }
             }
             _ => {
@@ -90,11 +95,15 @@ impl Inference {
                 let half = student_quantile(1.0 - 0.5 * alpha, *df) * error;
                 (self.value - half, self.value + half)
             }
-            How::Drawn { error, draws } => {
+            How::Drawn { error, df, draws } => {
+                let t = student_quantile(1.0 - 0.5 * alpha, *df);
                 let outside = 0.5 * alpha * (draws.len() as f64 + 1.0);
                 // A share such as 0.05 has no exact binary form: a whole number stays whole.
                 let outside = ((outside + 1e-9).floor() as usize).clamp(1, draws.len());
-                let (least, most) = (draws[outside - 1], draws[draws.len() - outside]);
+                let (least, most) = (
+                    draws[outside - 1].min(-t),
+                    draws[draws.len() - outside].max(t),
+                );
                 (self.value - most * error, self.value - least * error)
             }
             How::Limits { df, .. } => self.limits(student_quantile(1.0 - 0.5 * alpha, *df)),
@@ -111,10 +120,11 @@ impl Inference {
     pub fn p_above(&self, border: f64) -> f64 {
         match &self.how {
             How::Student { error, df } => 1.0 - student_cdf((self.value - border) / error, *df),
-            How::Drawn { error, draws } => {
+            How::Drawn { error, df, draws } => {
                 let t = (self.value - border) / error;
                 let as_far = draws.len() - draws.partition_point(|d| *d < t);
-                (as_far as f64 + 1.0) / (draws.len() as f64 + 1.0)
+                let drawn = (as_far as f64 + 1.0) / (draws.len() as f64 + 1.0);
+                drawn.max(1.0 - student_cdf(t, *df))
             }
             How::Limits { df, .. } => 1.0 - student_cdf(self.reach(border), *df),
         }
@@ -124,10 +134,11 @@ impl Inference {
     pub fn p_below(&self, border: f64) -> f64 {
         match &self.how {
             How::Student { error, df } => student_cdf((self.value - border) / error, *df),
-            How::Drawn { error, draws } => {
+            How::Drawn { error, df, draws } => {
                 let t = (self.value - border) / error;
                 let as_far = draws.partition_point(|d| *d <= t);
-                (as_far as f64 + 1.0) / (draws.len() as f64 + 1.0)
+                let drawn = (as_far as f64 + 1.0) / (draws.len() as f64 + 1.0);
+                drawn.max(student_cdf(t, *df))
             }
             How::Limits { df, .. } => student_cdf(self.reach(border), *df),
         }

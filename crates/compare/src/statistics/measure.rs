@@ -4,18 +4,22 @@
 //! influence function: Hampel 1974; for surveys the linearised variable: Deville 1999) gives standard errors over
 //! locations and variance components alike for all kinds.
 
+use super::inference::BOOTSTRAP_FROM;
 use super::quantiles::{self, Ranked};
 use super::refusal::{Refusal, Side};
 use super::sample::{Clusters, Count, Data};
 use super::spread::{self, Repeats};
+
+/// By location, ascending: a number per press.
+pub(super) type ByPlace = Vec<(u32, Vec<f64>)>;
 
 /// A metric's value, the influence of its presses, and its shape.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Measure {
     /// The metric's value.
     pub value: f64,
-    /// By location, ascending: the influence of each press; their mean over all presses is 0.
-    pub places: Vec<(u32, Vec<f64>)>,
+    /// The influence of each press; their mean over all presses is 0.
+    pub places: ByPlace,
     /// What it is besides.
     pub shape: Shape,
 }
@@ -27,12 +31,28 @@ pub(super) enum Shape {
     Ratio(Ratio),
     /// A share of so many trials.
     Share(u32),
-    /// Events during an exposure.
-    Counts(u32, f64),
+    /// Events during an exposure, and their ratio.
+    Counts(u32, f64, Ratio),
     /// A rank among times.
     Ranked(Ranked),
     /// The distance between two ranks, low and high, and the correlation of their estimates.
     Width(Ranked, Ranked, f64),
+}
+
+impl Shape {
+    /// What a bootstrap can draw from: a ratio that enough locations say something about.
+    pub fn ratio(&self) -> Option<&Ratio> {
+        match self {
+            Self::Ratio(ratio) => Some(ratio),
+            Self::Counts(_, _, ratio) => {
+                let counted =
+                    |(residual, weight): &&(f64, f64)| residual + ratio.ratio * weight > 0.5;
+                let many = ratio.terms.iter().filter(counted).count() >= BOOTSTRAP_FROM;
+                many.then_some(ratio)
+            }
+            _ => None,
+        }
+    }
 }
 
 /// A ratio of sums over locations and what is made of it.
@@ -146,7 +166,10 @@ pub(super) fn measure(
                 .fold(0, u32::saturating_add);
             let exposure = kept().map(|v| v.exposure).sum();
             rate.map(|m| Measure {
-                shape: Shape::Counts(events, exposure),
+                shape: match m.shape {
+                    Shape::Ratio(ratio) => Shape::Counts(events, exposure, ratio),
+                    other => other,
+                },
                 ..m
             })
         }

@@ -29,9 +29,9 @@ impl Limits {
                 let worth = scores::effective(p, n, error_of(measure), measure.locations());
                 Self::Share(p, worth)
             }
-            Shape::Counts(events, exposure) => {
+            Shape::Counts(events, exposure, _) => {
                 let effect = |of: &Measure| match of.shape {
-                    Shape::Counts(events, exposure) => {
+                    Shape::Counts(events, exposure, _) => {
                         scores::overdispersion(events, exposure, error_of(of))
                     }
                     _ => None,

@@ -30,7 +30,7 @@ pub(super) fn notes(data: [&Data; 2], of: &[Measure; 2]) -> Vec<Note> {
             Shape::Share(_) if of.value <= 0.0 || of.value >= 1.0 => {
                 notes.push(Note::AtTheBorder { side });
             }
-            Shape::Counts(0, _) => notes.push(Note::AtTheBorder { side }),
+            Shape::Counts(0, ..) => notes.push(Note::AtTheBorder { side }),
             _ => {}
         }
     }

@@ -5,7 +5,7 @@
 //! has an interval, and its ends are read off the times.
 
 use super::distributions::normal_quantile;
-use super::measure::{Measure, Shape, correlation, error};
+use super::measure::{ByPlace, Measure, Shape, correlation, error};
 use super::refusal::{Refusal, Side};
 use super::sample::{Clusters, late};
 use super::scores;
@@ -95,9 +95,8 @@ pub(super) fn width(
 ) -> Result<Measure, Refusal> {
     let (early, low) = ranked(clusters, &keep, 0.05, side)?;
     let (late, high) = ranked(clusters, &keep, 0.95, side)?;
-    let totals = |places: &[(u32, Vec<f64>)]| -> Vec<f64> {
-        places.iter().map(|(_, u)| u.iter().sum()).collect()
-    };
+    let totals =
+        |places: &ByPlace| -> Vec<f64> { places.iter().map(|(_, u)| u.iter().sum()).collect() };
     let together = correlation(&totals(&early), &totals(&late));
     let difference = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| b - a).collect();
     let pairs = early.iter().zip(&late);
@@ -115,7 +114,7 @@ fn ranked(
     keep: impl Fn(u32) -> bool,
     q: f64,
     side: Side,
-) -> Result<(Vec<(u32, Vec<f64>)>, Ranked), Refusal> {
+) -> Result<(ByPlace, Ranked), Refusal> {
     let kept = || clusters.iter().filter(|(k, _)| keep(**k));
     let mut sorted: Vec<f64> = kept().flat_map(|(_, v)| v).map(|t| late(*t)).collect();
     if sorted.is_empty() {

@@ -1,87 +1,257 @@
 //! How often intervals cover and tests err on simulated skins, and that presses taken as independent fail the same checks.
 
-use skinrig_compare::statistics::{Kind, Question, Settings, Verdict, compare};
+use skinrig_compare::statistics::{Kind, Pairing, Question, Settings, Verdict, compare};
 
 use crate::populations::{Draws, World};
 
-/// Shares of populations.
+/// Shares of the populations that could be compared.
 #[derive(Debug, Default, Clone, Copy)]
-struct Rates {
+pub struct Rates {
     /// The interval of the difference covers the truth.
-    covered: f64,
+    pub covered: f64,
     /// Claimed to differ.
-    differ: f64,
+    pub differ: f64,
     /// Claimed to be equivalent.
-    equivalent: f64,
-    /// Nothing could be compared.
-    refused: f64,
+    pub equivalent: f64,
+    /// Nothing could be compared, of all populations.
+    pub refused: f64,
 }
 
-/// Compares `populations` pairs of skins. The margin is what they differ by, or (without a difference) nothing.
-fn rates(world: World, populations: u32, naive: bool) -> Rates {
-    let [a, b] = world.truth();
-    let truth = b - a;
-    let question = Question {
-        better: world.better(),
-        margin: (truth != 0.0).then_some(truth.abs()),
-    };
-    let settings = Settings {
-        resamples: 399,
-        ..Settings::default()
-    };
-    let mut rates = Rates::default();
-    let share = 1.0 / f64::from(populations);
-    for population in 0..populations {
-        let mut draws = Draws::new(7, u64::from(population));
-        let [a, b] = world.draw(&mut draws, naive);
-        let Ok(found) = compare(&a, &b, &question, &settings) else {
-            rates.refused += share;
-            continue;
-        };
-        let i = found.difference;
-        if i.low.is_none_or(|l| l <= truth) && i.high.is_none_or(|h| h >= truth) {
-            rates.covered += share;
-        }
-        match found.verdict {
-            Verdict::Better | Verdict::Worse => rates.differ += share,
-            Verdict::Equivalent => rates.equivalent += share,
-            Verdict::Undecided => {}
+/// How populations are drawn and compared.
+#[derive(Debug, Clone, Copy)]
+pub struct Trial {
+    pub world: World,
+    pub populations: u32,
+    /// As if presses were independent.
+    pub naive: bool,
+    pub pairing: Pairing,
+    pub resamples: u32,
+}
+
+impl Trial {
+    pub fn new(world: World) -> Self {
+        Self {
+            world,
+            populations: 300,
+            naive: false,
+            pairing: Pairing::SharedLocations,
+            resamples: 199,
         }
     }
-    rates
+
+    /// Compares pairs of skins. The margin is what they differ by, or (without a difference) nothing.
+    pub fn rates(&self) -> Rates {
+        let [a, b] = self.world.truth();
+        let truth = b - a;
+        let question = Question {
+            better: self.world.better(),
+            margin: (truth != 0.0).then_some(truth.abs()),
+        };
+        let settings = Settings {
+            resamples: self.resamples,
+            pairing: self.pairing,
+            ..Settings::default()
+        };
+        let (mut rates, mut compared) = (Rates::default(), 0.0);
+        for population in 0..self.populations {
+            let mut draws = Draws::new(7, u64::from(population));
+            let [a, mut b] = self.world.draw(&mut draws, self.naive);
+            if self.pairing == Pairing::Independent {
+                [_, b] = self.world.draw(&mut draws, self.naive);
+            }
+            let Ok(found) = compare(&a, &b, &question, &settings) else {
+                rates.refused += 1.0 / f64::from(self.populations);
+                continue;
+            };
+            compared += 1.0;
+            let i = found.difference;
+            if i.low.is_none_or(|l| l <= truth) && i.high.is_none_or(|h| h >= truth) {
+                rates.covered += 1.0;
+            }
+            match found.verdict {
+                Verdict::Better | Verdict::Worse => rates.differ += 1.0,
+                Verdict::Equivalent => rates.equivalent += 1.0,
+                Verdict::Undecided => {}
+            }
+        }
+        for share in [&mut rates.covered, &mut rates.differ, &mut rates.equivalent] {
+            *share /= compared;
+        }
+        rates
+    }
+
+    /// Three standard errors of a share of 5 % of the populations.
+    fn band(&self) -> f64 {
+        3.0 * (0.05 * 0.95 / f64::from(self.populations)).sqrt()
+    }
+
+    /// Whether the levels are what they are said to be: without a difference, and with one as large as the margin.
+    fn holds(&self, none: Rates, border: Rates) -> bool {
+        let most = 0.05 + self.band();
+        none.refused.max(border.refused) < 0.02
+            && 1.0 - none.covered < most
+            && 1.0 - border.covered < most
+            && none.differ < most
+            && border.equivalent < most
+    }
+}
+
+fn levels_hold(trial: Trial) {
+    let levels = |trial: Trial| {
+        let world = trial.world.shifted();
+        (trial.rates(), Trial { world, ..trial }.rates())
+    };
+    let (none, border) = levels(trial);
+    assert!(trial.holds(none, border), "{trial:?}\n{none:?}\n{border:?}");
+    // Nor by never claiming anything.
+    assert!(
+        none.covered < 0.995 && border.differ > 0.1,
+        "{none:?}\n{border:?}"
+    );
+    // The first of the same populations are enough to show it.
+    let naive = Trial {
+        naive: true,
+        populations: trial.populations / 2,
+        ..trial
+    };
+    let (none, border) = levels(naive);
+    assert!(
+        !naive.holds(none, border),
+        "{naive:?}\n{none:?}\n{border:?}"
+    );
 }
 
 #[test]
-fn print_them() {
-    for kind in [
-        Kind::Mean,
-        Kind::Rms,
-        Kind::Taxels,
-        Kind::RepeatStd,
-        Kind::Share,
-        Kind::Median,
-        Kind::Width,
-        Kind::CountRate,
+fn of_a_mean() {
+    levels_hold(Trial::new(World::new(Kind::Mean)));
+}
+
+#[test]
+fn of_an_rmse() {
+    levels_hold(Trial::new(World::new(Kind::Rms)));
+}
+
+#[test]
+fn of_an_rmse_at_a_handful_of_locations() {
+    levels_hold(Trial::new(World {
+        locations: 7,
+        ..World::new(Kind::Rms)
+    }));
+}
+
+#[test]
+fn of_an_rmse_at_different_places() {
+    levels_hold(Trial {
+        pairing: Pairing::Independent,
+        ..Trial::new(World::new(Kind::Rms))
+    });
+}
+
+#[test]
+fn of_taxels() {
+    levels_hold(Trial::new(World::new(Kind::Taxels)));
+}
+
+#[test]
+fn of_the_std_between_repetitions() {
+    levels_hold(Trial::new(World::new(Kind::RepeatStd)));
+}
+
+#[test]
+fn of_a_share() {
+    levels_hold(Trial::new(World::new(Kind::Share)));
+}
+
+#[test]
+fn of_a_share_at_different_places() {
+    levels_hold(Trial {
+        pairing: Pairing::Independent,
+        ..Trial::new(World::new(Kind::Share))
+    });
+}
+
+#[test]
+fn of_a_median_latency() {
+    levels_hold(Trial::new(World::new(Kind::Median)));
+}
+
+#[test]
+fn of_the_width_of_latencies() {
+    levels_hold(Trial::new(World {
+        locations: 40,
+        ..World::new(Kind::Width)
+    }));
+}
+
+#[test]
+fn of_a_rate_of_counts() {
+    levels_hold(Trial::new(World::new(Kind::CountRate)));
+}
+
+#[test]
+fn of_a_rate_of_hardly_any_counts() {
+    let trial = Trial::new(World {
+        rate_per_s: 0.02,
+        ..World::new(Kind::CountRate)
+    });
+    let none = trial.rates();
+    assert!(none.differ < 0.05 + trial.band(), "{none:?}");
+    assert!(1.0 - none.covered < 0.05 + trial.band(), "{none:?}");
+}
+
+/// The table of `docs/comparison.md`.
+#[test]
+#[ignore = "takes minutes; cargo test -p skinrig-compare --test statistics -- --ignored --nocapture"]
+fn table_of_levels() {
+    println!(
+        "| metric | locations | covered, no difference | covered | type I, differ | type I, equivalent | naive covered | naive type I |"
+    );
+    println!("|---|---|---|---|---|---|---|---|");
+    for (kind, name) in [
+        (Kind::Mean, "mean (bias)"),
+        (Kind::Rms, "RMSE"),
+        (Kind::Taxels, "taxels"),
+        (Kind::RepeatStd, "std between repetitions"),
+        (Kind::Share, "share"),
+        (Kind::Median, "median latency"),
+        (Kind::Width, "latency width"),
+        (Kind::CountRate, "count rate"),
     ] {
-        for k in [6, 12, 24, 60] {
+        for locations in [8, 24, 60] {
             let world = World {
-                locations: k,
+                locations,
                 ..World::new(kind)
             };
-            let n = 1000;
-            let null = rates(world, n, false);
-            let border = rates(world.shifted(), n, false);
-            let naive = rates(world, n, true);
+            let trial = Trial {
+                populations: 2000,
+                resamples: 399,
+                ..Trial::new(world)
+            };
+            let none = trial.rates();
+            let border = Trial {
+                world: world.shifted(),
+                ..trial
+            }
+            .rates();
+            let naive = Trial {
+                naive: true,
+                populations: 500,
+                ..trial
+            }
+            .rates();
             println!(
-                "{kind:?} {k}: covered {:.3} {:.3} type I {:.3} equivalent {:.3} power {:.3} refused {:.3}; naive {:.3} {:.3}",
-                null.covered,
+                "| {name} | {locations} | {:.3} | {:.3} | {:.3} | {:.3} | {:.3} | {:.3} |",
+                none.covered,
                 border.covered,
-                null.differ,
+                none.differ,
                 border.equivalent,
-                border.differ,
-                border.refused,
                 naive.covered,
                 naive.differ
+            );
+            assert!(none.covered > 0.92 && none.differ < 0.08, "{none:?}");
+            assert!(
+                border.covered > 0.92 && border.equivalent < 0.08,
+                "{border:?}"
             );
         }
     }

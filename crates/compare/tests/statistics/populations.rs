@@ -43,12 +43,14 @@ pub struct World {
     pub repetitions: u32,
     /// What B has more than A of what the metric measures: see [`World::truth`].
     pub shift: f64,
+    /// Events per second of A, for counts.
+    pub rate_per_s: f64,
 }
 
 /// Standard deviation of what a location adds, shared by both skins and own to each, and of the noise of a press.
-const SHARED: f64 = 0.7;
-const OWN: f64 = 0.5;
-const NOISE: f64 = 0.8;
+pub const SHARED: f64 = 0.6;
+pub const OWN: f64 = 0.8;
+pub const NOISE: f64 = 0.5;
 /// Share of missed trials.
 const MISSED: f64 = 0.02;
 /// Mean exposure of a count, s.
@@ -74,6 +76,7 @@ impl World {
             locations: 24,
             repetitions: if kind == Kind::Width { 8 } else { 5 },
             shift: 0.0,
+            rate_per_s: 0.5,
         }
     }
 
@@ -174,7 +177,7 @@ impl World {
             }))
             .unwrap(),
             Kind::CountRate => Sample::count_rate(presses.iter().map(|p| {
-                let rate = 0.5 * (1.0 + shift) * libm::exp(p.place[0]);
+                let rate = self.rate_per_s * (1.0 + shift) * libm::exp(0.6 * p.place[0]);
                 let exposure = EXPOSURE_S * (0.75 + 0.5 * p.uniform);
                 let events = draws.poisson(rate * exposure);
                 (key(p), Count { events, exposure })
@@ -204,7 +207,7 @@ impl World {
                     let of_few = (2.0 / free).sqrt() * libm::exp(chi);
                     (1.0 + shift) * of_few * libm::exp(0.125 * place)
                 }
-                Kind::CountRate => 0.5 * (1.0 + shift) * libm::exp(0.5 * place),
+                Kind::CountRate => self.rate_per_s * (1.0 + shift) * libm::exp(0.18 * place),
             }
         })
     }
