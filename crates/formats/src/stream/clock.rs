@@ -19,6 +19,8 @@ pub(super) struct TimeBase<const BITS: u32, const SHIFT: u32> {
     high: u32,
     epoch_us: u64,
     known: bool,
+    /// Words were lost: the counter goes on from here, but where it stands now the next time base word tells.
+    stale: bool,
 }
 
 impl<const BITS: u32, const SHIFT: u32> TimeBase<BITS, SHIFT> {
@@ -32,12 +34,18 @@ impl<const BITS: u32, const SHIFT: u32> TimeBase<BITS, SHIFT> {
             high: 0,
             epoch_us: origin_us,
             known: false,
+            stale: false,
         }
     }
 
-    /// True once a time base word was seen.
+    /// True once a time base word was seen, and none can have been lost since.
     pub const fn known(&self) -> bool {
-        self.known
+        self.known && !self.stale
+    }
+
+    /// Words were lost.
+    pub const fn lost(&mut self) {
+        self.stale = true;
     }
 
     /// The current base, µs.
@@ -65,6 +73,7 @@ impl<const BITS: u32, const SHIFT: u32> TimeBase<BITS, SHIFT> {
         let from_us = self.base_us();
         let previous = self.high;
         self.high = high;
+        self.stale = false;
         if !self.known {
             self.known = true;
             return Step::Forward;

@@ -203,6 +203,12 @@ impl Words {
         };
     }
 
+    /// Words were lost.
+    pub const fn lost(&mut self) {
+        self.base.lost();
+        self.other = None;
+    }
+
     /// Decodes whole words.
     pub fn run<const KEEP: bool>(
         &mut self,
@@ -303,7 +309,7 @@ impl Words {
         match kind {
             0x8 => {
                 let step = self.base.set(w & 0x0fff_ffff);
-                output.time_high(step, self.base.base_us(), sink);
+                output.time_high(step, Some(self.base.base_us()), sink);
             }
             0x0 | 0x1 | 0xa if !self.base.known() => output.stats.dropped_before_time += 1,
             0x0 | 0x1 => output.cd::<KEEP>(

@@ -32,6 +32,11 @@ impl Words {
         self.base = TimeBase::starting_at(origin_us);
     }
 
+    /// Words were lost.
+    pub const fn lost(&mut self) {
+        self.base.lost();
+    }
+
     /// Decodes whole words.
     pub fn run<const KEEP: bool>(
         &mut self,
@@ -52,7 +57,7 @@ impl Words {
         match kind {
             0x8 => {
                 let step = self.base.set((w >> 32) as u32 & 0x0fff_ffff);
-                output.time_high(step, self.base.base_us(), sink);
+                output.time_high(step, Some(self.base.base_us()), sink);
             }
             0x0 | 0x1 if !self.base.known() => {
                 output.stats.dropped_before_time += u64::from((w as u32).count_ones());

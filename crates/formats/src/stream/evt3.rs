@@ -26,6 +26,8 @@ pub const RANGE_US: u64 = 1 << 24;
 pub(super) struct Words {
     base: TimeBase<TIME_HIGH_BITS, 12>,
     low: u16,
+    /// Words were lost, and no TIME_LOW came behind a TIME_HIGH since: whether that one had changed nobody knows.
+    low_is_lost: bool,
     y: Option<u16>,
     /// Column and polarity of the next vector.
     vector: Option<(u16, Polarity)>,
@@ -50,6 +52,20 @@ impl Words {
         };
     }
 
+    /// Words were lost.
+    pub const fn lost(&mut self) {
+        self.base.lost();
+        self.low_is_lost = true;
+        self.y = None;
+        self.vector = None;
+        self.other = None;
+    }
+
+    /// True while events have a time.
+    const fn knows_time(&self) -> bool {
+        self.base.known() && !self.low_is_lost
+    }
+
     /// Decodes whole words.
     pub fn run<const KEEP: bool>(
         &mut self,
@@ -69,7 +85,7 @@ impl Words {
         let data = w & 0x0fff;
         match w >> 12 {
             0x2 => {
-                let Some(y) = self.y.filter(|_| self.base.known()) else {
+                let Some(y) = self.y.filter(|_| self.knows_time()) else {
                     return self.drop_events(1, output);
                 };
                 output.cd::<KEEP>(
@@ -88,6 +104,7 @@ impl Words {
                 self.low = data;
                 output.stats.time_low += 1;
                 if self.base.known() {
+                    self.low_is_lost = false;
                     output.timed(self.base.base_us() + u64::from(data));
                 }
             }
@@ -105,9 +122,9 @@ impl Words {
                 }
                 let step = self.base.set(data.into());
                 let now_us = self.base.base_us() + u64::from(self.low);
-                output.time_high(step, now_us, sink);
+                output.time_high(step, (!self.low_is_lost).then_some(now_us), sink);
             }
-            0xa if !self.base.known() => output.stats.dropped_before_time += 1,
+            0xa if !self.knows_time() => output.stats.dropped_before_time += 1,
             0xa => output.trigger(
                 TriggerEdge {
                     t_us,
@@ -140,7 +157,7 @@ impl Words {
         output: &mut Output,
         sink: &mut impl EventSink,
     ) {
-        let (Some(y), Some((x, polarity)), true) = (self.y, self.vector, self.base.known()) else {
+        let (Some(y), Some((x, polarity)), true) = (self.y, self.vector, self.knows_time()) else {
             self.drop_events(mask.count_ones(), output);
             if let Some((x, _)) = &mut self.vector {
                 *x = x.saturating_add(columns);
@@ -165,7 +182,7 @@ impl Words {
 
     /// Counts events whose time, row or column is not known.
     fn drop_events(&self, events: u32, output: &mut Output) {
-        if self.base.known() {
+        if self.knows_time() {
             output.stats.dropped_before_address += u64::from(events);
         } else {
             output.stats.dropped_before_time += u64::from(events);
@@ -190,7 +207,7 @@ impl Words {
         other.bits += bits;
         if other.bits < 28 {
             self.other = Some(other);
-        } else if self.base.known() {
+        } else if self.knows_time() {
             output.monitoring(
                 Monitoring {
                     t_us: other.t_us,

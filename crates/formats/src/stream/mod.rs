@@ -20,7 +20,8 @@ use output::Output;
 
 /// An incremental decoder: bytes in, events out, in stream order.
 ///
-/// The bytes may be split anywhere, also inside a word; the result does not depend on the splits. Times are
+/// The bytes may be split anywhere, also inside a word; the result does not depend on the splits. Where some are missing,
+/// [`Self::lost`] must be told. Times are
 /// camera times in µs, unwrapped, with the origin of the stream (nothing is shifted to zero). Events before
 /// the first time base word have no time and are counted in [`StreamStats::dropped_before_time`].
 ///
@@ -32,6 +33,8 @@ pub struct Decoder {
     output: Output,
     partial: [u8; 8],
     partial_len: usize,
+    /// Bytes that are still to come of a word whose beginning is lost.
+    torn_len: usize,
 }
 
 #[derive(Debug, Clone)]
@@ -61,6 +64,15 @@ impl Words {
             Self::Evt2(w) => w.restart(origin_us),
             Self::Evt21(w) => w.restart(origin_us),
             Self::Evt3(w) => w.restart(origin_us),
+        }
+    }
+
+    /// Words were lost.
+    const fn lost(&mut self) {
+        match self {
+            Self::Evt2(w) => w.lost(),
+            Self::Evt21(w) => w.lost(),
+            Self::Evt3(w) => w.lost(),
         }
     }
 
@@ -95,6 +107,7 @@ impl Decoder {
             output: Output::new(geometry),
             partial: [0; 8],
             partial_len: 0,
+            torn_len: 0,
         }
     }
 
@@ -102,8 +115,29 @@ impl Decoder {
     /// count from `origin_us`, which the caller chooses so that they go on behind those before. Counts go on.
     pub fn restart(&mut self, origin_us: u64) {
         self.output.stats.trailing_bytes += self.partial_len as u64;
-        self.partial_len = 0;
+        (self.partial_len, self.torn_len) = (0, 0);
         self.words.restart(origin_us);
+    }
+
+    /// Bytes were lost here: `bytes` of them, exactly or but for whole words, so that it is known where the next word begins. The
+    /// word that they tore is let go, and so is what a lost time base word (or EVT3 address) would have changed: events and
+    /// edges up to the next one have no time and are counted in [`StreamStats::dropped_before_time`], never stamped with the
+    /// old one. Camera time goes on through a loss of less than half of its range: 2.4 h, EVT3 8 s.
+    pub fn lost(&mut self, bytes: u64) {
+        if bytes == 0 {
+            return;
+        }
+        let size = self.words.word_bytes();
+        let into_word = match self.torn_len {
+            0 => self.partial_len,
+            torn => size - torn,
+        };
+        // Words have at most 8 bytes.
+        let phase = (into_word + (bytes % size as u64) as usize) % size;
+        self.output.stats.trailing_bytes += self.partial_len as u64;
+        self.partial_len = 0;
+        self.torn_len = (size - phase) % size;
+        self.words.lost();
     }
 
     /// Decodes `bytes` and hands everything found to `sink`, in stream order; CD events come in slices of at
@@ -152,6 +186,12 @@ impl Decoder {
 
     fn feed<const KEEP: bool>(&mut self, mut bytes: &[u8], sink: &mut impl EventSink) {
         let size = self.words.word_bytes();
+        if self.torn_len > 0 {
+            let torn = bytes.len().min(self.torn_len);
+            self.torn_len -= torn;
+            self.output.stats.trailing_bytes += torn as u64;
+            bytes = &bytes[torn..];
+        }
         if self.partial_len > 0 {
             let taken = bytes.len().min(size - self.partial_len);
             let (head, rest) = bytes.split_at(taken);

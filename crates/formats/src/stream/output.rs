@@ -94,10 +94,12 @@ impl Output {
         sink.on_monitoring(monitoring);
     }
 
-    /// Takes one time base word, which led to `now_us`.
-    pub fn time_high(&mut self, step: Step, now_us: u64, sink: &mut impl EventSink) {
+    /// Takes one time base word, which led to `now_us` when that is known.
+    pub fn time_high(&mut self, step: Step, now_us: Option<u64>, sink: &mut impl EventSink) {
         self.stats.time_high += 1;
-        self.timed(now_us);
+        if let Some(now_us) = now_us {
+            self.timed(now_us);
+        }
         match step {
             Step::Forward => {}
             Step::Wrap => self.stats.wraps += 1,

@@ -37,6 +37,11 @@ impl Scanner {
         }
     }
 
+    /// Bytes were lost before those that follow: see [`Decoder::lost`].
+    pub fn lost(&mut self, bytes: u64) {
+        self.decoder.lost(bytes);
+    }
+
     /// Other bytes follow, of a device that was started anew: see [`Decoder::restart`].
     pub fn restart(&mut self, origin_us: u64) {
         self.decoder.restart(origin_us);

@@ -59,7 +59,7 @@ pub struct StreamStats {
     /// Words that were skipped, by their type code: inertial data, codes without a meaning for a single CD
     /// sensor, and continuations without a beginning.
     pub skipped: [u64; 16],
-    /// Events and triggers before the first time base word.
+    /// Events and triggers before the first time base word, of the stream and after each loss.
     pub dropped_before_time: u64,
     /// EVT3 events before the row or the vector base that they refer to was known.
     pub dropped_before_address: u64,
@@ -69,7 +69,7 @@ pub struct StreamStats {
     pub wraps: u64,
     /// CD events outside the sensor; not delivered.
     pub out_of_geometry: u64,
-    /// Bytes at the end that do not make a whole word.
+    /// Bytes that do not make a whole word: at the end, and on both sides of a loss.
     pub trailing_bytes: u64,
 }
 
