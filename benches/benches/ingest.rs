@@ -45,6 +45,7 @@ fn session(path: &Path, chunk: &[u8]) -> Result<(), Box<dyn Error>> {
             seq: n / 2,
             host_time: HostTime(n as i64),
             lost_before: 0,
+            lost_from_us: None,
             bytes: chunk.to_vec(),
             facts: ChunkFacts::default(),
             triggers: vec![],

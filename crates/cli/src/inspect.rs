@@ -48,6 +48,7 @@ fn inspect_session(path: &Path, gap_us: u64) -> Result<Inspection, Failure> {
                 if let Some(origin_us) = meta.restart_us {
                     decoder.restart(origin_us);
                 }
+                decoder.lost(meta.lost_before);
                 decoder.push(bytes, &mut stream);
             })
             .map_err(Failure::input)?;

@@ -4,7 +4,9 @@ use chrono::DateTime;
 use skinrig_analysis::Analysis;
 use skinrig_model::{HostTime, PressVerdict, RunEnd, RunHeader};
 use skinrig_recorder::{RecorderError, SessionReader};
-use skinrig_report::{DeviceRow, InterruptionRow, LegRow, NoteRow, Provenance, RetakenRow};
+use skinrig_report::{
+    DeviceRow, InterruptionRow, LegRow, LossRow, NoteRow, Provenance, RetakenRow,
+};
 
 /// Reads the provenance block of a session.
 ///
@@ -59,12 +61,18 @@ pub fn provenance(
         })
         .collect();
     let mut lost_bytes = [0; 2];
+    let mut losses = Vec::new();
     for camera in skinrig_model::CameraId::ALL {
         lost_bytes[camera.index()] = reader
             .chunk_index(camera)?
             .iter()
             .map(|c| c.lost_before)
             .sum();
+        losses.extend(reader.losses(camera)?.iter().map(|loss| LossRow {
+            camera: camera.number(),
+            bytes: loss.bytes,
+            time: loss.time,
+        }));
     }
     Ok(Provenance {
         session_id: reader.session_id()?,
@@ -94,6 +102,7 @@ pub fn provenance(
         interruptions,
         notes,
         lost_bytes,
+        losses,
     })
 }
 

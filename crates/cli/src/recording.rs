@@ -116,12 +116,17 @@ impl Recording for SessionRecording {
             .chunk_bytes(camera, meta.seq)
             .map_err(unreadable)?;
         // The stored facts are those of the first decoding; the edges come from decoding again.
-        let (_, triggers) = self.scanners[camera.index()].push(&bytes);
+        let scanner = &mut self.scanners[camera.index()];
+        if meta.lost_time.is_some() {
+            scanner.lost(meta.lost_before);
+        }
+        let (_, triggers) = scanner.push(&bytes);
         Ok(Some(RawChunk {
             camera,
             seq: meta.seq,
             host_time: meta.host_time,
             lost_before: meta.lost_before,
+            lost_from_us: meta.lost_time.and_then(|t| t.from_us),
             bytes,
             facts: meta.facts,
             triggers,

@@ -22,6 +22,24 @@ pub fn show(args: &ShowArgs, json: bool) -> Outcome {
     Ok(Exit::Ok)
 }
 
+/// How many losses of a camera are listed.
+const MOST_LOSSES: usize = 5;
+
+/// What a camera lost, and when.
+fn losses(
+    reader: &SessionReader,
+    camera: CameraId,
+) -> Result<Vec<serde_json::Value>, RecorderError> {
+    let losses = reader.losses(camera)?;
+    let rows = losses.iter().map(|loss| {
+        serde_json::json!({
+            "chunk": loss.seq, "bytes": loss.bytes, "from_us": loss.time.from_us, "to_us": loss.time.to_us,
+            "time": loss.time.to_string(),
+        })
+    });
+    Ok(rows.collect())
+}
+
 fn describe(args: &ShowArgs) -> Result<serde_json::Value, RecorderError> {
     let reader = SessionReader::open(&args.session)?;
     let header = reader.header()?;
@@ -54,6 +72,7 @@ fn describe(args: &ShowArgs) -> Result<serde_json::Value, RecorderError> {
             "events": chunks.iter().map(|c| c.facts.cd_events).sum::<u64>(),
             "trigger_edges": chunks.iter().map(|c| c.facts.trigger_edges).sum::<u64>(),
             "lost_bytes": chunks.iter().map(|c| c.lost_before).sum::<u64>(),
+            "losses": losses(&reader, camera)?,
         }));
     }
     let interruptions: Vec<_> = reader
@@ -283,6 +302,20 @@ fn print(d: &serde_json::Value) {
             count(&c["stored_bytes"]) as f64 / 1e6,
             c["lost_bytes"],
         );
+        let losses = c["losses"].as_array().map_or(&[][..], Vec::as_slice);
+        for loss in losses.iter().take(MOST_LOSSES) {
+            outln!(
+                "    lost: {} bytes, {}",
+                loss["bytes"],
+                loss["time"].as_str().unwrap_or("")
+            );
+        }
+        if losses.len() > MOST_LOSSES {
+            outln!(
+                "    lost: {} times more (--json)",
+                losses.len() - MOST_LOSSES
+            );
+        }
     }
     for row in d["interruptions"].as_array().into_iter().flatten() {
         outln!(

@@ -48,6 +48,7 @@ impl EventSource for SessionEvents {
                         moves.get(&origin_us).copied().unwrap_or_default(),
                     );
                 }
+                legs.lost(meta.lost_before);
                 legs.for_each_slice(bytes, each);
             })
             .map_err(|e| e.to_string())
@@ -79,6 +80,11 @@ impl LegDecoder {
         };
         self.decoder.restart(begin_us);
         self.by_us = rest_us;
+    }
+
+    /// Bytes were lost here: what follows has a time again from the next time base word on.
+    fn lost(&mut self, bytes: u64) {
+        self.decoder.lost(bytes);
     }
 
     fn for_each_slice(&mut self, bytes: &[u8], each: &mut dyn FnMut(&[CdEvent])) {
@@ -117,6 +123,12 @@ impl ChunkScanner for Rescan {
         self.scanners[camera.index()]
             .get_or_insert_with(|| Scanner::new(format))
             .push(bytes)
+    }
+
+    fn lost(&mut self, camera: CameraId, format: StreamFormat, bytes: u64) {
+        self.scanners[camera.index()]
+            .get_or_insert_with(|| Scanner::new(format))
+            .lost(bytes);
     }
 
     fn restart(&mut self, camera: CameraId, format: StreamFormat, origin_us: u64) {

@@ -41,6 +41,6 @@ pub use settings::{
     RigGeometry, ThresholdRule, WindowAnchor,
 };
 pub use skin::SkinOutline;
-pub use stream::{ChunkFacts, RawChunk, StreamFormat};
+pub use stream::{ChunkFacts, LostTime, RawChunk, StreamFormat};
 pub use time::{HostDuration, HostTime};
 pub use trigger_box::{BoxReport, BoxTime};

@@ -145,6 +145,7 @@ pub(crate) fn chunk_from(row: &SqliteRow) -> Result<ChunkMeta, Fault> {
         seq: num(row, "seq")?,
         host_time: HostTime(int(row, "host_ns")?),
         lost_before: num(row, "lost_before")?,
+        lost_time: None,
         codec: named(
             row,
             "codec",

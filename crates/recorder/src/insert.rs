@@ -456,6 +456,23 @@ impl Journal {
         .bind(chunk.stored)
         .execute(&mut self.conn)
         .await?;
+        if let Some(gap) = chunk.gap {
+            sqlx::query("INSERT INTO gap (camera, seq, from_us, to_us) VALUES (?, ?, ?, ?)")
+                .bind(camera.number())
+                .bind(chunk.seq)
+                .bind(gap.from_us)
+                .bind(gap.to_us)
+                .execute(&mut self.conn)
+                .await?;
+        }
+        if let Some(seq) = chunk.ends_gaps_from {
+            sqlx::query("UPDATE gap SET to_us = ? WHERE camera = ? AND seq >= ? AND to_us IS NULL")
+                .bind(chunk.first_us)
+                .bind(camera.number())
+                .bind(seq)
+                .execute(&mut self.conn)
+                .await?;
+        }
         let Some(edges) = chunk.edges_json else {
             return Ok(());
         };

@@ -95,7 +95,11 @@ impl Joint {
                 let origin_us = self.camera_origin_us[camera];
                 later(&mut chunk.host_time)?;
                 chunk.seq = chunk.seq.checked_add(self.first_seq[camera])?;
-                let facts = [&mut chunk.facts.first_us, &mut chunk.facts.last_us];
+                let facts = [
+                    &mut chunk.facts.first_us,
+                    &mut chunk.facts.last_us,
+                    &mut chunk.lost_from_us,
+                ];
                 let edges = chunk.triggers.iter_mut().map(|edge| &mut edge.t_us);
                 for t_us in facts.into_iter().flatten().chain(edges) {
                     *t_us = t_us.checked_add(origin_us)?;

@@ -40,8 +40,8 @@ pub use lock::writer_of;
 pub use queue::QueueLoad;
 pub use reader::SessionReader;
 pub use rows::{
-    AttemptRow, ChunkMeta, CommandRow, DeviceRow, InterruptionRow, LegRow, NoteRow, PressTally,
-    Seal, SessionTotals,
+    AttemptRow, ChunkMeta, CommandRow, DeviceRow, InterruptionRow, LegRow, Loss, NoteRow,
+    PressTally, Seal, SessionTotals,
 };
 pub use salvage::{LostBytes, SalvageReport, SalvagedTable, salvage};
 pub use schema::SCHEMA_VERSION;

@@ -32,6 +32,10 @@ pub struct PreparedChunk {
     pub seq: i64,
     pub host_time: HostTime,
     pub lost_before: i64,
+    /// The time that was lost before it, as far as it is known by now; `None` without a loss.
+    pub gap: Option<PreparedGap>,
+    /// The first gap since which no time came, when this chunk's is the time that ends it and those after it.
+    pub ends_gaps_from: Option<i64>,
     pub codec: Codec,
     pub raw_bytes: i64,
     pub raw_crc32: u32,
@@ -44,6 +48,50 @@ pub struct PreparedChunk {
     pub stored: Vec<u8>,
     /// `[[t_us, channel, rising], ...]`; `None` without edges.
     pub edges_json: Option<String>,
+}
+
+/// A row of `gap`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PreparedGap {
+    pub from_us: Option<i64>,
+    pub to_us: Option<i64>,
+}
+
+/// Where the time of a camera's stream stands.
+#[derive(Debug, Clone, Copy, Default)]
+struct Course {
+    /// The last time that came.
+    last_us: Option<i64>,
+    /// The first lossy chunk since which none came.
+    open_gap: Option<i64>,
+}
+
+impl Course {
+    /// Takes the next chunk: the time that was lost before it, and the gap that it ends.
+    fn see(
+        &mut self,
+        seq: i64,
+        lost: bool,
+        lost_from_us: Option<i64>,
+        times_us: (Option<i64>, Option<i64>),
+    ) -> (Option<PreparedGap>, Option<i64>) {
+        let (first_us, last_us) = times_us;
+        let gap = lost.then(|| PreparedGap {
+            from_us: match (self.last_us, lost_from_us) {
+                (Some(last), Some(from)) => Some(last.min(from)),
+                (last, _) => last,
+            },
+            to_us: first_us,
+        });
+        let ends = self.open_gap.filter(|_| first_us.is_some());
+        if first_us.is_some() {
+            self.open_gap = None;
+        } else if lost {
+            self.open_gap.get_or_insert(seq);
+        }
+        self.last_us = last_us.or(self.last_us);
+        (gap, ends)
+    }
 }
 
 /// Tells waiting callers when the thread ends by a panic.
@@ -73,6 +121,19 @@ pub struct Preparer {
     pub formats: Option<[StreamFormat; 2]>,
     /// The next chunk of each camera.
     pub next_seq: [u64; 2],
+    /// How far each camera's time has come in this leg.
+    courses: [Course; 2],
+}
+
+impl Preparer {
+    /// One that goes on with a session: how its cameras' bytes encode events, and the next chunk of each.
+    pub fn resuming(formats: [StreamFormat; 2], next_seq: [u64; 2]) -> Self {
+        Self {
+            formats: Some(formats),
+            next_seq,
+            ..Self::default()
+        }
+    }
 }
 
 impl Preparer {
@@ -127,17 +188,29 @@ impl Preparer {
             Some(folded) => (Codec::TimeHighRuns, folded),
             None => (Codec::None, chunk.bytes),
         };
+        let seq = signed(chunk.seq)?;
+        let first_us = facts.first_us.map(signed).transpose()?;
+        let last_us = facts.last_us.map(signed).transpose()?;
+        let lost_from_us = chunk.lost_from_us.map(signed).transpose()?;
+        let (gap, ends_gaps_from) = self.courses[camera].see(
+            seq,
+            chunk.lost_before > 0,
+            lost_from_us,
+            (first_us, last_us),
+        );
         Ok(PreparedChunk {
             camera: chunk.camera,
-            seq: signed(chunk.seq)?,
+            seq,
             host_time: chunk.host_time,
             lost_before: signed(chunk.lost_before)?,
+            gap,
+            ends_gaps_from,
             codec,
             raw_bytes,
             raw_crc32,
             stored_sha256: Sha256::digest(&stored).into(),
-            first_us: facts.first_us.map(signed).transpose()?,
-            last_us: facts.last_us.map(signed).transpose()?,
+            first_us,
+            last_us,
             cd_events: signed(facts.cd_events)?,
             on_events: signed(facts.on_events)?,
             trigger_edges: signed(facts.trigger_edges)?,

@@ -13,16 +13,27 @@ use crate::query::Fault;
 const QUEUE_BYTES: usize = 64 << 20;
 
 /// Longest time for which a caller waits for the disk.
-const PATIENCE: Duration = Duration::from_secs(if cfg!(test) { 2 } else { 30 });
+const PATIENCE: Duration = Duration::from_secs(30);
 
 /// A record that can be written, or why it cannot. It keeps its place in the order either way.
 pub type Prepared = Result<Ready, Fault>;
 
 /// What the caller, the preparing and the writing thread share.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Shared {
     queue: Mutex<Queue>,
     changed: Condvar,
+    patience: Duration,
+}
+
+impl Default for Shared {
+    fn default() -> Self {
+        Self {
+            queue: Mutex::default(),
+            changed: Condvar::new(),
+            patience: PATIENCE,
+        }
+    }
 }
 
 #[derive(Debug, Default)]
@@ -84,11 +95,11 @@ impl Shared {
         queue: MutexGuard<'a, Queue>,
         since: Instant,
     ) -> Result<MutexGuard<'a, Queue>, String> {
-        let left = PATIENCE.saturating_sub(since.elapsed());
+        let left = self.patience.saturating_sub(since.elapsed());
         if left.is_zero() {
             return Err(format!(
                 "expected the disk to take a record within {} s, found that it did not",
-                PATIENCE.as_secs()
+                self.patience.as_secs_f64()
             ));
         }
         let (queue, _) = self
@@ -268,6 +279,7 @@ mod tests {
             seq: 0,
             host_time: HostTime::ZERO,
             lost_before: 0,
+            lost_from_us: None,
             bytes: vec![0; bytes],
             facts: ChunkFacts::default(),
             triggers: Vec::new(),
@@ -298,7 +310,11 @@ mod tests {
     /// A disk that hangs ends the run while the arm can still be retracted.
     #[test]
     fn nobody_waits_for_a_disk_for_ever() {
-        let shared = Shared::default();
+        assert_eq!(Shared::default().patience, Duration::from_secs(30));
+        let shared = Shared {
+            patience: Duration::from_millis(50),
+            ..Shared::default()
+        };
         let end = Record::Ended {
             t: HostTime::ZERO,
             end: skinrig_model::RunEnd::Completed,

@@ -208,6 +208,19 @@ impl SessionReader {
             DeviceRole::Camera2,
             DeviceRole::TriggerBox,
         ];
+        // First: in a session that is written a device and its settings may come between the two.
+        let settings = self.all(
+            DOING,
+            "SELECT * FROM setting ORDER BY device, position",
+            |row| {
+                let setting = Setting {
+                    name: text(row, "name")?,
+                    requested: text(row, "requested")?,
+                    read_back: text(row, "read_back")?,
+                };
+                Ok((int(row, "device")?, setting))
+            },
+        )?;
         let mut devices = self.all(DOING, "SELECT * FROM device ORDER BY id", |row| {
             let identity = DeviceIdentity {
                 model: text(row, "model")?,
@@ -224,18 +237,6 @@ impl SessionReader {
                 },
             ))
         })?;
-        let settings = self.all(
-            DOING,
-            "SELECT * FROM setting ORDER BY device, position",
-            |row| {
-                let setting = Setting {
-                    name: text(row, "name")?,
-                    requested: text(row, "requested")?,
-                    read_back: text(row, "read_back")?,
-                };
-                Ok((int(row, "device")?, setting))
-            },
-        )?;
         for (device, setting) in settings {
             match devices.iter_mut().find(|(id, _)| *id == device) {
                 Some((_, row)) => row.settings.push(setting),

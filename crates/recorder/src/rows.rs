@@ -3,7 +3,7 @@
 use serde::Serialize;
 use skinrig_model::{
     AttemptId, CameraId, ChunkFacts, DeviceIdentity, DeviceRole, HostTime, InterruptionKind,
-    MotionCommand, PressOutcome, ResumeHeader, RunEnd, Setting,
+    LostTime, MotionCommand, PressOutcome, ResumeHeader, RunEnd, Setting,
 };
 
 use crate::codec::Codec;
@@ -95,6 +95,9 @@ pub struct ChunkMeta {
     pub host_time: HostTime,
     /// Bytes lost before it.
     pub lost_before: u64,
+    /// The time that was lost with them. `None` without a loss, and where the session does not tell: one of a schema before 6, and a
+    /// place that a salvage left empty. When it is there, the facts are those of a decoder that carried nothing over.
+    pub lost_time: Option<LostTime>,
     /// How it is stored.
     pub codec: Codec,
     /// Bytes as they came.
@@ -108,6 +111,17 @@ pub struct ChunkMeta {
     /// Set on the first chunk of a further leg: these bytes do not go on from those before. Their decoder starts anew, and the
     /// times that it finds are moved by this, µs.
     pub restart_us: Option<u64>,
+}
+
+/// Bytes of a camera that were lost, and when.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Loss {
+    /// The chunk before which they were lost.
+    pub seq: u64,
+    /// How many; together with those of the chunks that follow without a time.
+    pub bytes: u64,
+    /// When, on the camera's clock, joined over the legs.
+    pub time: LostTime,
 }
 
 /// How presses ended, each counted once by its last attempt.

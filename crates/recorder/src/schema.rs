@@ -13,7 +13,7 @@ use crate::error::RecorderError;
 use crate::query::{Fault, each_row};
 
 /// The schema version that this build writes, and the newest that it reads (`PRAGMA user_version`).
-pub const SCHEMA_VERSION: u32 = 5;
+pub const SCHEMA_VERSION: u32 = 6;
 
 /// `skrg` in ASCII (`PRAGMA application_id`).
 pub const APPLICATION_ID: u32 = u32::from_be_bytes(*b"skrg");
@@ -345,6 +345,8 @@ mod tests {
                 _: u64,
             ) {
             }
+            fn lost(&mut self, _: skinrig_model::CameraId, _: skinrig_model::StreamFormat, _: u64) {
+            }
             fn scan(
                 &mut self,
                 _: skinrig_model::CameraId,
@@ -366,6 +368,7 @@ mod tests {
                 "DROP TABLE box_report",
                 "DROP TABLE preflight",
                 "DROP TABLE leg",
+                "DROP TABLE gap",
                 "ALTER TABLE attempt DROP COLUMN touched_mm",
                 "DELETE FROM _sqlx_migrations WHERE version > 20261121000000",
                 "PRAGMA user_version = 1",
@@ -375,7 +378,7 @@ mod tests {
             }
             crate::seal::digest_tables(&mut conn).await.unwrap()
         });
-        let later = ["box_report", "preflight", "leg"];
+        let later = ["box_report", "preflight", "leg", "gap"];
         assert!(digests.iter().all(|d| !later.contains(&d.name.as_str())));
         assert_eq!(digests.len(), 15);
         let reader = crate::SessionReader::open(&path).unwrap();

@@ -17,7 +17,7 @@ use crate::rows::SessionTotals;
 
 /// The tables that the tree hash covers, in its order, each with the rows and columns that count. Blobs of
 /// camera bytes and poses are covered by the SHA-256 beside them.
-const TABLES: [(&str, &str); 18] = [
+const TABLES: [(&str, &str); 19] = [
     ("session", "SELECT * FROM session ORDER BY id"),
     ("leg", "SELECT * FROM leg ORDER BY number"),
     ("robot_from_skin", "SELECT * FROM robot_from_skin ORDER BY axis"),
@@ -35,6 +35,7 @@ const TABLES: [(&str, &str); 18] = [
         "SELECT camera, seq, host_ns, lost_before, codec, raw_bytes, raw_crc32, stored_sha256, first_us,
          last_us, cd_events, on_events, trigger_edges FROM chunk ORDER BY camera, seq",
     ),
+    ("gap", "SELECT camera, seq, from_us, to_us FROM gap ORDER BY camera, seq"),
     (
         "trigger_edge",
         "SELECT camera, seq, position, t_us, channel, rising FROM trigger_edge

@@ -8,6 +8,7 @@ use skinrig_model::{
     RunHeader, StreamFormat, TriggerEdge, press::PressRole,
 };
 
+mod gaps;
 mod legs;
 
 use crate::error::RecorderError;
@@ -35,8 +36,9 @@ pub trait ChunkScanner {
     /// `origin_us`. Called before their `scan`.
     fn restart(&mut self, camera: CameraId, format: StreamFormat, origin_us: u64);
 
-    /// Bytes were lost between the previous chunk of `camera` and the next one. Called before its `scan`.
-    fn lost(&mut self, _camera: CameraId, _bytes: u64) {}
+    /// Bytes were lost between the previous chunk of `camera` and the next one: nothing that they may have changed carries over.
+    /// Called before its `scan`, where the session tells the time that was lost.
+    fn lost(&mut self, camera: CameraId, format: StreamFormat, bytes: u64);
 }
 
 /// What [`verify()`] found.
@@ -187,7 +189,9 @@ fn check_chunks(
     report: &mut VerifyReport,
 ) -> Result<(), RecorderError> {
     let (mut previous, mut host) = (None, HostTime(i64::MIN));
-    for meta in reader.chunk_index(camera)? {
+    let index = reader.chunk_index(camera)?;
+    gaps::check(camera, &index, report);
+    for meta in index {
         let place = format!("{camera} chunk {}", meta.seq);
         let expected = previous.map_or(0, |p| p + 1);
         if meta.seq != expected {
@@ -225,8 +229,8 @@ fn check_chunks(
         if let Some(origin_us) = meta.restart_us {
             scanner.restart(camera, format, origin_us);
         }
-        if meta.lost_before > 0 {
-            scanner.lost(camera, meta.lost_before);
+        if meta.lost_time.is_some() {
+            scanner.lost(camera, format, meta.lost_before);
         }
         let (facts, edges) = scanner.scan(camera, format, &bytes);
         report.equal(&format!("{place}: facts"), &facts, &meta.facts);

@@ -158,10 +158,7 @@ impl SessionWriter {
         let runtime = runtime(&self.path)?;
         let (conn, leg) = runtime.block_on(resume::begin(&self.path, header))?;
         self.joint = leg.joint;
-        let preparer = Preparer {
-            formats: Some(leg.formats),
-            next_seq: leg.joint.first_seq,
-        };
+        let preparer = Preparer::resuming(leg.formats, leg.joint.first_seq);
         self.start(runtime, conn, preparer)
     }
 

@@ -1,7 +1,7 @@
 //! Owns how the course of a session is told in words: its legs, and the attempts that others replaced.
 
 use crate::format::{number, or_missing};
-use crate::provenance::{LegRow, Provenance};
+use crate::provenance::{LegRow, LossRow, Provenance};
 
 /// A leg in words, without its number.
 pub(crate) fn leg(leg: &LegRow) -> String {
@@ -46,6 +46,21 @@ pub(crate) fn reasons(p: &Provenance) -> Vec<String> {
         format!("press{plural} {}: {reason}", presses.join(", "))
     });
     lines.collect()
+}
+
+/// How many losses of a camera are told one by one.
+const MOST_LOSSES: usize = 5;
+
+/// When the camera with this index lost data, and how much time with it.
+pub(crate) fn losses(p: &Provenance, camera: usize) -> Vec<String> {
+    let mine = |row: &&LossRow| usize::from(row.camera) == camera + 1;
+    let times = p.losses.iter().filter(mine).map(|row| row.time.to_string());
+    let mut told: Vec<String> = times.collect();
+    if let Some(more) = told.len().checked_sub(MOST_LOSSES + 1) {
+        told.truncate(MOST_LOSSES);
+        told.push(format!("and {} times more", more + 1));
+    }
+    told
 }
 
 /// `40 s`, `25 min` or `7 h 5 min`.

@@ -28,7 +28,9 @@ mod tables;
 mod terminal;
 
 pub use document::{JSON_FORMAT, JSON_VERSION};
-pub use provenance::{DeviceRow, InterruptionRow, LegRow, NoteRow, Provenance, RetakenRow};
+pub use provenance::{
+    DeviceRow, InterruptionRow, LegRow, LossRow, NoteRow, Provenance, RetakenRow,
+};
 
 use skinrig_analysis::result::Analysis;
 

@@ -1,7 +1,7 @@
 //! Owns the plain description of where a session comes from, as the report shows it.
 
 use serde::{Deserialize, Serialize};
-use skinrig_model::PreflightCheck;
+use skinrig_model::{LostTime, PreflightCheck};
 
 /// Where the numbers of a report come from. Plain strings; empty strings are shown as "not recorded".
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -62,6 +62,20 @@ pub struct Provenance {
     pub notes: Vec<NoteRow>,
     /// Bytes known to be lost, camera 1 and camera 2.
     pub lost_bytes: [u64; 2],
+    /// When they were lost, in the order of each stream, camera 1 first.
+    #[serde(default)]
+    pub losses: Vec<LossRow>,
+}
+
+/// A loss of a camera.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct LossRow {
+    /// 1 or 2.
+    pub camera: u8,
+    /// Bytes known to be lost.
+    pub bytes: u64,
+    /// When, on the camera's clock.
+    pub time: LostTime,
 }
 
 impl Provenance {

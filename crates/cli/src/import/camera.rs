@@ -206,6 +206,7 @@ impl FileCamera {
                 seq: self.seq,
                 host_time: self.clock.now(),
                 lost_before: 0,
+                lost_from_us: None,
                 bytes,
                 facts,
                 triggers,

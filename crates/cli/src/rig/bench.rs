@@ -106,6 +106,7 @@ pub fn settings(kind: &str) -> ControllerSettings {
         settings.late_after = SLOW_LATE;
         settings.speed_over = SLOW_SPEED;
         settings.camera_lag = Some(SLOW_LATE);
+        settings.data_within = SLOW_LATE;
     }
     settings
 }
@@ -216,6 +217,7 @@ fn open_camera(
     let config = Evk1Config {
         read_back_exceptions: setup.read_back_exceptions.clone(),
         max_time_step_us: setup.max_time_high_gap_us,
+        overflow_is_loss: setup.overflow_is_loss,
         ..Evk1Config::default()
     };
     let evk1 = Evk1::open_serial(&setup.serial, camera, config, clock);

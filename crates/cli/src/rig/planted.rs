@@ -39,6 +39,7 @@ fn of_device(fault: &PlantedFault) -> Option<Fault> {
             when,
             by_us: CLOCK_STEP_US,
         },
+        FaultKind::CameraHot(camera) => Fault::CameraHot { camera, when },
         FaultKind::TriggerLost => mark(MarkFate::Lost),
         FaultKind::TriggerDoubled => mark(MarkFate::Doubled),
         FaultKind::TriggerDelayed => mark(MarkFate::Delayed),

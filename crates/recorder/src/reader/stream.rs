@@ -1,13 +1,15 @@
 //! Camera bytes, chunk by chunk, and what is known about them.
 
-use skinrig_model::{CameraId, TriggerEdge};
+use std::collections::BTreeMap;
+
+use skinrig_model::{CameraId, LostTime, TriggerEdge};
 
 use super::SessionReader;
 use crate::codec::{self, Codec};
 use crate::error::RecorderError;
 use crate::from_row::chunk_from;
-use crate::query::{blob, each_row, int, num};
-use crate::rows::ChunkMeta;
+use crate::query::{blob, each_row, has_table, int, num, opt_num};
+use crate::rows::{ChunkMeta, Loss};
 
 /// What is known about a chunk, then how many bytes are stored of it.
 const INDEX: &str = "SELECT camera, seq, host_ns, lost_before, codec, raw_bytes, raw_crc32, first_us, last_us, cd_events,
@@ -26,12 +28,14 @@ impl SessionReader {
     /// When the file is damaged.
     pub fn chunk_index(&self, camera: CameraId) -> Result<Vec<ChunkMeta>, RecorderError> {
         let restarts = self.restarts(camera)?;
+        let lost = self.lost_times(camera)?;
         self.ask("reading the chunk index", async |conn| {
             let query = sqlx::query(INDEX).bind(camera.number());
             let mut index = Vec::new();
             each_row(query, conn, |row| {
                 let mut meta = chunk_from(row)?;
                 meta.restart_us = restarts.get(&meta.seq).copied();
+                meta.lost_time = lost.get(&meta.seq).copied();
                 index.push(meta);
                 Ok(())
             })
@@ -54,7 +58,8 @@ impl SessionReader {
         }
     }
 
-    /// The first chunk from `seq` on, with its bytes as they came, checked; whether it begins a leg is left to the caller.
+    /// The first chunk from `seq` on, with its bytes as they came, checked; whether it begins a leg, and
+    /// what time was lost before it, is left to the caller.
     pub(crate) fn chunk_at_or_after(
         &self,
         camera: CameraId,
@@ -102,36 +107,83 @@ impl SessionReader {
         mut each: impl FnMut(ChunkMeta, &[u8]),
     ) -> Result<(), RecorderError> {
         let restarts = self.restarts(camera)?;
+        let lost = self.lost_times(camera)?;
         let mut next = from_seq;
         while let Some((mut meta, bytes)) = self.chunk_at_or_after(camera, next)? {
             meta.restart_us = restarts.get(&meta.seq).copied();
+            meta.lost_time = lost.get(&meta.seq).copied();
             each(meta, &bytes);
             next = meta.seq + 1;
         }
         Ok(())
     }
 
-    /// Camera-time intervals `(from_us, to_us)` in which bytes of `camera` were lost: from the last time seen
-    /// before a loss to the first time seen after it; 0 and `u64::MAX` where there is none.
+    /// What the table of gaps says, by chunk; nothing in a session of a schema before it.
+    fn lost_times(&self, camera: CameraId) -> Result<BTreeMap<u64, LostTime>, RecorderError> {
+        self.ask("reading the gaps", async |conn| {
+            let mut times = BTreeMap::new();
+            if !has_table(conn, "gap").await? {
+                return Ok(times);
+            }
+            let query =
+                sqlx::query("SELECT seq, from_us, to_us FROM gap WHERE camera = ? ORDER BY seq");
+            each_row(query.bind(camera.number()), conn, |row| {
+                let time = LostTime {
+                    from_us: opt_num(row, "from_us")?,
+                    to_us: opt_num(row, "to_us")?,
+                };
+                times.insert(num(row, "seq")?, time);
+                Ok(())
+            })
+            .await?;
+            Ok(times)
+        })
+    }
+
+    /// What `camera` lost, in stream order: from the last time that is good to the first time after, over the ends of legs too.
+    /// Losses between which no time came are one.
+    ///
+    /// # Errors
+    /// When the file is damaged.
+    pub fn losses(&self, camera: CameraId) -> Result<Vec<Loss>, RecorderError> {
+        let mut losses = Vec::new();
+        let (mut last_us, mut open) = (None, None::<Loss>);
+        for chunk in self.chunk_index(camera)? {
+            if chunk.lost_before > 0 {
+                let told_us = chunk.lost_time.and_then(|t| t.from_us);
+                let loss = open.get_or_insert(Loss {
+                    seq: chunk.seq,
+                    bytes: 0,
+                    time: LostTime {
+                        from_us: last_us,
+                        to_us: None,
+                    },
+                });
+                loss.bytes = loss.bytes.saturating_add(chunk.lost_before);
+                // A device may know that it began earlier.
+                let from_us = [loss.time.from_us, told_us];
+                loss.time.from_us = from_us.into_iter().flatten().min();
+            }
+            if let (Some(first), Some(last)) = (chunk.facts.first_us, chunk.facts.last_us) {
+                if let Some(mut loss) = open.take() {
+                    loss.time.to_us = Some(first);
+                    losses.push(loss);
+                }
+                last_us = Some(last);
+            }
+        }
+        losses.extend(open);
+        Ok(losses)
+    }
+
+    /// Camera-time intervals `(from_us, to_us)` in which bytes of `camera` were lost, as [`Self::losses`]; 0 and `u64::MAX` where an
+    /// end is not known.
     ///
     /// # Errors
     /// When the file is damaged.
     pub fn gaps(&self, camera: CameraId) -> Result<Vec<(u64, u64)>, RecorderError> {
-        let mut gaps = Vec::new();
-        let (mut last_us, mut lost) = (0, false);
-        for chunk in self.chunk_index(camera)? {
-            lost |= chunk.lost_before > 0;
-            if let (Some(first), Some(last)) = (chunk.facts.first_us, chunk.facts.last_us) {
-                if lost {
-                    gaps.push((last_us, first));
-                }
-                (last_us, lost) = (last, false);
-            }
-        }
-        if lost {
-            gaps.push((last_us, u64::MAX));
-        }
-        Ok(gaps)
+        let losses = self.losses(camera)?;
+        Ok(losses.iter().map(|loss| loss.time.bounds_us()).collect())
     }
 
     /// The trigger edges of `camera`, in stream order, all channels.

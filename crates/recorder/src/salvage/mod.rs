@@ -8,6 +8,7 @@
 mod cells;
 mod fill;
 mod gather;
+mod missing;
 mod pages;
 mod shapes;
 

@@ -29,7 +29,7 @@ const fn kind(name: &'static str, least: usize, insert: &'static str) -> Kind {
 }
 
 /// In the order in which rows refer to one another.
-pub const KINDS: [Kind; 18] = [
+pub const KINDS: [Kind; 19] = [
     kind(
         "session",
         20,
@@ -85,6 +85,7 @@ pub const KINDS: [Kind; 18] = [
             "INSERT INTO chunk VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
         )
     },
+    kind("gap", 4, "INSERT INTO gap VALUES (?, ?, ?, ?)"),
     kind(
         "trigger_edge",
         6,

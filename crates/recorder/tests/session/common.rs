@@ -20,6 +20,10 @@ impl ChunkScanner for Evt2 {
         self.origin_us[camera.index()] = origin_us;
     }
 
+    fn lost(&mut self, camera: CameraId, _format: StreamFormat, _bytes: u64) {
+        self.base[camera.index()] = None;
+    }
+
     fn scan(
         &mut self,
         camera: CameraId,
@@ -299,6 +303,7 @@ fn attempts(ids: &[AttemptId], out: &mut Vec<Record>) -> HostTime {
                 } else {
                     0
                 },
+                lost_from_us: None,
                 bytes,
                 facts,
                 triggers,

@@ -64,6 +64,7 @@ fn write_until_killed(path: &Path, acknowledged: usize) -> Result<(), RecorderEr
                 seq,
                 host_time: HostTime(1_000_000_000 + n as i64),
                 lost_before: 0,
+                lost_from_us: None,
                 bytes,
                 facts,
                 triggers,

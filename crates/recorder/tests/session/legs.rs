@@ -347,6 +347,7 @@ fn a_session_of_an_older_schema_goes_on() {
             &[
                 "DROP TABLE preflight",
                 "DROP TABLE leg",
+                "DROP TABLE gap",
                 "ALTER TABLE attempt DROP COLUMN touched_mm",
                 "DELETE FROM _sqlx_migrations WHERE version > 20261121120000",
                 "PRAGMA user_version = 2",

@@ -4,6 +4,7 @@
 mod common;
 mod crash;
 mod damage;
+mod gaps;
 mod legs;
 mod python;
 mod readers;

@@ -259,6 +259,7 @@ fn lost_chunks_and_nan_positions_are_never_taken() {
         seq: 1,
         host_time: HostTime(0),
         lost_before: 0,
+        lost_from_us: None,
         bytes: vec![],
         facts: ChunkFacts::default(),
         triggers: vec![],

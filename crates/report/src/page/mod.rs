@@ -178,7 +178,7 @@ pub(crate) fn render(input: &ReportInput<'_>) -> Result<String, ReportError> {
             .map(|n| context! { t => number(Some(n.t_s), 1), text => n.text.clone() })
             .collect::<Vec<_>>(),
         losses => p.lost_bytes.iter().enumerate().filter(|(_, b)| **b > 0)
-            .map(|(i, b)| context! { camera => i + 1, bytes => grouped(*b) })
+            .map(|(i, b)| context! { camera => i + 1, bytes => grouped(*b), times => crate::course::losses(p, i) })
             .collect::<Vec<_>>(),
         rejections => rejections(a, false),
         sync_rejections => rejections(a, true),

@@ -308,7 +308,10 @@ pub(crate) fn table(input: &ReportInput<'_>, color: bool) -> String {
         out += &studies::calibration(a);
     }
     for (i, lost) in p.lost_bytes.iter().enumerate().filter(|(_, l)| **l > 0) {
-        let text = format!("camera {}: {} bytes lost", i + 1, grouped(*lost));
+        let mut text = format!("camera {}: {} bytes lost", i + 1, grouped(*lost));
+        for time in crate::course::losses(p, i) {
+            text += &format!("; {time}");
+        }
         out += &paint.warn(&wrap("loss      ", &text));
     }
     for leg in p.several_legs() {

@@ -4,7 +4,9 @@ pub mod studies;
 
 use skinrig_analysis::result::*;
 use skinrig_model::*;
-use skinrig_report::{DeviceRow, InterruptionRow, LegRow, NoteRow, Provenance, RetakenRow};
+use skinrig_report::{
+    DeviceRow, InterruptionRow, LegRow, LossRow, NoteRow, Provenance, RetakenRow,
+};
 
 /// A small generator (SplitMix64): the report needs no better one.
 pub struct Noise(pub u64);
@@ -525,6 +527,14 @@ pub fn provenance() -> Provenance {
             text: "blinds closed".into(),
         }],
         lost_bytes: [0, 4096],
+        losses: vec![LossRow {
+            camera: 2,
+            bytes: 4096,
+            time: LostTime {
+                from_us: Some(61_250_000),
+                to_us: Some(61_262_500),
+            },
+        }],
     }
 }
 

@@ -48,6 +48,10 @@ impl ChunkScanner for Rescan {
         scanner.restart(origin_us);
     }
 
+    fn lost(&mut self, camera: CameraId, _format: StreamFormat, bytes: u64) {
+        self.0[camera.index()].lost(bytes);
+    }
+
     fn scan(
         &mut self,
         camera: CameraId,

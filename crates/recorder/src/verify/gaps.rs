@@ -1,0 +1,70 @@
+//! The time that was lost, held against the times of the chunks around it.
+
+use skinrig_model::CameraId;
+
+use super::VerifyReport;
+use crate::rows::ChunkMeta;
+
+/// A gap belongs to a chunk after lost bytes, begins with the last time before it or earlier, and ends with the first time after it in
+/// its leg. What a salvage took out may widen what lies around it, never narrow it.
+pub fn check(camera: CameraId, index: &[ChunkMeta], report: &mut VerifyReport) {
+    let mut after_us = None;
+    // From the end: the first time at or after each chunk, within its leg.
+    for (n, meta) in index.iter().enumerate().rev() {
+        after_us = meta.facts.first_us.or(after_us);
+        if let Some(time) = meta.lost_time {
+            let place = format!("gap before {camera} chunk {}", meta.seq);
+            if meta.lost_before == 0 {
+                report.add(format!("{place}: expected lost bytes, found none"));
+            }
+            let ends = match (time.to_us, after_us) {
+                (Some(to), Some(after)) => to <= after,
+                (to, None) => to.is_none() || n + 1 < index.len(),
+                (None, Some(_)) => false,
+            };
+            if !ends {
+                report.add(format!(
+                    "{place}: expected it to end with the first time after it, {} µs, found {}",
+                    words(after_us),
+                    words(time.to_us)
+                ));
+            }
+            let in_leg = index[..n].iter().rev();
+            let before_us = match meta.restart_us {
+                Some(_) => None,
+                None => last_time(in_leg),
+            };
+            let begins = match (time.from_us, before_us) {
+                (Some(from), Some(before)) => {
+                    from <= before || time.to_us.is_some_and(|to| from <= to)
+                }
+                (Some(_), None) => n > 0,
+                (None, before) => before.is_none(),
+            };
+            if !begins {
+                report.add(format!(
+                    "{place}: expected it to begin with the last time before it, {} µs, or earlier, found {}",
+                    words(before_us),
+                    words(time.from_us)
+                ));
+            }
+        }
+        if meta.restart_us.is_some() {
+            after_us = None;
+        }
+    }
+}
+
+/// The last time of these chunks, the latest first, up to the beginning of their leg.
+fn last_time<'a>(chunks: impl Iterator<Item = &'a ChunkMeta>) -> Option<u64> {
+    for chunk in chunks {
+        if chunk.facts.last_us.is_some() || chunk.restart_us.is_some() {
+            return chunk.facts.last_us;
+        }
+    }
+    None
+}
+
+fn words(us: Option<u64>) -> String {
+    us.map_or_else(|| "none".to_owned(), |us| us.to_string())
+}
