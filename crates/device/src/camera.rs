@@ -119,4 +119,14 @@ pub trait EventCamera: Send {
     /// time that were let go at the start, jumps of the camera's time base, its own overflow counter. A camera that
     /// notices nothing of the kind has none.
     fn take_notes(&mut self, _notes: &mut Vec<String>) {}
+
+    /// Temperature of the camera, °C, at the present; of which part of it the implementation says. `None` from a camera that
+    /// cannot tell: it is not asked again. Allowed in every state; asked at most once a second, for it may take a request to
+    /// the device.
+    ///
+    /// # Errors
+    /// [`DeviceError::Lost`] when a camera that could tell does not answer.
+    fn temperature_c(&mut self) -> Result<Option<f64>, DeviceError> {
+        Ok(None)
+    }
 }

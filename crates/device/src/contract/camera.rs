@@ -73,8 +73,19 @@ fn camera_states(
         DeviceError::State { .. },
         "camera: configure while streaming must be a State error"
     );
+    let hot = camera
+        .temperature_c()
+        .expect("camera: temperature while streaming");
     camera.stop(&mut chunks).expect("camera: stop");
     camera.stop(&mut chunks).expect("camera: stop twice");
+    let cold = camera
+        .temperature_c()
+        .expect("camera: temperature while stopped");
+    assert_eq!(
+        hot.map(f64::is_finite),
+        cold.map(|_| true),
+        "camera: it tells a temperature in every state or in none, found {hot:?} and {cold:?}"
+    );
     camera
         .configure(settings)
         .expect("camera: configure after stop");

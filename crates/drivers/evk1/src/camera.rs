@@ -7,8 +7,8 @@ use skinrig_device::{
     CameraCapabilities, CameraSettings, Clock, DeviceError, EventCamera, RealClock, SyncMode,
 };
 use skinrig_model::{
-    CameraId, DeviceIdentity, DeviceRole, HostDuration, RawChunk, SENSOR_HEIGHT, SENSOR_WIDTH,
-    Setting, StreamFormat,
+    CameraId, DeviceIdentity, DeviceRole, HostDuration, HostTime, RawChunk, SENSOR_HEIGHT,
+    SENSOR_WIDTH, Setting, StreamFormat,
 };
 
 use crate::access::Registers;
@@ -46,8 +46,30 @@ pub struct Evk1 {
 /// What exists only while streaming.
 struct Stream {
     inbox: Arc<Inbox>,
+    /// The overflow counter before the start.
     overflow_hits: u16,
+    overflow: Overflow,
 }
+
+/// What the camera's overflow counter said last.
+#[derive(Debug, Clone, Copy)]
+struct Overflow {
+    hits: u16,
+    read_at: HostTime,
+    /// The camera's time that had come by then, µs.
+    good_us: Option<u64>,
+}
+
+impl Overflow {
+    /// Whether something may have been lost since, now that the counter says `hits`. At its end it cannot tell.
+    const fn lost(self, hits: u16) -> bool {
+        hits != self.hits || hits == u16::MAX
+    }
+}
+
+/// How often the overflow counter is read while streaming; whoever flushes, as before a verdict on what was recorded, has it read at
+/// once.
+const OVERFLOW_PERIOD: HostDuration = HostDuration::from_millis(1_000);
 
 impl Evk1 {
     /// Opens the camera with this serial number (8 hexadecimal digits) through libusb. What it sends is stamped on
@@ -138,14 +160,6 @@ impl Evk1 {
             ));
         }
         triggers::write_out(&mut self.registers(), pulses)
-    }
-
-    /// Temperature of the board, °C.
-    ///
-    /// # Errors
-    /// [`Evk1Error::Usb`].
-    pub fn temperature_c(&mut self) -> Result<f64, Evk1Error> {
-        Ok(f64::from(self.registers().get(TEMPERATURE)?) / 4096.0)
     }
 
     /// Stops, powers the camera down, empties its buffers and gives it free. Every step is taken whatever became of those
@@ -294,9 +308,22 @@ impl Evk1 {
             self.undo_start();
             return Err(error);
         }
+        // What the start itself made overflow is not lost: nothing of it was awaited.
+        let hits = match registers.read(OVERFLOW_HITCOUNT) {
+            Ok(hits) => hits as u16,
+            Err(error) => {
+                self.undo_start();
+                return Err(error);
+            }
+        };
         self.stream = Some(Stream {
             inbox,
             overflow_hits,
+            overflow: Overflow {
+                hits,
+                read_at: self.clock.now(),
+                good_us: None,
+            },
         });
         Ok(())
     }
@@ -323,8 +350,57 @@ impl Evk1 {
         }
     }
 
+    /// Hands over what has come, and a loss that the camera itself counted.
+    fn try_take(&mut self, all: bool, chunks: &mut Vec<RawChunk>) -> Result<(), Evk1Error> {
+        let Some(mut stream) = self.stream.take() else {
+            return Ok(());
+        };
+        let now = self.clock.now();
+        let due = self.config.overflow_is_loss
+            && (all || now - stream.overflow.read_at >= OVERFLOW_PERIOD);
+        // Read before the bytes are taken: what it counts was lost among those that have come, or is about to be missed.
+        let hits = match due {
+            true => self.registers().read(OVERFLOW_HITCOUNT).map(|w| w as u16),
+            false => Ok(stream.overflow.hits),
+        };
+        let lost = due && hits.as_ref().is_ok_and(|h| stream.overflow.lost(*h));
+        let taken = match all || lost {
+            true => stream.inbox.take_all(),
+            false => stream.inbox.take_full(),
+        };
+        let mut received = self.hand_over(taken, chunks);
+        match hits {
+            Ok(hits) if due => {
+                self.follow_overflow(&mut stream.overflow, hits, now, chunks);
+            }
+            Ok(_) => {}
+            Err(error) => received = received.and(Err(error)),
+        }
+        self.stream = Some(stream);
+        received
+    }
+
+    /// The overflow counter is `hits` at `now`.
+    fn follow_overflow(
+        &mut self,
+        last: &mut Overflow,
+        hits: u16,
+        now: HostTime,
+        chunks: &mut Vec<RawChunk>,
+    ) {
+        if last.lost(hits) {
+            let report = &mut self.report;
+            self.chunker.overflowed(now, last.good_us, report, chunks);
+        }
+        *last = Overflow {
+            hits,
+            read_at: now,
+            good_us: self.chunker.reached_us(),
+        };
+    }
+
     fn try_stop(&mut self, chunks: &mut Vec<RawChunk>) -> Result<(), Evk1Error> {
-        let Some(stream) = self.stream.take() else {
+        let Some(mut stream) = self.stream.take() else {
             return Ok(());
         };
         let back = self.transport.stop_stream();
@@ -336,6 +412,10 @@ impl Evk1 {
             }) => Ok(()),
             _ => self.stop_device(stream.overflow_hits),
         };
+        if let (true, Some((_, hits))) = (self.config.overflow_is_loss, self.report.overflow_hits) {
+            let now = self.clock.now();
+            self.follow_overflow(&mut stream.overflow, hits, now, chunks);
+        }
         self.notes.extend(self.report.notes());
         received?;
         back.map_err(|e| e.during("stopping the stream"))?;
@@ -384,19 +464,11 @@ impl EventCamera for Evk1 {
     }
 
     fn poll(&mut self, chunks: &mut Vec<RawChunk>) -> Result<(), DeviceError> {
-        let Some(stream) = &self.stream else {
-            return Ok(());
-        };
-        let taken = stream.inbox.take_full();
-        self.hand_over(taken, chunks).map_err(|e| self.fault(e))
+        self.try_take(false, chunks).map_err(|e| self.fault(e))
     }
 
     fn flush(&mut self, chunks: &mut Vec<RawChunk>) -> Result<(), DeviceError> {
-        let Some(stream) = &self.stream else {
-            return Ok(());
-        };
-        let taken = stream.inbox.take_all();
-        self.hand_over(taken, chunks).map_err(|e| self.fault(e))
+        self.try_take(true, chunks).map_err(|e| self.fault(e))
     }
 
     fn stop(&mut self, chunks: &mut Vec<RawChunk>) -> Result<(), DeviceError> {
@@ -405,6 +477,13 @@ impl EventCamera for Evk1 {
 
     fn take_notes(&mut self, notes: &mut Vec<String>) {
         notes.append(&mut self.notes);
+    }
+
+    /// Of the board's own sensor, in steps of 1/4096 °C (OpenEB 3.1.2, `gen31_monitoring.cpp`).
+    fn temperature_c(&mut self) -> Result<Option<f64>, DeviceError> {
+        let read = self.registers().get(TEMPERATURE);
+        let steps = read.map_err(|e| self.fault(e))?;
+        Ok(Some(f64::from(steps) / 4096.0))
     }
 }
 

@@ -19,7 +19,10 @@ pub struct Chunker {
     watch: Watch,
     /// Nothing of this stream has a time yet.
     fresh: bool,
+    /// The first time of this stream.
+    began_us: Option<u64>,
     last_us: u64,
+    last_arrival: HostTime,
     max_step_us: Option<u64>,
 }
 
@@ -36,7 +39,9 @@ impl Chunker {
             after_loss: false,
             watch: Watch::default(),
             fresh: true,
+            began_us: None,
             last_us: 0,
+            last_arrival: HostTime(i64::MIN),
             max_step_us,
         }
     }
@@ -50,7 +55,38 @@ impl Chunker {
         };
         self.after_loss = false;
         self.fresh = true;
+        self.began_us = None;
         self.watch.reset();
+    }
+
+    /// The last time of this stream, µs.
+    #[must_use]
+    pub fn reached_us(&self) -> Option<u64> {
+        (!self.fresh).then_some(self.last_us)
+    }
+
+    /// The camera told at `at` that it lost words since its time was `good_us`, or since the stream began: how many, and where among
+    /// those that came since, nobody knows.
+    pub fn overflowed(
+        &mut self,
+        at: HostTime,
+        good_us: Option<u64>,
+        report: &mut StreamReport,
+        chunks: &mut Vec<RawChunk>,
+    ) {
+        report.overflow_gaps += 1;
+        report.lost_bytes += WORD as u64;
+        if self.gate == Gate::Open {
+            self.gate = Gate::AwaitTime;
+            self.after_loss = true;
+        }
+        self.watch.reset();
+        let from_us = good_us.or(self.began_us);
+        let arrived = at.max(self.last_arrival);
+        self.hand_over(Vec::new(), arrived, WORD as u64, report, chunks);
+        if let Some(told) = chunks.last_mut() {
+            told.lost_from_us = from_us;
+        }
     }
 
     /// True once words carry a time that counts.
@@ -119,11 +155,13 @@ impl Chunker {
     ) {
         self.watch
             .look(&bytes, arrived, |jump| report.add_jump(jump));
+        self.scanner.lost(lost);
         let (facts, triggers) = self.scanner.push(&bytes);
         if let (Some(first), Some(last)) = (facts.first_us, facts.last_us) {
             if std::mem::replace(&mut self.fresh, false) && first < self.last_us {
                 report.restarted = Some((self.last_us, first));
             }
+            self.began_us.get_or_insert(first);
             self.last_us = last;
         }
         chunks.push(RawChunk {
@@ -131,10 +169,12 @@ impl Chunker {
             seq: self.seq,
             host_time: arrived,
             lost_before: lost,
+            lost_from_us: None,
             bytes,
             facts,
             triggers,
         });
+        self.last_arrival = arrived;
         self.seq += 1;
     }
 }

@@ -24,6 +24,9 @@ pub struct Evk1Config {
     /// Longest step of the time base, µs, that is no loss. `None`: steps are noted and nothing more, because how often
     /// an EVK1 sends its time base is not public.
     pub max_time_step_us: Option<u64>,
+    /// Whether a step of the camera's overflow counter is a loss of at least one word. False: it is noted at the end and nothing
+    /// more, because what the counter of a real EVK1 counts is not public.
+    pub overflow_is_loss: bool,
 }
 
 impl Default for Evk1Config {
@@ -36,6 +39,7 @@ impl Default for Evk1Config {
             transfer_timeout: Duration::from_millis(100),
             read_back_exceptions: Vec::new(),
             max_time_step_us: None,
+            overflow_is_loss: true,
         }
     }
 }

@@ -162,9 +162,9 @@ pub const IMAGE_SIZE: Register = register("IMAGE_SIZE", 0x003e, 0x0280_01e0);
 pub const EXT_TEMP_CONTROL: Register = register("EXT_TEMP_CONTROL", 0x0148, 0);
 /// Reads the board's temperature sensor.
 pub const EXT_TEMP_MONITOR_SPI_EN: Field = bit(EXT_TEMP_CONTROL, "EXT_TEMP_MONITOR_SPI_EN", 2);
-/// The board's temperature.
+/// The board's temperature; a sign is not known.
 pub const EVK_EXT_TEMP_VALUE: Register = volatile("EVK_EXT_TEMP_VALUE", 0x014c, 0, 0);
-/// 1/4096 °C.
+/// In 1/4096 °C.
 pub const TEMPERATURE: Field = field(EVK_EXT_TEMP_VALUE, "EVK_EXT_TEMP_VALUE", 0, 22);
 /// Trigger inputs: bit n enables channel n.
 pub const EXT_TRIGGERS_ENABLE: Register = register("EXT_TRIGGERS/ENABLE", 0x01a0, 0);

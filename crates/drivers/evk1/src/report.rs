@@ -26,6 +26,9 @@ pub struct StreamReport {
     /// How often it made a step that counts as a loss, see [`crate::Evk1Config::max_time_step_us`]; each is a word in
     /// `lost_bytes`, for how many it was is not known.
     pub time_gaps: u64,
+    /// How often the overflow counter was found to have counted on, which counts as a loss, see
+    /// [`crate::Evk1Config::overflow_is_loss`]; each is a word in `lost_bytes`, for how many it was is not known.
+    pub overflow_gaps: u64,
     /// How often the time base jumped by more than one count, or back: the camera itself has lost something.
     pub jump_count: u64,
     /// The first jumps.
@@ -80,6 +83,12 @@ impl StreamReport {
             notes.push(format!(
                 "{} steps of the time base were longer than allowed: the camera lost events, how many is not known",
                 self.time_gaps
+            ));
+        }
+        if self.overflow_gaps > 0 {
+            notes.push(format!(
+                "the camera's overflow counter was seen to count on {} times: the camera lost events, how many is not known",
+                self.overflow_gaps
             ));
         }
         if let Some(first) = self.jumps.first() {

@@ -153,12 +153,14 @@ impl Evt3Camera {
             return;
         }
         let bytes = mem::take(&mut self.filling.bytes);
+        self.scanner.lost(self.filling.lost_before);
         let (facts, triggers) = self.scanner.push(&bytes);
         chunks.push(RawChunk {
             camera: self.camera,
             seq: self.filling.seq,
             host_time: self.filling.arrived,
             lost_before: mem::take(&mut self.filling.lost_before),
+            lost_from_us: None,
             bytes,
             facts,
             triggers,

@@ -151,6 +151,7 @@ fn camera(f: &Field, places: &Places<'_>, out: &mut Collector) -> Option<CameraS
         max_time_high_gap_us: f
             .quantity("max_time_high_gap")
             .map(|s| (s * 1e6).round() as u64),
+        overflow_is_loss: f.word("overflow_counter")? == "loss",
         sync,
         trigger_channel,
         geometry,

@@ -209,6 +209,8 @@ pub struct CameraSetup {
     pub read_back_exceptions: Vec<u32>,
     /// Longest step of the time base that is no loss, µs; `None`: steps are only noted.
     pub max_time_high_gap_us: Option<u64>,
+    /// Whether a step of the camera's overflow counter is a loss; otherwise it is only noted.
+    pub overflow_is_loss: bool,
     /// Threshold of the sensor's activity gate, events per second.
     pub noise_filter_ev_s: Option<u32>,
     /// Whose time base it follows.

@@ -339,6 +339,9 @@ impl Inner {
                 };
                 self.world.edge(serial, edge);
             }
+            Order::Temperature(steps) => {
+                camera?.lock().set_temperature(steps);
+            }
             Order::Observe => {
                 let counters = camera?.lock().counters;
                 let handed = plugged.queues.handed();

@@ -106,6 +106,8 @@ pub enum Order {
     Journal,
     /// Tell the value of a register, without a request.
     Register(u32),
+    /// Let the board have this temperature, in 1/4096 °C.
+    Temperature(u32),
 }
 
 /// The answer to an order.

@@ -133,3 +133,24 @@ fn a_register_that_cannot_be_read_has_no_value() {
         }
     });
 }
+
+#[test]
+fn the_temperature_is_that_of_the_board_in_every_state() {
+    let test = "settings::the_temperature_is_that_of_the_board_in_every_state";
+    on_bus(test, vec![noise(FIRST).into()], |remote| {
+        let mut camera = open(FIRST);
+        assert_eq!(camera.temperature_c().unwrap(), Some(25.0));
+        camera.start().unwrap();
+        // Bits beyond the field are not part of it.
+        let steps = 61 << 12 | 1 << 10;
+        remote
+            .order(FIRST, Order::Temperature(1 << 30 | steps))
+            .unwrap();
+        assert_eq!(camera.temperature_c().unwrap(), Some(61.25));
+        camera.stop(&mut Vec::new()).unwrap();
+        remote.order(FIRST, Order::FailReads(true)).unwrap();
+        let lost = camera.temperature_c().unwrap_err();
+        assert!(lost.to_string().contains("EVK_EXT_TEMP_VALUE"), "{lost}");
+        remote.order(FIRST, Order::FailReads(false)).unwrap();
+    });
+}

@@ -27,6 +27,17 @@ fn start_stop_and_close_follow_the_golden_trace() {
     insta::assert_snapshot!("start_stop_close", bench.trace());
 }
 
+#[test]
+fn a_temperature_is_one_read_and_changes_nothing() {
+    let bench = Bench::new();
+    let mut camera = bench.open().unwrap();
+    let sensor = r::EVK_EXT_TEMP_VALUE.address;
+    bench.model().registers.insert(sensor, 0x0003_6c00);
+    bench.trace();
+    assert_eq!(camera.temperature_c().unwrap(), Some(54.75));
+    insta::assert_snapshot!(bench.trace(), @"014c EVK_EXT_TEMP_VALUE is 00036c00");
+}
+
 /// The values that a device receives that starts from the public defaults.
 #[test]
 fn the_fpga_receives_the_values_of_the_public_driver() {

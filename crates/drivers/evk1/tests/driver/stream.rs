@@ -213,7 +213,69 @@ fn the_overflow_counter_is_read_around_the_stream() {
         .insert(r::OVERFLOW_HITCOUNT.address, 9);
     camera.stop(&mut Vec::new()).unwrap();
     assert_eq!(camera.report().overflow_hits, Some((7, 9)));
-    assert!(camera.report().notes()[0].contains("from 7 to 9"));
+    let notes = camera.report().notes().join("\n");
+    assert!(notes.contains("from 7 to 9"), "{notes}");
+}
+
+/// Whoever flushes knows of an overflow up to now; otherwise it is looked for once a second. The gap goes back to the reading before.
+#[test]
+fn a_step_of_the_overflow_counter_is_a_gap() {
+    let bench = Bench::new();
+    let mut camera = bench.open().unwrap();
+    let count = |hits: u32| {
+        let counter = r::OVERFLOW_HITCOUNT.address;
+        bench.model().registers.insert(counter, hits);
+    };
+    camera.start().unwrap();
+    let mut chunks = Vec::new();
+    bench.pass(100);
+    camera.flush(&mut chunks).unwrap();
+    let good_us = chunks.last().unwrap().facts.last_us;
+    assert!(chunks.iter().all(|c| c.lost_before == 0));
+    bench.pass(50);
+    count(0xfff0);
+    bench.pass(50);
+    let before = chunks.len();
+    camera.poll(&mut chunks).unwrap();
+    assert_eq!(chunks.len(), before, "not looked for yet");
+    camera.flush(&mut chunks).unwrap();
+    let told = chunks.last().unwrap();
+    assert_eq!((told.lost_before, told.lost_from_us), (4, good_us));
+    let told_at = chunks.len();
+    bench.pass(100);
+    camera.flush(&mut chunks).unwrap();
+    assert_eq!(chunks[told_at].bytes[3] >> 4, 8, "time comes first");
+    // It wraps, and is found without a flush.
+    count(3);
+    bench.pass(1_100);
+    camera.poll(&mut chunks).unwrap();
+    assert_eq!(chunks.last().unwrap().lost_before, 4);
+    count(4);
+    camera.stop(&mut chunks).unwrap();
+    assert_eq!(camera.report().overflow_gaps, 3);
+    assert!(chunks.is_sorted_by_key(|c| c.host_time));
+    let lost: u64 = chunks.iter().map(|c| c.lost_before).sum();
+    assert_eq!(lost, camera.report().lost_bytes);
+}
+
+#[test]
+fn an_overflow_counter_that_counts_otherwise_is_only_noted() {
+    let bench = Bench::new();
+    let config = Evk1Config {
+        overflow_is_loss: false,
+        ..Evk1Config::default()
+    };
+    let mut camera = bench.open_with(config).unwrap();
+    camera.start().unwrap();
+    let counter = r::OVERFLOW_HITCOUNT.address;
+    bench.model().registers.insert(counter, 9);
+    let mut chunks = Vec::new();
+    bench.pass(1_100);
+    camera.flush(&mut chunks).unwrap();
+    camera.stop(&mut chunks).unwrap();
+    assert!(chunks.iter().all(|c| c.lost_before == 0));
+    let notes = camera.report().notes().join("\n");
+    assert!(notes.contains("from 0 to 9"), "{notes}");
 }
 
 #[test]

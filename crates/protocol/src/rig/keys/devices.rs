@@ -217,6 +217,12 @@ static CAMERA: Table = Table {
             "EVK1: a longer step of the camera's time base counts as lost data, and spoils the press. Absent: steps are noted at the end, because how often a real camera sends its time base is not published.",
         ),
         default(
+            "overflow_counter",
+            Shape::Choice(OVERFLOWS),
+            "loss",
+            "EVK1: what a step of the camera's overflow counter is. What the counter of a real camera counts is not published; one that counts without a loss, which spoils presses for nothing, is set to `note`.",
+        ),
+        default(
             "read_back_exceptions",
             Shape::List {
                 of: &Shape::Text,
@@ -261,6 +267,14 @@ const MODELS: &[Word] = &[
         "silky_vga",
         "CenturyArks SilkyEvCam VGA, as `evk3_hd`; no biases either",
     ),
+];
+
+const OVERFLOWS: &[Word] = &[
+    (
+        "loss",
+        "lost data: a gap of the session, and the press is spoilt",
+    ),
+    ("note", "a note at the end of the session"),
 ];
 
 const SYNC_MODES: &[Word] = &[

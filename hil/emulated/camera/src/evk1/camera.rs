@@ -74,6 +74,11 @@ pub struct Model {
 }
 
 impl Model {
+    /// Sets what the board's temperature sensor reports, in 1/4096 °C.
+    pub fn set_temperature(&mut self, steps: u32) {
+        self.registers.set(r::TEMPERATURE, steps);
+    }
+
     fn is_running(&self, run: u64) -> bool {
         !self.unplugged && self.running.is_some_and(|(number, ..)| number == run)
     }
