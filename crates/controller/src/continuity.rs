@@ -6,6 +6,7 @@ use skinrig_model::{CameraId, HostDuration, HostTime, RawChunk, Record};
 use crate::core::{Collect, Core};
 use crate::error::{ControllerError, Halt};
 use crate::press::cleared_at;
+use crate::verdict::Spoilt;
 
 /// How fast two clocks may drift apart: far beyond any quartz, parts per million.
 const DRIFT_PPM: i64 = 1_000;
@@ -18,6 +19,8 @@ pub(crate) struct Continuity {
     /// When camera time came last, and how far that time then was ahead of the host's at most, µs: bytes come late at times,
     /// but never early.
     ahead: Option<(HostTime, i64)>,
+    /// The last camera time that came, µs.
+    last_us: Option<i64>,
     /// The last bytes came late.
     late: bool,
 }
@@ -43,6 +46,7 @@ impl Continuity {
         let Some(camera_us) = chunk.facts.last_us.and_then(|us| i64::try_from(us).ok()) else {
             return Pace::Even;
         };
+        self.last_us = Some(camera_us);
         let ahead_us = camera_us - t.0 / 1_000;
         let Some((before, most_us)) = self.ahead else {
             self.ahead = Some((t, ahead_us));
@@ -61,11 +65,21 @@ impl Continuity {
             Pace::Even
         }
     }
+
+    /// Up to when, by the host's clock, the stream tells what the camera saw. By the camera's own time where it tells one: bytes that
+    /// come late tell of an earlier time than that at which they came. A delay that was there from the first byte on is not seen.
+    pub(crate) fn reached(&self) -> Option<HostTime> {
+        match (self.last_us, self.ahead) {
+            (Some(last_us), Some((_, ahead_us))) => Some(HostTime((last_us - ahead_us) * 1_000)),
+            _ => self.arrived,
+        }
+    }
 }
 
 impl Core<'_> {
-    /// Looks at the time of a chunk that came. Data that come late spoil the press under way; a clock that was set forward ends
-    /// the run, for no later press could be placed in time: resumed, the session gets a clock of its own for what follows.
+    /// Looks at the time of a chunk that came. Data that come late are noted: the verdict on a press waits for them. A clock that was
+    /// set forward ends the run, for no later press could be placed in time: resumed, the session gets a clock of its own for what
+    /// follows.
     pub(crate) fn follow_stream(&mut self, chunk: &RawChunk) -> Result<(), ControllerError> {
         let Some(limit) = self.settings.camera_lag else {
             return Ok(());
@@ -83,48 +97,46 @@ impl Core<'_> {
                     "{camera}: expected data within {limit}, found them {} late",
                     HostDuration(us * 1_000)
                 );
-                self.with_open(|open| open.spoilt.push(text.clone()));
                 let t = chunk.host_time;
                 self.journal.emit(Record::Note { t, text })
             }
         }
     }
 
-    /// Waits until both cameras have delivered what they saw of the press; not for long.
+    /// Waits until both cameras have delivered what they saw of the press, so that what was lost of it is known before the verdict;
+    /// not for long.
     pub(crate) fn await_streams(&mut self) -> Result<(), Halt> {
-        let Some(limit) = self.settings.camera_lag else {
+        if self.settings.camera_lag.is_none() {
             return Ok(());
-        };
+        }
         let end = self.end_of_press();
+        let within = self.settings.data_within;
         self.collect(Collect::Flush)?;
-        while self.first_behind(end).is_some() && self.now() < end + limit {
+        while self.first_behind(end).is_some() && self.now() < end + within {
             self.tick(None)?;
             self.collect(Collect::Flush)?;
         }
-        // Told once, and true of every press until the stream has caught up.
         for camera in CameraId::ALL {
-            if self.continuity[camera.index()].late {
-                let text = format!("{camera}: expected data within {limit}, found them late");
-                self.with_open(|open| {
-                    if open.spoilt.is_empty() {
-                        open.spoilt.push(text);
-                    }
-                });
+            let reached = self.continuity[camera.index()].reached();
+            if reached.is_none_or(|t| t < end) {
+                let late = Spoilt::DataLate {
+                    camera,
+                    end,
+                    waited: within,
+                    reached,
+                };
+                self.with_open(|open| open.spoilt.push(late));
             }
-        }
-        if let Some(camera) = self.first_behind(end) {
-            let arrived = self.continuity[camera.index()].arrived;
-            let found = arrived.map_or("none".to_owned(), |t| format!("none after {t}"));
-            let text =
-                format!("{camera}: expected data up to {end}, the end of the press, found {found}");
-            self.with_open(|open| open.spoilt.push(text));
         }
         Ok(())
     }
 
     /// A camera whose stream has not come to `end`.
     fn first_behind(&self, end: HostTime) -> Option<CameraId> {
-        let behind = |c: &CameraId| self.continuity[c.index()].arrived.is_none_or(|t| t < end);
+        let behind = |c: &CameraId| {
+            let reached = self.continuity[c.index()].reached();
+            reached.is_none_or(|t| t < end)
+        };
         CameraId::ALL.into_iter().find(behind)
     }
 
@@ -145,9 +157,11 @@ impl Core<'_> {
             for camera in CameraId::ALL {
                 let rate = open.events[camera.index()] as f64 / seconds;
                 if rate > level {
-                    open.spoilt.push(format!(
-                        "{camera}: expected at most {level} ev/s during the press (`suspend.event_rate`), found {rate:.0} ev/s"
-                    ));
+                    open.spoilt.push(Spoilt::Storm {
+                        camera,
+                        level_ev_s: level,
+                        found_ev_s: rate,
+                    });
                 }
             }
         });
@@ -166,6 +180,7 @@ mod tests {
             seq: 0,
             host_time: HostTime(host_ms * 1_000_000),
             lost_before: 0,
+            lost_from_us: None,
             bytes: vec![0; 4],
             facts: ChunkFacts {
                 last_us: camera_ms.map(|ms| ms * 1_000),
@@ -189,6 +204,23 @@ mod tests {
         assert_eq!(see(63_100, Some(138_720)), Pace::Even, "told once");
         assert_eq!(see(64_000, Some(140_010)), Pace::Even);
         assert_eq!(see(65_000, Some(141_310)), Pace::Stepped(300_000));
+    }
+
+    /// Bytes that come late tell of the time at which the camera sent them.
+    #[test]
+    fn a_stream_has_come_as_far_as_its_own_time_tells() {
+        let limit = HostDuration::from_millis(250);
+        let mut stream = Continuity::default();
+        assert_eq!(stream.reached(), None);
+        stream.see(&chunk(900, None), limit);
+        assert_eq!(stream.reached(), Some(HostTime(900_000_000)));
+        stream.see(&chunk(1_000, Some(77_000)), limit);
+        assert_eq!(stream.reached(), Some(HostTime(1_000_000_000)));
+        // 300 ms late; half a millisecond may be drift.
+        stream.see(&chunk(1_500, Some(77_200)), limit);
+        assert_eq!(stream.reached(), Some(HostTime(1_200_500_000)));
+        stream.see(&chunk(1_501, None), limit);
+        assert_eq!(stream.reached(), Some(HostTime(1_200_500_000)));
     }
 
     #[test]

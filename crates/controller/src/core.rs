@@ -23,6 +23,7 @@ use crate::sink::RecordSink;
 use crate::states::{Event, Machine, State};
 use crate::suspend::Suspender;
 use crate::touch::TouchDetector;
+use crate::verdict::Spoilt;
 
 /// A press under way.
 pub(crate) struct OpenPress {
@@ -35,7 +36,7 @@ pub(crate) struct OpenPress {
     /// When its intent was made.
     pub(crate) began: HostTime,
     /// What spoilt its data, besides lost bytes.
-    pub(crate) spoilt: Vec<String>,
+    pub(crate) spoilt: Vec<Spoilt>,
 }
 
 /// Everything that a run holds. Dropped before its end, it brings the rig to rest first.

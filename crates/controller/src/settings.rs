@@ -18,9 +18,10 @@ pub struct ControllerSettings {
     pub speed_over: HostDuration,
     /// Longest time from arming the robot to the first sample of its pose stream.
     pub first_pose_within: HostDuration,
-    /// How far a camera's time may step away from the host's, and how long its stream may take to reach the end of a press;
-    /// not watched when absent.
+    /// How far a camera's time may step away from the host's; its stream is not watched when absent.
     pub camera_lag: Option<HostDuration>,
+    /// How long the verdict on a press may wait for what both cameras saw of it; then its data are late, and it is invalid.
+    pub data_within: HostDuration,
     /// Speed of motions that are not in the plan (rising from an unknown start, retracting after a
     /// fault), mm/s; never more than the plan's own limit.
     pub rise_speed_mm_s: f64,
@@ -41,6 +42,7 @@ impl Default for ControllerSettings {
             speed_over: HostDuration::from_millis(5),
             first_pose_within: HostDuration::from_millis(2_000),
             camera_lag: Some(HostDuration::from_millis(250)),
+            data_within: HostDuration::from_millis(1_000),
             rise_speed_mm_s: 20.0,
             rise_allowance: HostDuration::from_millis(3_000),
             mark_within: HostDuration::from_millis(1_000),

@@ -73,19 +73,49 @@ impl Hysteresis {
     }
 }
 
+/// What is measured.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Measure {
+    Storm,
+    Dark,
+    Loss,
+    Temperature,
+    Disk,
+}
+
+impl Measure {
+    /// Its name and unit.
+    const fn words(self) -> (&'static str, &'static str) {
+        match self {
+            Self::Storm => ("event rate", "ev/s"),
+            Self::Dark => ("dark scene: event rate", "ev/s"),
+            Self::Loss => ("lost data", "B/s"),
+            Self::Temperature => ("temperature", "°C"),
+            Self::Disk => ("free space", "B"),
+        }
+    }
+}
+
 /// One condition.
 #[derive(Debug, Clone)]
 struct Watched {
-    what: &'static str,
-    unit: &'static str,
+    measure: Measure,
     follow: Hysteresis,
+}
+
+/// What was measured over a window, besides what chunks tell.
+#[derive(Debug, Clone, Copy, Default)]
+struct Measured {
+    /// °C.
+    temperatures_c: [Option<f64>; 2],
+    free_b: Option<f64>,
 }
 
 /// All conditions of a run, and whether one of them holds it.
 #[derive(Debug)]
 pub(crate) struct Suspender {
     settings: Suspend,
-    /// Storm, dark, loss: for each camera; then the disk.
+    /// Storm, dark, loss, temperature: for each camera; then the disk.
     cameras: [Vec<Watched>; 2],
     disk: Option<Watched>,
     window_from: Option<HostTime>,
@@ -99,18 +129,18 @@ pub(crate) struct Suspender {
 
 impl Suspender {
     pub(crate) fn new(settings: Suspend) -> Self {
-        let watched = |what, unit, threshold: Option<Threshold>| {
+        let watched = |measure, threshold: Option<Threshold>| {
             threshold.map(|t| Watched {
-                what,
-                unit,
+                measure,
                 follow: Hysteresis::new(t, settings.resume_after),
             })
         };
         let of_camera = || {
             [
-                watched("event rate", "ev/s", settings.event_rate),
-                watched("dark scene: event rate", "ev/s", settings.dark),
-                watched("lost data", "B/s", settings.lost_bytes),
+                watched(Measure::Storm, settings.event_rate),
+                watched(Measure::Dark, settings.dark),
+                watched(Measure::Loss, settings.lost_bytes),
+                watched(Measure::Temperature, settings.temperature),
             ]
             .into_iter()
             .flatten()
@@ -118,7 +148,7 @@ impl Suspender {
         };
         Self {
             cameras: [of_camera(), of_camera()],
-            disk: watched("free space", "B", settings.disk_free),
+            disk: watched(Measure::Disk, settings.disk_free),
             settings,
             window_from: None,
             events: [0; 2],
@@ -146,7 +176,17 @@ impl Suspender {
     }
 
     fn is_asleep(&self) -> bool {
-        self.disk.is_none() && self.cameras[0].is_empty()
+        self.disk.is_none() && self.cameras.iter().all(Vec::is_empty)
+    }
+
+    fn watches_heat(&self, camera: CameraId) -> bool {
+        let watched = &self.cameras[camera.index()];
+        watched.iter().any(|w| w.measure == Measure::Temperature)
+    }
+
+    /// This camera cannot tell its temperature.
+    fn leave_heat(&mut self, camera: CameraId) {
+        self.cameras[camera.index()].retain(|w| w.measure != Measure::Temperature);
     }
 
     fn is_calm(&self) -> bool {
@@ -155,33 +195,33 @@ impl Suspender {
     }
 
     /// Takes a whole window; gives what tripped, in words.
-    fn judge(&mut self, t: HostTime, seconds: f64, free_b: Option<f64>) -> Option<String> {
+    fn judge(&mut self, t: HostTime, seconds: f64, measured: Measured) -> Option<String> {
         let mut words = None;
         let mut feed = |w: &mut Watched, of: &str, value: f64| {
             if w.follow.feed(t, value) == Some(Turn::Tripped) {
                 let Threshold { trip, .. } = w.follow.threshold;
                 let side = if value > trip { "at most" } else { "at least" };
+                let (what, unit) = w.measure.words();
                 words.get_or_insert_with(|| {
-                    format!(
-                        "{of}{}: expected {side} {trip} {unit}, found {value:.0} {unit}",
-                        w.what,
-                        unit = w.unit
-                    )
+                    format!("{of}{what}: expected {side} {trip} {unit}, found {value:.0} {unit}")
                 });
             }
         };
         for camera in CameraId::ALL {
             let i = camera.index();
             for w in &mut self.cameras[i] {
-                let count = if w.unit == "B/s" {
-                    self.lost[i]
-                } else {
-                    self.events[i]
+                let value = match w.measure {
+                    Measure::Storm | Measure::Dark => Some(self.events[i] as f64 / seconds),
+                    Measure::Loss => Some(self.lost[i] as f64 / seconds),
+                    Measure::Temperature => measured.temperatures_c[i],
+                    Measure::Disk => None,
                 };
-                feed(w, &format!("{camera}: "), count as f64 / seconds);
+                if let Some(value) = value {
+                    feed(w, &format!("{camera}: "), value);
+                }
             }
         }
-        if let (Some(disk), Some(free_b)) = (&mut self.disk, free_b) {
+        if let (Some(disk), Some(free_b)) = (&mut self.disk, measured.free_b) {
             feed(disk, "", free_b);
         }
         (self.events, self.lost) = ([0; 2], [0; 2]);
@@ -207,21 +247,12 @@ impl Core<'_> {
         // A chunk may take long to fill, and what it holds belongs to this window.
         self.collect(Collect::Flush)?;
         self.suspender.window_from = Some(now);
-        let mut free_b = None;
-        if self.suspender.disk.is_some() {
-            free_b = self.journal.free_bytes().map(|b| b as f64);
-            if free_b.is_none() {
-                self.suspender.disk = None;
-                let text = "suspend.disk_free: expected to know the free space, found nobody who tells it: not watched";
-                self.journal.emit(Record::Note {
-                    t: now,
-                    text: text.to_owned(),
-                })?;
-            }
-        }
-        let tripped = self
-            .suspender
-            .judge(now, (now - from).as_secs_f64(), free_b);
+        let measured = Measured {
+            temperatures_c: self.temperatures(now)?,
+            free_b: self.free_space(now)?,
+        };
+        let seconds = (now - from).as_secs_f64();
+        let tripped = self.suspender.judge(now, seconds, measured);
         if self.machine.state() == State::Running {
             self.suspender.holding = None; // the operator went on
         }
@@ -257,6 +288,43 @@ impl Core<'_> {
             return Err(ControllerError::Suspended { reason, limit }.into());
         }
         Ok(())
+    }
+
+    /// Asks the cameras that are watched for their temperature. A camera that does not answer is a fault, as in any other call.
+    fn temperatures(&mut self, t: HostTime) -> Result<[Option<f64>; 2], ControllerError> {
+        let mut found = [None; 2];
+        for camera in CameraId::ALL {
+            if !self.suspender.watches_heat(camera) {
+                continue;
+            }
+            let told = self.cameras[camera.index()].temperature_c()?;
+            if told.is_none() {
+                self.suspender.leave_heat(camera);
+                let text = format!(
+                    "suspend.temperature: expected {camera} to tell its temperature, found one that cannot: not watched"
+                );
+                self.journal.emit(Record::Note { t, text })?;
+            }
+            found[camera.index()] = told;
+        }
+        Ok(found)
+    }
+
+    /// The free space where the session is written, in bytes, when it is watched.
+    fn free_space(&mut self, t: HostTime) -> Result<Option<f64>, ControllerError> {
+        if self.suspender.disk.is_none() {
+            return Ok(None);
+        }
+        let free_b = self.journal.free_bytes().map(|b| b as f64);
+        if free_b.is_none() {
+            self.suspender.disk = None;
+            let text = "suspend.disk_free: expected to know the free space, found nobody who tells it: not watched";
+            self.journal.emit(Record::Note {
+                t,
+                text: text.to_owned(),
+            })?;
+        }
+        Ok(free_b)
     }
 
     fn interrupt(

@@ -1,6 +1,10 @@
 //! What becomes of an attempt, and whether another one may bring what it did not.
 
-use skinrig_model::{CameraId, Point3, PressOutcome, PressTiming, PressVerdict};
+use std::fmt;
+
+use skinrig_model::{
+    CameraId, HostDuration, HostTime, Point3, PressOutcome, PressTiming, PressVerdict,
+};
 
 use crate::core::OpenPress;
 use crate::moments::PressTracker;
@@ -36,6 +40,57 @@ impl Trouble {
     }
 }
 
+/// What spoilt the data of a press, besides lost bytes. All of it passes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Spoilt {
+    /// What a camera saw of the press had not come when the verdict could wait no longer.
+    DataLate {
+        camera: CameraId,
+        /// The end of the press.
+        end: HostTime,
+        /// How long the verdict waited.
+        waited: HostDuration,
+        /// Up to when the camera's data have come; `None`: none have.
+        reached: Option<HostTime>,
+    },
+    /// A camera sent more events per second than a storm has.
+    Storm {
+        camera: CameraId,
+        level_ev_s: f64,
+        found_ev_s: f64,
+    },
+}
+
+impl fmt::Display for Spoilt {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::DataLate {
+                camera,
+                end,
+                waited,
+                reached,
+            } => {
+                write!(
+                    f,
+                    "data late: {camera}: expected data up to {end}, the end of the press, within {waited}, found "
+                )?;
+                match reached {
+                    Some(t) => write!(f, "them up to {t}"),
+                    None => f.write_str("none"),
+                }
+            }
+            Self::Storm {
+                camera,
+                level_ev_s,
+                found_ev_s,
+            } => write!(
+                f,
+                "{camera}: expected at most {level_ev_s} ev/s during the press (`suspend.event_rate`), found {found_ev_s:.0} ev/s"
+            ),
+        }
+    }
+}
+
 /// The outcome of a press, valid only when all was measured, stayed in place and nothing was lost; and whether it is worth
 /// another attempt: when everything that is wrong passes.
 pub(crate) fn judge(open: &OpenPress, trouble: Option<Trouble>) -> (PressOutcome, bool) {
@@ -59,7 +114,8 @@ pub(crate) fn judge(open: &OpenPress, trouble: Option<Trouble>) -> (PressOutcome
             troubles.push(Trouble::passing(format!("{camera} sent no bytes")));
         }
     }
-    troubles.extend(open.spoilt.iter().cloned().map(Trouble::passing));
+    let spoilt = open.spoilt.iter().map(ToString::to_string);
+    troubles.extend(spoilt.map(Trouble::passing));
     let again = !troubles.is_empty() && troubles.iter().all(|t| t.again);
     let reasons: Vec<String> = troubles.into_iter().map(|t| t.reason).collect();
     let tracker = open.tracker.as_ref();

@@ -32,6 +32,8 @@ pub enum FaultKind {
     CameraStorm(CameraId),
     /// The clock of a camera is set forward.
     CameraClockStep(CameraId),
+    /// A camera grows hot, and cools down again.
+    CameraHot(CameraId),
     /// The next mark reaches no camera.
     TriggerLost,
     /// The next mark reaches the cameras twice.
@@ -61,7 +63,7 @@ pub enum FaultKind {
 }
 
 /// Every kind by its name.
-const KINDS: [(&str, FaultKind); 23] = {
+const KINDS: [(&str, FaultKind); 25] = {
     use CameraId::{One, Two};
     use FaultKind as K;
     [
@@ -75,6 +77,8 @@ const KINDS: [(&str, FaultKind); 23] = {
         ("camera2-storm", K::CameraStorm(Two)),
         ("camera1-clock-step", K::CameraClockStep(One)),
         ("camera2-clock-step", K::CameraClockStep(Two)),
+        ("camera1-hot", K::CameraHot(One)),
+        ("camera2-hot", K::CameraHot(Two)),
         ("trigger-lost", K::TriggerLost),
         ("trigger-doubled", K::TriggerDoubled),
         ("trigger-delayed", K::TriggerDelayed),

@@ -37,6 +37,8 @@ pub enum Dimension {
     DataRate,
     /// Percent of a whole.
     Share,
+    /// Degrees Celsius.
+    Temperature,
 }
 
 impl Dimension {
@@ -81,11 +83,12 @@ impl Dimension {
             ],
             Self::DataRate => &[("B/s", 1.0), ("kB/s", 1e3), ("MB/s", 1e6), ("GB/s", 1e9)],
             Self::Share => &[("%", 1.0)],
+            Self::Temperature => &[("degC", 1.0), ("°C", 1.0)],
         }
     }
 
     /// All dimensions.
-    const ALL: [Self; 14] = [
+    const ALL: [Self; 15] = [
         Self::Length,
         Self::Time,
         Self::Speed,
@@ -100,6 +103,7 @@ impl Dimension {
         Self::Data,
         Self::DataRate,
         Self::Share,
+        Self::Temperature,
     ];
 
     /// `a length`, `a time`, ...
@@ -120,6 +124,7 @@ impl Dimension {
             Self::Data => "an amount of data",
             Self::DataRate => "a data rate",
             Self::Share => "a share",
+            Self::Temperature => "a temperature",
         }
     }
 
@@ -147,6 +152,7 @@ impl Dimension {
             Self::Data => "2 GB",
             Self::DataRate => "20 MB/s",
             Self::Share => "2 %",
+            Self::Temperature => "60 degC",
         }
     }
 }

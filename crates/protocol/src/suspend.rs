@@ -6,7 +6,7 @@ use skinrig_model::HostDuration;
 use crate::build::seconds;
 use crate::diagnostic::Collector;
 use crate::keys::{default, optional};
-use crate::quantity::Dimension::{Data, DataRate, EventRate, Time};
+use crate::quantity::Dimension::{Data, DataRate, EventRate, Temperature, Time};
 use crate::shape::{Field, Key, Range, Shape, Table, Word};
 
 /// What suspends a run, and for how long. Nothing when no condition is given.
@@ -24,6 +24,9 @@ pub struct Suspend {
     /// Free bytes where the session is written: too few are below.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub disk_free: Option<Threshold>,
+    /// Temperature of either camera, °C: too hot is above. Off without a limit: what a camera may bear, its maker says.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub temperature: Option<Threshold>,
     /// What becomes of the press under way.
     pub press: UnderWay,
     /// So long must all be well again before the run goes on.
@@ -83,6 +86,7 @@ impl Default for Suspend {
             dark: None,
             lost_bytes: None,
             disk_free: None,
+            temperature: None,
             press: UnderWay::Finish,
             resume_after: HostDuration::from_millis(5_000),
             give_up_after: HostDuration::from_millis(600_000),
@@ -121,6 +125,11 @@ pub(crate) static SUSPEND: Table = Table {
             Shape::Map(&DISK),
             "Free space where the session is written.",
         ),
+        optional(
+            "temperature",
+            Shape::Map(&HEAT),
+            "Temperature of either camera; one that cannot tell it is not watched.",
+        ),
         default(
             "press",
             Shape::Choice(UNDER_WAY),
@@ -154,6 +163,7 @@ const LASTING_DOC: &str = "So long must it last.";
 const RATE: Shape = Shape::Quantity(&[EventRate], Range::from_zero(MOST));
 const LOST: Shape = Shape::Quantity(&[DataRate], Range::from_zero(MOST));
 const ROOM: Shape = Shape::Quantity(&[Data], Range::from_zero(MOST));
+const WARMTH: Shape = Shape::Quantity(&[Temperature], Range::between(-40.0, 150.0));
 
 const fn needed(name: &'static str, shape: Shape, doc: &'static str) -> Key {
     crate::keys::required(name, shape, doc)
@@ -203,6 +213,17 @@ static DISK: Table = Table {
     exactly_one: &[],
 };
 
+static HEAT: Table = Table {
+    name: "suspend_temperature",
+    doc: "Two temperatures.",
+    keys: &[
+        needed("above", WARMTH, "Suspends."),
+        needed("resume_below", WARMTH, "Well again; smaller."),
+        default("for", LASTING, "2 s", LASTING_DOC),
+    ],
+    exactly_one: &[],
+};
+
 /// Reads a mapping of the table `suspend`.
 pub(crate) fn suspend(f: &Field, out: &mut Collector) -> Option<Suspend> {
     let mut one = |key: &str, trip: &str, resume: &str| -> Option<Option<Threshold>> {
@@ -233,6 +254,7 @@ pub(crate) fn suspend(f: &Field, out: &mut Collector) -> Option<Suspend> {
         dark: one("dark", "below", "resume_above")?,
         lost_bytes: one("lost_bytes", "above", "resume_below")?,
         disk_free: one("disk_free", "below", "resume_above")?,
+        temperature: one("temperature", "above", "resume_below")?,
         press: match f.word("press")? {
             "break_off" => UnderWay::BreakOff,
             _ => UnderWay::Finish,

@@ -12,7 +12,7 @@ use skinrig_model::{
 use crate::camera_stream::{Outgoing, Streaming};
 use crate::config::SimConfig;
 use crate::drifting::DriftingClock;
-use crate::faults::{Fault, STORM_NS, When};
+use crate::faults::{Fault, HOT_C, HOT_NS, HOT_RISE_NS, STORM_NS, When};
 use crate::line::LineEdge;
 use crate::random::{Purpose, Stream};
 use crate::scene::{GRID_NS, PixelModel};
@@ -35,6 +35,9 @@ const CHANNELS: [u8; 3] = [0, 6, 7];
 /// The channel that the trigger box is wired to.
 pub const TRIGGER_CHANNEL: u8 = 0;
 
+/// Temperature of a simulated camera that no fault heats, °C.
+pub const TEMPERATURE_C: f64 = 35.0;
+
 /// Makes the pixel model for the n-th start of a camera; `None` when there are no pixels at this level.
 pub type PixelFactory = Box<dyn Fn(u64) -> Option<Box<dyn PixelModel>> + Send>;
 
@@ -51,6 +54,7 @@ pub struct SimCamera {
     stall: Option<When>,
     storms: Vec<When>,
     steps: Vec<(When, u32)>,
+    hot: Option<When>,
     buffer_bytes: usize,
     make_pixels: PixelFactory,
     random: Stream,
@@ -74,7 +78,7 @@ impl SimCamera {
         make_pixels: PixelFactory,
     ) -> Self {
         let mut lost = Vec::new();
-        let (mut unplug, mut stall) = (None, None);
+        let (mut unplug, mut stall, mut hot) = (None, None, None);
         let (mut storms, mut steps) = (Vec::new(), Vec::new());
         let mut read_back_fault = false;
         for fault in &config.faults {
@@ -89,6 +93,7 @@ impl SimCamera {
                 Fault::CameraUnplugged { camera, when } if camera == id => unplug = Some(when),
                 Fault::CameraReadBack(camera) if camera == id => read_back_fault = true,
                 Fault::CameraStalled { camera, when } if camera == id => stall = Some(when),
+                Fault::CameraHot { camera, when } if camera == id => hot = Some(when),
                 Fault::HotPixelStorm { camera, when } if camera == id => storms.push(when),
                 Fault::ClockStep {
                     camera,
@@ -110,6 +115,7 @@ impl SimCamera {
             stall,
             storms,
             steps,
+            hot,
             buffer_bytes: config.camera_clock.buffer_bytes.max(4) / 4 * 4,
             make_pixels,
             random: Stream::new(config.seed, Purpose::CameraClock, id.index() as u64),
@@ -428,6 +434,23 @@ impl EventCamera for SimCamera {
         self.shared.world().unwatch(self.id.index());
         flushed
     }
+
+    fn temperature_c(&mut self) -> Result<Option<f64>, DeviceError> {
+        if self.gone {
+            return Err(self.gone_error());
+        }
+        let world = self.shared.world();
+        let struck_ns = self.hot.and_then(|when| world.struck_at(when));
+        let after_ns = struck_ns.map(|t| world.grid() * GRID_NS - t);
+        Ok(Some(TEMPERATURE_C + after_ns.map_or(0.0, heat_c)))
+    }
+}
+
+/// By how much a camera is hotter so long after the fault that heats it, °C.
+fn heat_c(after_ns: i64) -> f64 {
+    let cooling_ns = 2 * HOT_RISE_NS + HOT_NS - after_ns;
+    let near_ns = after_ns.min(cooling_ns).clamp(0, HOT_RISE_NS);
+    HOT_C * near_ns as f64 / HOT_RISE_NS as f64
 }
 
 fn same(name: String, value: String) -> Setting {

@@ -171,12 +171,14 @@ impl Outgoing {
         }
         let bytes = std::mem::take(&mut self.bytes);
         self.last_len = bytes.len();
+        scanner.lost(self.lost_before);
         let (facts, triggers) = scanner.push(&bytes);
         self.ready.push_back(RawChunk {
             camera,
             seq: self.seq,
             host_time: self.arrived,
             lost_before: std::mem::take(&mut self.lost_before),
+            lost_from_us: None,
             bytes,
             facts,
             triggers,

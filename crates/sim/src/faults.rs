@@ -93,6 +93,13 @@ pub enum Fault {
         /// By how much, µs.
         by_us: u32,
     },
+    /// A camera grows hotter by [`HOT_C`] within [`HOT_RISE_NS`], stays so for [`HOT_NS`], and cools down as fast.
+    CameraHot {
+        /// Which.
+        camera: CameraId,
+        /// When it begins.
+        when: When,
+    },
     /// A bias reads back with another value than written. Seen as
     /// [`skinrig_device::DeviceError::ReadBack`].
     CameraReadBack(CameraId),
@@ -168,3 +175,9 @@ pub const STORM_PIXELS: u16 = 40;
 pub const STORM_PER_MS: i64 = 20;
 /// How long a storm lasts, ns.
 pub const STORM_NS: i64 = 300_000_000;
+/// How much hotter a camera grows, °C.
+pub const HOT_C: f64 = 40.0;
+/// How long it takes to grow so hot, and to cool down again, ns.
+pub const HOT_RISE_NS: i64 = 1_000_000_000;
+/// How long it stays so hot, ns.
+pub const HOT_NS: i64 = 6_000_000_000;

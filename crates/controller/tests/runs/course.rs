@@ -536,6 +536,56 @@ fn lost_bytes_invalidate_their_press() {
     assert_eq!(told.invalid_reason(1), "camera 2 lost 7 bytes");
 }
 
+/// When the hold of a press ended and when the tip was clear, ms.
+fn hold_and_clear(told: &Told, n: usize) -> (i64, i64) {
+    let timing = told.outcomes()[n].timing.expect("a press that was made");
+    (timing.retract.0 / MS, timing.clear.0 / MS)
+}
+
+/// Data on their way for 300 ms: what is lost of a press becomes known after its end, and spoils this press and not the next.
+#[test]
+fn a_loss_that_is_told_late_spoils_the_press_that_it_was_in() {
+    let slow = Faults {
+        delay: Some((0, 300)),
+        ..faults()
+    };
+    let good = run(slow.clone());
+    good.check("late data");
+    assert_eq!(good.verdicts(), ["valid", "valid", "valid"]);
+    let (retract, clear) = hold_and_clear(&good, 1);
+    assert!(clear - retract < 300, "{retract}..{clear}");
+    let told = run(Faults {
+        lost_at_ms: Some(clear - 10),
+        ..slow
+    });
+    told.check("late loss");
+    assert_eq!(told.verdicts(), ["valid", "invalid", "valid"]);
+    assert_eq!(told.invalid_reason(1), "camera 2 lost 8 bytes");
+    // Nothing is known of it by the clock of arrival alone when the tip is clear.
+    let arrival = told.records.iter().find_map(|r| match r {
+        Record::Chunk(c) if c.lost_before > 0 => Some(c.host_time.0 / MS),
+        _ => None,
+    });
+    assert!(arrival.is_some_and(|t| t >= clear + 250), "{arrival:?}");
+}
+
+#[test]
+fn data_that_come_too_late_are_told_from_lost_ones() {
+    let told = run(Faults {
+        delay: Some((0, 3_000)),
+        ..faults()
+    });
+    told.check("too late");
+    for n in 0..told.outcomes().len() {
+        let reason = told.invalid_reason(n);
+        assert!(
+            reason.starts_with("data late: camera 2: expected data up to")
+                && reason.contains("within 1.000000 s"),
+            "{reason}"
+        );
+    }
+}
+
 #[test]
 fn a_slow_recorder_delays_but_breaks_nothing() {
     let mut plan = plan();

@@ -35,6 +35,15 @@ fn around() -> Surroundings {
     }
 }
 
+/// A robot at (0, 0, 10), and its guard.
+fn guarded() -> (Shared, GuardedIndenter) {
+    let world = World::shared(Faults::default(), [0.0, 0.0, 10.0]);
+    let robot = Box::new(MockIndenter(world.clone()));
+    let settings = ControllerSettings::default();
+    let guard = GuardedIndenter::new(robot, robot_from_skin(), LIMITS, &settings);
+    (world, guard)
+}
+
 /// What the surroundings allow, in words of its own: by points on the way.
 fn allows(from: [f64; 3], to: [f64; 3]) -> bool {
     let sideways = (from[0] - to[0]).hypot(from[1] - to[1]);
@@ -79,10 +88,8 @@ proptest! {
 
     #[test]
     fn nothing_forbidden_reaches_the_robot(acts in prop::collection::vec(act(), 1..80)) {
-        let world = World::shared(Faults::default(), [0.0, 0.0, 10.0]);
-        let mut guard = GuardedIndenter::new(
-            Box::new(MockIndenter(world.clone())), robot_from_skin(), LIMITS, &ControllerSettings::default(),
-        ).within(Some(around()));
+        let (world, guard) = guarded();
+        let mut guard = guard.within(Some(around()));
         let mut poses = Vec::new();
         // Where the tip went down below clearance height.
         let mut foot: Option<[f64; 2]> = None;
@@ -140,13 +147,7 @@ proptest! {
 
 #[test]
 fn refusals_say_what_was_expected() {
-    let world = World::shared(Faults::default(), [0.0, 0.0, 10.0]);
-    let mut guard = GuardedIndenter::new(
-        Box::new(MockIndenter(world.clone())),
-        robot_from_skin(),
-        LIMITS,
-        &ControllerSettings::default(),
-    );
+    let (world, mut guard) = guarded();
     let mut poses = Vec::new();
     assert!(guard.arm().is_ok());
     lock(&world).t = 50 * MS;
@@ -189,13 +190,7 @@ fn refusals_say_what_was_expected() {
 /// Below clearance height the tip moves up and down where it went down, however small the steps aside are.
 #[test]
 fn many_small_steps_aside_are_one_large_one() {
-    let world = World::shared(Faults::default(), [0.0, 0.0, 10.0]);
-    let mut guard = GuardedIndenter::new(
-        Box::new(MockIndenter(world.clone())),
-        robot_from_skin(),
-        LIMITS,
-        &ControllerSettings::default(),
-    );
+    let (world, mut guard) = guarded();
     let mut poses = Vec::new();
     assert!(guard.arm().is_ok());
     let mut go = |x: f64, z: f64| {

@@ -68,6 +68,12 @@ pub struct Faults {
     pub poses_end_ms: Option<i64>,
     /// Bytes lost by a camera before its chunk with this number.
     pub loss: Option<(CameraId, u64, u64)>,
+    /// Cameras tell their time. From this time on, ms, what camera 2 sends takes so long, ms.
+    pub delay: Option<(i64, i64)>,
+    /// Camera 2 loses bytes at this time, ms, and tells so with the data that follow.
+    pub lost_at_ms: Option<i64>,
+    /// Camera 1 tells its temperature: 70 °C in this time, ms, 30 °C otherwise.
+    pub hot_ms: Option<std::ops::Range<i64>>,
     /// A camera that has something to say about its stream, once.
     pub remark: Option<(CameraId, String)>,
     /// What the trigger box has to say about the run, once.
@@ -108,6 +114,8 @@ pub struct World {
     /// Cameras in the order in which they were started.
     pub started: Vec<CameraId>,
     pub seq: [u64; 2],
+    /// How often each camera was asked for its temperature.
+    pub asked_heat: [u32; 2],
     pub line_until: i64,
     pub clearance_mm: f64,
     /// When the strike began to break a limit.
@@ -155,6 +163,7 @@ impl World {
             streaming: [false; 2],
             started: vec![],
             seq: [0; 2],
+            asked_heat: [0; 2],
             line_until: 0,
             clearance_mm: 5.0,
             broken_at: None,
@@ -409,18 +418,33 @@ impl MockCamera {
         let i = self.1.index();
         let seq = w.seq[i];
         w.seq[i] += 1;
-        let lost_before = match w.faults.loss {
+        let mut lost_before = match w.faults.loss {
             Some((camera, at, bytes)) if camera == self.1 && at == seq => bytes,
             _ => 0,
         };
+        // What comes now was sent earlier, and in order.
+        let sent_ms = match w.faults.delay {
+            Some((from_ms, by_ms)) if self.1 == CameraId::Two => {
+                (w.t / MS).min(from_ms).max(w.t / MS - by_ms)
+            }
+            _ => w.t / MS,
+        };
+        let lost_now = |at: &mut i64| self.1 == CameraId::Two && *at <= sent_ms;
+        if w.faults.lost_at_ms.take_if(lost_now).is_some() {
+            lost_before = 8;
+        }
+        let time_us = (w.faults.delay.is_some()).then_some(sent_ms as u64 * 1_000);
         chunks.push(RawChunk {
             camera: self.1,
             seq,
             host_time: HostTime(w.t),
             lost_before,
+            lost_from_us: None,
             bytes: vec![0; 8],
             facts: ChunkFacts {
                 cd_events: 100,
+                first_us: time_us,
+                last_us: time_us,
                 ..ChunkFacts::default()
             },
             triggers: vec![],
@@ -481,6 +505,14 @@ impl EventCamera for MockCamera {
     fn take_notes(&mut self, notes: &mut Vec<String>) {
         let mine = |of: &mut (CameraId, String)| of.0 == self.1;
         notes.extend(lock(&self.0).faults.remark.take_if(mine).map(|r| r.1));
+    }
+    fn temperature_c(&mut self) -> Result<Option<f64>, DeviceError> {
+        call(&self.0, self.role())?;
+        let mut w = lock(&self.0);
+        w.asked_heat[self.1.index()] += 1;
+        let hot_ms = w.faults.hot_ms.clone().filter(|_| self.1 == CameraId::One);
+        let ms = w.t / MS;
+        Ok(hot_ms.map(|hot| if hot.contains(&ms) { 70.0 } else { 30.0 }))
     }
 }
 

@@ -47,6 +47,7 @@ fn rates_count_the_events_between_chunks() {
             seq,
             host_time: HostTime(ms * 1_000_000),
             lost_before: 0,
+            lost_from_us: None,
             bytes: vec![],
             facts: ChunkFacts {
                 cd_events,
@@ -96,6 +97,7 @@ fn marks_are_seen_across_chunks_and_strays_are_not() {
             seq: seq as u64,
             host_time: HostTime(seq as i64),
             lost_before: 0,
+            lost_from_us: None,
             bytes: vec![],
             facts: ChunkFacts::default(),
             triggers: part.to_vec(),

@@ -6,7 +6,7 @@ use skinrig_controller::{RecordSink, SinkFault, execute};
 use skinrig_model::{HostDuration, HostTime, InterruptionKind, Record, RunEnd};
 use skinrig_protocol::{Suspend, Threshold, UnderWay};
 
-use crate::course::{START, faults};
+use crate::course::{START, faults, run_plan};
 use crate::mock::*;
 
 const STORM: Threshold = Threshold {
@@ -180,4 +180,71 @@ fn what_began_during_a_pause_suspends_after_it() {
     assert_eq!(words[..2], ["operator: pause", "operator: resume"]);
     assert!(words[2].starts_with("suspended: free space"), "{rows:?}");
     assert!(words[3].starts_with("no longer suspended"), "{rows:?}");
+}
+
+/// The camera that tells is watched, once a second; the one that cannot is asked once, and the session says so.
+#[test]
+fn a_hot_camera_suspends_until_it_is_cool() {
+    let mut plan = plan();
+    plan.suspend = Suspend {
+        temperature: Some(Threshold {
+            trip: 60.0,
+            resume: 50.0,
+            lasting: HostDuration::ZERO,
+        }),
+        resume_after: HostDuration::from_millis(2_000),
+        ..Suspend::default()
+    };
+    let hot = Faults {
+        hot_ms: Some(500..6_000),
+        ..faults()
+    };
+    let told = run_plan(&plan, hot, START, Sink::default());
+    let mut rows = Vec::new();
+    let mut notes = Vec::new();
+    for record in &told.records {
+        match record {
+            Record::Interruption { kind, t, reason } => rows.push((*kind, t.0 / MS, reason)),
+            Record::Note { text, .. } if text.contains("temperature") => notes.push(text),
+            _ => {}
+        }
+    }
+    assert_eq!(told.report.end, RunEnd::Completed, "{rows:?}");
+    let [
+        (InterruptionKind::Pause, at, why),
+        (InterruptionKind::Resume, then, because),
+    ] = rows[..]
+    else {
+        panic!("{rows:?}");
+    };
+    assert_eq!(
+        why,
+        "suspended: camera 1: temperature: expected at most 60 °C, found 70 °C"
+    );
+    assert!(because.starts_with("no longer suspended: camera 1: temperature"));
+    assert!(
+        (1_000..2_600).contains(&at) && (8_000..10_000).contains(&then),
+        "{rows:?}"
+    );
+    assert_eq!(
+        notes,
+        [
+            "suspend.temperature: expected camera 2 to tell its temperature, found one that cannot: not watched"
+        ]
+    );
+    let world = lock(&told.world);
+    let seconds = u32::try_from(world.t / (1_000 * MS)).unwrap();
+    assert_eq!(world.asked_heat[1], 1);
+    assert!((2..=seconds + 1).contains(&world.asked_heat[0]));
+}
+
+#[test]
+fn a_camera_without_a_limit_is_not_asked() {
+    let hot = Faults {
+        hot_ms: Some(0..i64::MAX),
+        ..faults()
+    };
+    let told = run_plan(&plan(), hot, START, Sink::default());
+    assert_eq!(told.report.end, RunEnd::Completed);
+    assert_eq!(lock(&told.world).asked_heat, [0, 0]);
 }

@@ -357,6 +357,27 @@ fn a_suspension_needs_room_between_its_levels() {
         disk.is_some_and(|d| d.is_beyond(4.9e9) && d.is_calm(6e9) && !d.is_calm(5.9e9)),
         "{suspend:?}"
     );
+    let text = shipped("demo.yaml");
+    let hot = |levels: &str| {
+        parse(
+            &format!("{text}\nsuspend: {{temperature: {levels}}}\n"),
+            &[],
+        )
+    };
+    let found = hot("{above: 60 °C, resume_below: 50 degC}").map(|p| p.suspend.temperature);
+    let limit = found.as_ref().ok().copied().flatten();
+    assert!(
+        limit.is_some_and(|t| t.is_beyond(60.1) && t.is_calm(50.0) && t.lasting.0 == 2_000_000_000),
+        "{found:?}"
+    );
+    for (levels, told) in [
+        ("{above: 60 deg, resume_below: 50 degC}", "an angle"),
+        ("{above: 60 degC, resume_below: 60 °C}", "no room"),
+        ("{above: 300 degC, resume_below: 60 °C}", "150"),
+    ] {
+        let error = hot(levels).unwrap_err().to_string();
+        assert!(error.contains(told), "{error}");
+    }
     for turned in [
         "{below: 6 GB, resume_above: 5 GB}",
         "{below: 5 GB, resume_above: 5 GB}",
