@@ -331,10 +331,9 @@ fn judge(run: &Run, fault: PlantedFault, without: &Ideal) -> Cell {
 
 /// How far the truth of a press may be off, mm: twice the 0.0049 mm of the worst cell.
 const TRUTH_MM: f64 = 0.01;
-/// How far its number of events may be off, as a share. Two touches of one place differ by up to 0.195 here, where one follows a
-/// touch of its neighbour and the other one of itself.
+/// How far its number of events may be off, as a share: 0.195 in the worst cell.
 const EVENTS_SHARE: f64 = 0.25;
-/// How far its estimate may be off, mm: 1.10 mm in the worst cell, of events as above.
+/// How far its estimate may be off, mm: 1.10 mm in the worst cell.
 const ESTIMATE_MM: f64 = 1.5;
 /// The same of a slow robot, of which fewer presses are valid: twice the 0.19 mm of the worst cell.
 const SLOW_ESTIMATE_MM: f64 = 0.4;
