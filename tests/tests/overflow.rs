@@ -42,10 +42,10 @@ analysis: {calibration: none}
 #[test]
 fn what_a_camera_drops_spoils_the_press_and_is_told() {
     let test = "what_a_camera_drops_spoils_the_press_and_is_told";
-    // A packet of some 40 kB every millisecond, and room for a tenth of it.
+    // A packet of some 80 kB every millisecond; the FIFO and two transfers of 16 KiB take less than half of it.
     let camera = Emulated {
         fifo_bytes: 4 << 10,
-        content: Content::Dense { mev_per_s: 10.0 },
+        content: Content::Dense { mev_per_s: 20.0 },
         ..Emulated::new(SERIAL)
     };
     on_bus(test, vec![camera.into()], |remote| {
@@ -54,7 +54,12 @@ fn what_a_camera_drops_spoils_the_press_and_is_told() {
         let path = folder.path().join("overflow.session.sqlite");
         let mut rig = in_real_time(simulated_rig(&SimConfig::new(3, SimLevel::Kinematic)));
         let clock = RealClock::start();
-        let evk1 = Evk1::open_serial(SERIAL, CameraId::One, Evk1Config::default(), clock);
+        let config = Evk1Config {
+            transfers: 2,
+            transfer_bytes: 16 << 10,
+            ..Evk1Config::default()
+        };
+        let evk1 = Evk1::open_serial(SERIAL, CameraId::One, config, clock);
         rig.cameras[0] = Box::new(evk1.unwrap());
         let report = record(&protocol, &plan, rig, &path, |record, _| {
             if matches!(record, Record::Chunk(chunk) if chunk.camera == CameraId::One) {
