@@ -33,7 +33,8 @@ pub enum Command {
     /// Compile a protocol into steps; print them, or draw the path.
     #[command(
         after_help = "Examples:\n  skinrig plan protocols/paper-meander.yaml --svg path.svg\n  \
-        skinrig plan protocols/demo.yaml --set path.meander.pitch=6mm --steps"
+        skinrig plan protocols/demo.yaml --set path.meander.pitch=6mm --steps\n  \
+        skinrig plan --detect \"1 mm\" --power 0.8 --from sessions/NAME.session.sqlite"
     )]
     Plan(PlanArgs),
 
@@ -170,17 +171,49 @@ pub struct ProtocolArgs {
 /// Arguments of `plan`.
 #[derive(Debug, Args)]
 pub struct PlanArgs {
-    /// The protocol.
-    #[command(flatten)]
-    pub protocol: ProtocolArgs,
+    /// The protocol file; not needed with `--detect`.
+    #[arg(required_unless_present = "detect", conflicts_with = "detect")]
+    pub protocol: Option<PathBuf>,
+
+    /// Override one value of the protocol, for example `path.meander.pitch=6mm`. Can be given several times.
+    #[arg(long = "set", value_name = "KEY=VALUE", conflicts_with = "detect")]
+    pub overrides: Vec<String>,
 
     /// Print every step.
-    #[arg(long)]
+    #[arg(long, conflicts_with = "detect")]
     pub steps: bool,
 
     /// Draw the path, numbered, as SVG.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", conflicts_with = "detect")]
     pub svg: Option<PathBuf>,
+
+    /// What to press to find a difference.
+    #[command(flatten)]
+    pub detect: DetectArgs,
+}
+
+/// What to press on two skins to find a difference between them.
+#[derive(Debug, Args)]
+pub struct DetectArgs {
+    /// Propose locations x repetitions that show a difference this large between the RMSE of two skins, for example "1 mm".
+    #[arg(long, value_name = "LENGTH", value_parser = length_mm, requires = "from")]
+    pub detect: Option<f64>,
+
+    /// The session whose variance is taken.
+    #[arg(long, value_name = "SESSION", requires = "detect")]
+    pub from: Option<PathBuf>,
+
+    /// Probability of finding the difference.
+    #[arg(long, value_name = "SHARE", default_value = "0.8", value_parser = probability)]
+    pub power: f64,
+
+    /// Probability of claiming a difference when there is none.
+    #[arg(long, value_name = "SHARE", default_value = "0.05", value_parser = probability)]
+    pub alpha: f64,
+
+    /// Share of the variance between locations that the two skins have in common, from 0 (not known) to 1.
+    #[arg(long, value_name = "SHARE", default_value = "0", value_parser = share)]
+    pub common: f64,
 }
 
 /// Arguments of `run`.
@@ -414,6 +447,24 @@ fn above_zero(text: &str, dimension: Dimension) -> Result<f64, String> {
             dimension.name()
         )),
         Err(e) => Err(format!("expected {}, found {}", e.expected, e.found)),
+    }
+}
+
+/// A probability, neither 0 nor 1.
+fn probability(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value > 0.0 && value < 1.0 => Ok(value),
+        _ => Err(format!(
+            "expected a probability between 0 and 1, found {text}"
+        )),
+    }
+}
+
+/// A share from 0 to 1.
+fn share(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if (0.0..=1.0).contains(&value) => Ok(value),
+        _ => Err(format!("expected a share from 0 to 1, found {text}")),
     }
 }
 

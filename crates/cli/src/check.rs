@@ -6,6 +6,7 @@ use skinrig_protocol::{Diagnostics, Plan, Protocol, Step, path_svg};
 
 use crate::args::{PlanArgs, ProtocolArgs};
 use crate::exit::{Exit, Failure, Outcome};
+use crate::sample_size;
 
 /// A protocol whose plan passed every check.
 pub struct Checked {
@@ -84,10 +85,16 @@ pub fn check(args: &ProtocolArgs, json: bool) -> Outcome {
 /// `skinrig plan`.
 ///
 /// # Errors
-/// See [`load`]; [`Failure::internal`] when the SVG cannot be written.
+/// See [`load`] and [`sample_size::propose`]; [`Failure::internal`] when the SVG cannot be written.
 pub fn plan(args: &PlanArgs, json: bool) -> Outcome {
+    if let (Some(difference_mm), Some(session)) = (args.detect.detect, &args.detect.from) {
+        return sample_size::propose(difference_mm, session, &args.detect, json);
+    }
+    let Some(protocol) = &args.protocol else {
+        return Err(Failure::input("expected a protocol file, found none"));
+    };
     // A plan that breaks its limits is drawn too: that is when its picture is wanted.
-    let read = read(&args.protocol.protocol, &args.protocol.overrides)?;
+    let read = read(protocol, &args.overrides)?;
     let drawn = match &read {
         Ok(checked) => Some(checked),
         Err(refused) => refused.planned.as_ref(),

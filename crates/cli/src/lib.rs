@@ -25,6 +25,7 @@ pub mod resume;
 pub mod rig;
 pub mod run;
 pub mod salvage;
+pub mod sample_size;
 mod schema;
 pub mod sessions;
 pub mod show;

@@ -17,6 +17,7 @@ mod pipeline;
 mod replay;
 mod resume;
 mod rigs;
+mod sample_size;
 mod strangers;
 mod streams;
 mod support;

@@ -3,7 +3,7 @@
 use super::bootstrap;
 use super::comparison::Interval;
 use super::distributions::{student_cdf, student_quantile};
-use super::measure::{Measure, Ratio, correlation, error};
+use super::measure::{Measure, Ratio, Shape, correlation, error};
 use super::mover::{Limits, recovered};
 use super::question::{Pairing, Settings};
 
@@ -26,13 +26,14 @@ enum How {
         draws: Vec<f64>,
     },
     /// As the limits of what it is made of do, at quantiles of Student's t.
-    Limits { of: Made, df: f64 },
+    Limits { of: Box<Made>, df: f64 },
 }
 
 enum Made {
     One(Limits),
-    /// The second less the first.
-    Two([(f64, Limits); 2], f64),
+    /// The second less the first; their correlation; the standard error of their difference, where limits nearer than
+    /// that many times it are not to be trusted (0 where they are).
+    Two([(f64, Limits); 2], f64, f64),
 }
 
 impl Inference {
@@ -48,7 +49,7 @@ impl Inference {
                 draws: bootstrap::paired(None, ratio, settings.resamples, settings.seed),
             },
             None => How::Limits {
-                of: Made::One(Limits::of(of, None)),
+                of: Box::new(Made::One(Limits::of(of, None))),
                 df,
             },
         };
@@ -79,8 +80,12 @@ impl Inference {
                     (a.value, Limits::of(a, Some(b))),
                     (b.value, Limits::of(b, Some(a))),
                 ];
+                let least = match a.shape {
+                    Shape::Share(_) | Shape::Counts(..) => error,
+                    _ => 0.0,
+                };
                 How::Limits {
-                    of: Made::Two(parts, together),
+                    of: Box::new(Made::Two(parts, together, least)),
                     df,
                 }
             }
@@ -146,10 +151,12 @@ impl Inference {
 
     fn limits(&self, c: f64) -> (f64, f64) {
         match &self.how {
-            How::Limits { of, .. } => match of {
+            How::Limits { of, .. } => match of.as_ref() {
                 Made::One(limits) => limits.at(c),
-                Made::Two([a, b], together) => {
-                    recovered((a.0, a.1.at(c)), (b.0, b.1.at(c)), *together)
+                Made::Two([a, b], together, least) => {
+                    let (low, high) = recovered((a.0, a.1.at(c)), (b.0, b.1.at(c)), *together);
+                    let half = c * least;
+                    (low.min(self.value - half), high.max(self.value + half))
                 }
             },
             How::Student { error, .. } | How::Drawn { error, .. } => {

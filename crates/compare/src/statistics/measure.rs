@@ -112,7 +112,7 @@ impl Measure {
 }
 
 /// Standard error of a sum over locations whose terms add up to 0 (Taylor linearisation with locations as primary
-/// units: Cochran 1977, 9A.3).
+/// units: Cochran 1977, chapter 9A).
 pub(super) fn error(totals: &[f64]) -> f64 {
     let k = totals.len() as f64;
     (k / (k - 1.0) * totals.iter().map(|e| e * e).sum::<f64>()).sqrt()

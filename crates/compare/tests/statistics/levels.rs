@@ -217,14 +217,13 @@ fn table_of_levels() {
         (Kind::Width, "latency width"),
         (Kind::CountRate, "count rate"),
     ] {
-        for locations in [8, 24, 60] {
+        for locations in [8, 24] {
             let world = World {
                 locations,
                 ..World::new(kind)
             };
             let trial = Trial {
-                populations: 2000,
-                resamples: 399,
+                populations: 1000,
                 ..Trial::new(world)
             };
             let none = trial.rates();
@@ -235,7 +234,7 @@ fn table_of_levels() {
             .rates();
             let naive = Trial {
                 naive: true,
-                populations: 500,
+                populations: 200,
                 ..trial
             }
             .rates();

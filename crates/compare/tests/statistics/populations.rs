@@ -83,7 +83,7 @@ impl World {
     /// A difference that is as large as a margin would be.
     pub fn shifted(self) -> Self {
         let shift = match self.kind {
-            Kind::Share => -0.6,
+            Kind::Share => 0.9,
             Kind::CountRate => 0.8,
             Kind::RepeatStd => 0.25,
             Kind::Width => 0.5,

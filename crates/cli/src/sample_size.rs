@@ -1,0 +1,139 @@
+//! `skinrig plan --detect`: locations x repetitions that show a difference, from the variance of a session.
+
+use std::path::Path;
+
+use serde_json::json;
+use skinrig_analysis::Analysis;
+use skinrig_compare::statistics::Sample;
+use skinrig_compare::statistics::power::{self, Measured, PowerPlan, Proposal, Target};
+use skinrig_model::{HostDuration, PressRole, PressVerdict};
+
+use crate::args::DetectArgs;
+use crate::exit::{Exit, Failure, Outcome};
+use crate::progress::clock_text;
+use crate::results::{Choices, analyze_session};
+
+/// Fewer locations than this say little about their variance: its 95 % interval spans a factor of 6 or more.
+const FEW_LOCATIONS: u32 = 12;
+
+/// Proposes what to press on each of two skins so that a difference in RMSE is found.
+///
+/// # Errors
+/// [`Failure::input`] for a session that cannot be analysed, without presses that score, or that says too little.
+pub fn propose(difference_mm: f64, session: &Path, args: &DetectArgs, json: bool) -> Outcome {
+    let analysis = analyze_session(session, Choices::default())?.analysis;
+    let refused = |e: &dyn std::fmt::Display| Failure::input(format!("{}: {e}", session.display()));
+    let sample = errors(&analysis).map_err(|e| refused(&e))?;
+    let measured = power::measure(&sample).map_err(|e| refused(&e))?;
+    let target = Target {
+        difference: difference_mm,
+        power: args.power,
+        alpha: args.alpha,
+        common: args.common,
+        seconds_per_press: seconds_per_press(&analysis),
+    };
+    let plan = power::plan(&measured, &target).map_err(|e| refused(&e))?;
+    if json {
+        crate::print_json(
+            &json!({ "session": session, "metric": "rmse", "unit": "mm", "plan": plan }),
+        );
+    } else {
+        print(&plan, session);
+    }
+    Ok(Exit::Ok)
+}
+
+/// Lengths of the errors of the presses that make the RMSE, mm.
+fn errors(analysis: &Analysis) -> Result<Sample, skinrig_compare::statistics::SampleFault> {
+    let scored = analysis
+        .presses
+        .iter()
+        .filter(|p| p.role == PressRole::Score && p.verdict == PressVerdict::Valid.name());
+    Sample::rms(scored.filter_map(|p| {
+        let (x, y) = p.error_mm()?;
+        Some((p.location, x.hypot(y)))
+    }))
+}
+
+/// The median time from one press to the next, s.
+fn seconds_per_press(analysis: &Analysis) -> Option<f64> {
+    let begun = analysis.presses.iter().filter_map(|p| p.timing);
+    let mut begun: Vec<f64> = begun.map(|t| t.approach.as_secs_f64()).collect();
+    begun.sort_by(f64::total_cmp);
+    let mut gaps: Vec<f64> = begun.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    gaps.sort_by(f64::total_cmp);
+    gaps.get(gaps.len() / 2).copied().filter(|gap| *gap > 0.0)
+}
+
+fn print(plan: &PowerPlan, session: &Path) {
+    let Target {
+        difference,
+        power,
+        alpha,
+        common,
+        ..
+    } = plan.target;
+    outln!(
+        "to show a difference of {difference} mm in RMSE with a power of {} % (two-sided, alpha {} %),",
+        shown(100.0 * power),
+        shown(100.0 * alpha)
+    );
+    outln!("press each of the two skins at the same");
+    outln!("  locations x repetitions = presses   half width   time for one skin");
+    for (i, proposal) in plan.proposals.iter().enumerate() {
+        let mark = if i == plan.cheapest { '*' } else { ' ' };
+        let Proposal {
+            locations,
+            repetitions,
+            presses,
+            half_width,
+            seconds,
+        } = proposal;
+        let time = seconds.map_or_else(
+            || "not known".to_owned(),
+            |s| clock_text(HostDuration::from_secs_f64(s)),
+        );
+        outln!(
+            "{mark} {locations:>9} x {repetitions:>11} = {presses:>7}   {half_width:>7.3} mm   {time}"
+        );
+    }
+    outln!("* fewest presses; half width: expected, of the interval of the difference");
+    let Measured {
+        value,
+        between,
+        within,
+        locations,
+    } = plan.measured;
+    outln!("");
+    outln!("from {}", session.display());
+    outln!("  RMSE {value:.3} mm at {locations} locations");
+    if locations < FEW_LOCATIONS {
+        outln!(
+            "  so few locations that these variances are uncertain themselves: take more than proposed"
+        );
+    }
+    outln!(
+        "  standard deviation between locations {:.3} mm",
+        between.sqrt()
+    );
+    match within {
+        Some(within) => {
+            outln!(
+                "  standard deviation between repetitions {:.3} mm",
+                within.sqrt()
+            );
+        }
+        None => outln!(
+            "  nothing was pressed twice: what repetitions are worth is not known, and part of the above"
+        ),
+    }
+    outln!(
+        "  {} % of the variance between locations taken as common to both skins (--common)",
+        shown(100.0 * common)
+    );
+}
+
+/// A share in percent without the dust of its binary form.
+fn shown(percent: f64) -> f64 {
+    (percent * 1e6).round() * 1e-6
+}

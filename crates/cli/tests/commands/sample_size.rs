@@ -1,0 +1,53 @@
+//! What to press to find a difference, from a session's own variance.
+
+use crate::support::{Lab, skinrig, text};
+
+#[test]
+fn a_session_says_what_its_successor_has_to_be_pressed() {
+    let lab = Lab::new();
+    let session = text(&lab.record("s", &[]));
+    let ask = |more: &[&str]| {
+        let arguments = ["--json", "plan", "--from", &session, "--detect"];
+        skinrig(&[&arguments[..], more].concat()).code(0).json()
+    };
+    let said = ask(&["1 mm"]);
+    let proposals = said["plan"]["proposals"].as_array().unwrap();
+    let presses = |i: usize| proposals[i]["presses"].as_u64().unwrap();
+    let cheapest = said["plan"]["cheapest"].as_u64().unwrap() as usize;
+    assert!((0..proposals.len()).all(|i| presses(i) >= presses(cheapest)));
+    assert!(proposals[0]["seconds"].as_f64().unwrap() > 0.0);
+    let locations =
+        |said: &serde_json::Value| said["plan"]["proposals"][0]["locations"].as_u64().unwrap();
+    // A tenth of the difference takes more places; a length in another unit is the same length.
+    assert!(locations(&ask(&["0.1 mm"])) > locations(&said));
+    assert_eq!(ask(&["100 um"]), ask(&["0.1 mm"]));
+    assert!(locations(&ask(&["0.1 mm", "--power", "0.95"])) > locations(&ask(&["0.1 mm"])));
+    assert!(locations(&ask(&["0.1 mm", "--common", "0.9"])) < locations(&ask(&["0.1 mm"])));
+    let table = skinrig(&["plan", "--from", &session, "--detect", "0.1 mm"]).code(0);
+    assert!(
+        table.out.contains("locations x repetitions"),
+        "{}",
+        table.out
+    );
+
+    skinrig(&["plan", "--detect", "1 mm"])
+        .code(2)
+        .complains(&["--from"]);
+    for (wrong, part) in [("0 mm", "above 0"), ("3 s", "length")] {
+        let said = skinrig(&["plan", "--from", &session, "--detect", wrong]);
+        said.code(2).complains(&[part]);
+    }
+    let sure = [
+        "plan", "--from", &session, "--detect", "1 mm", "--power", "1",
+    ];
+    skinrig(&sure).code(2).complains(&["probability"]);
+    let both = [
+        "plan",
+        "protocols/demo.yaml",
+        "--from",
+        &session,
+        "--detect",
+        "1 mm",
+    ];
+    skinrig(&both).code(2);
+}
