@@ -46,7 +46,7 @@ pub mod sums;
 pub mod timebase;
 pub mod tradeoff;
 pub mod triangulate;
-mod verdict;
+pub mod verdict;
 mod width;
 
 pub use analyze::{analyze, analyze_and_keep};

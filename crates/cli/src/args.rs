@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use skinrig_protocol::PlantedFault;
+use skinrig_protocol::limits::Margin;
 use skinrig_protocol::quantity::{self, Dimension};
 
 use crate::exit::Exit;
@@ -105,6 +106,15 @@ pub enum Command {
     )]
     Report(ReportArgs),
 
+    /// Say whether one skin is better than another: may they be compared, which is better at what, where, and why.
+    #[command(
+        after_help = "Examples:\n  skinrig compare sessions/OLD.session.sqlite sessions/NEW.session.sqlite --margin rmse=0.5mm\n  \
+        skinrig compare \"mold 3\" \"mold 4\" \"mold 5\" --sessions sessions/ --limits protocols/comparison.limits.yaml\n\n\
+        Each skin is compared with the first, place by place. Skins that may not be compared end with exit code 2 and the reason;\n\
+        --despite KEY goes on in spite of it, and the table and the page say so. docs/comparison.md has the rules."
+    )]
+    Compare(CompareArgs),
+
     /// Measure speed against accuracy on a session: estimators, windows, thinning, bins, rows.
     #[command(
         after_help = "Examples:\n  skinrig tradeoff sessions/NAME.session.sqlite\n  \
@@ -140,7 +150,7 @@ pub enum Command {
     #[command(after_help = "Example:\n  skinrig inspect recording.raw")]
     Inspect(InspectArgs),
 
-    /// Print the JSON Schema of protocols, schedules or rig files, for editors.
+    /// Print the JSON Schema of protocols, schedules, rig files or limits, for editors.
     #[command(after_help = "Example:\n  skinrig schema > skinrig.schema.json")]
     Schema(SchemaArgs),
 
@@ -418,6 +428,39 @@ pub struct AnalyzeArgs {
     pub max_rmse: Option<f64>,
 }
 
+/// Arguments of `compare`.
+#[derive(Debug, Args)]
+pub struct CompareArgs {
+    /// Two skins or more: session files, folders of sessions, or names of prototypes (all their sessions in `--sessions`).
+    #[arg(required = true, num_args = 2.., value_name = "SKIN")]
+    pub skins: Vec<String>,
+
+    /// Where sessions of prototypes are looked for.
+    #[arg(long, value_name = "DIR", default_value = "sessions")]
+    pub sessions: PathBuf,
+
+    /// The file of limits: what counts as a difference. `limits.yaml` where skinrig is started, when that is there.
+    #[arg(long, value_name = "FILE")]
+    pub limits: Option<PathBuf>,
+
+    /// The largest difference of a metric that is none, for example `rmse=0.5mm`; goes before the file's. Can be given several
+    /// times.
+    #[arg(long = "margin", value_name = "METRIC=MARGIN", value_parser = Margin::parse)]
+    pub margins: Vec<Margin>,
+
+    /// The error that the pass rate asks about; that of the limits, else of the first skin's analysis, when absent.
+    #[arg(long, value_name = "LENGTH", value_parser = length_mm)]
+    pub within: Option<f64>,
+
+    /// Compare in spite of a blocking difference with this key. Can be given several times.
+    #[arg(long, value_name = "KEY")]
+    pub despite: Vec<String>,
+
+    /// Where to write the page, and beside it the results as JSON; beside the first session when absent.
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+}
+
 /// What accuracy is traded for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum CostKind {
@@ -616,6 +659,8 @@ pub enum SchemaKind {
     Schedule,
     /// Rig files (`--rig`).
     Rig,
+    /// Limits (`compare`).
+    Limits,
 }
 
 /// Arguments of `schema`.

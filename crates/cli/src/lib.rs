@@ -6,6 +6,7 @@ pub mod terminal;
 
 pub mod args;
 pub mod check;
+pub mod compare;
 pub mod contacts;
 pub mod control;
 pub mod devices;
@@ -89,6 +90,7 @@ fn dispatch(cli: &Cli, arguments: &[OsString]) -> Outcome {
         Command::Show(a) => show::show(a, json),
         Command::Analyze(a) => results::analyze(a, json),
         Command::Report(a) => results::report(a, json),
+        Command::Compare(a) => compare::compare(a, json),
         Command::Tradeoff(a) => tradeoff::tradeoff(a, json),
         Command::Verify(a) => verify::verify(a, json),
         Command::Salvage(a) => salvage::salvage(a, json),

@@ -12,6 +12,7 @@ pub fn schema(args: &SchemaArgs) -> Outcome {
         SchemaKind::Protocol => skinrig_protocol::schema_json(),
         SchemaKind::Schedule => skinrig_protocol::schedule_schema_json(),
         SchemaKind::Rig => skinrig_protocol::rig_schema_json(),
+        SchemaKind::Limits => skinrig_protocol::limits_schema_json(),
     };
     crate::terminal::out(format_args!("{schema}"));
     Ok(Exit::Ok)

@@ -11,6 +11,7 @@
 
 pub mod axes;
 pub mod colour;
+pub mod compare;
 pub mod comparison;
 mod course;
 pub mod derive;

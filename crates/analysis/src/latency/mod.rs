@@ -30,7 +30,8 @@ use self::trial::{Detector, Label, Trial};
 use crate::kept::{Kept, KeptPress};
 use crate::metrics::quantile;
 use crate::result::{
-    Analysis, ClockFit, ClockMethod, ContactLatency, Latency, MapName, ReducedLatency, ThresholdRow,
+    Analysis, ClockFit, ClockMethod, ContactLatency, Latency, MapName, ReducedLatency,
+    ThresholdRow, TrialBackground,
 };
 use crate::seeded;
 use crate::verdict;
@@ -113,6 +114,7 @@ pub fn study(analysis: &Analysis, kept: &Kept) -> Option<Latency> {
         }),
         course: course::course(&trials, detector.bin_ms),
         onsets: trials.iter().map(|t| (t.label.press, onset(t))).collect(),
+        backgrounds: backgrounds(&trials, &found),
         chosen: found.chosen.map(|i| i as u32),
         sweep: found.rows,
     })
@@ -165,11 +167,25 @@ fn look(usable: &[Usable<'_>], detector: &Detector, thinning: Option<(u32, u64)>
     found.into_iter().flatten().collect()
 }
 
+/// False alarms before each trial; nothing without a threshold.
+fn backgrounds(trials: &[Trial], found: &Found) -> Vec<TrialBackground> {
+    let of = |(t, o): (&Trial, &Outcome)| TrialBackground {
+        press: t.label.press,
+        alarms: o.alarms,
+        length_s: o.background_s,
+    };
+    let chosen = found
+        .chosen
+        .map(|_| trials.iter().zip(&found.outcomes).map(of).collect());
+    chosen.unwrap_or_default()
+}
+
 /// A detector at the threshold that was chosen for it.
 struct Found {
     rows: Vec<ThresholdRow>,
     chosen: Option<usize>,
     estimates: Estimates,
+    outcomes: Vec<Outcome>,
 }
 
 impl Found {
@@ -202,6 +218,7 @@ impl Found {
             estimates: plan.estimate(&outcomes),
             rows,
             chosen,
+            outcomes,
         }
     }
 }

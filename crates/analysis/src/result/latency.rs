@@ -72,6 +72,20 @@ pub struct Latency {
     pub course: LatencyCourse,
     /// (press, onset after contact in ms or `None` when not detected) at the chosen threshold.
     pub onsets: Vec<(PressId, Option<f64>)>,
+    /// The background before each trial, at the chosen threshold; in order of the presses, empty without one.
+    #[serde(default)]
+    pub backgrounds: Vec<TrialBackground>,
+}
+
+/// What a detector did before one trial, where nothing touched.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct TrialBackground {
+    /// Which trial.
+    pub press: PressId,
+    /// False alarms, with a cool-down of one width.
+    pub alarms: u32,
+    /// How long it looked, s.
+    pub length_s: f64,
 }
 
 /// The detector at one threshold.

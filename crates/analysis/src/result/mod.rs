@@ -14,6 +14,7 @@ pub use calibration::{CalibrationResult, ModelComparison, ThresholdChoice};
 pub use coverage::{Activity, BitRates, Cmre, Coverage};
 pub use latency::{
     ContactLatency, ContactTiming, Latency, LatencyCourse, ReducedLatency, ThresholdRow,
+    TrialBackground,
 };
 pub use reduction::{Reduction, ReductionCurve, ReductionRow, Thinning};
 pub use reference::{ReferenceCode, ReferenceReduction};

@@ -2,9 +2,9 @@
 
 use crate::support::{ROOT, skinrig};
 
-const COMMANDS: [&str; 18] = [
+const COMMANDS: [&str; 19] = [
     "check", "plan", "status", "control", "note", "run", "resume", "sessions", "show", "analyze",
-    "report", "verify", "salvage", "import", "export", "inspect", "schema", "tradeoff",
+    "report", "verify", "salvage", "import", "export", "inspect", "schema", "tradeoff", "compare",
 ];
 
 #[test]
@@ -91,6 +91,7 @@ fn the_shipped_schemas_are_those_that_the_program_prints() {
     for (kind, file) in [
         ("protocol", "skinrig.schema.json"),
         ("schedule", "skinrig-schedule.schema.json"),
+        ("limits", "skinrig-limits.schema.json"),
     ] {
         let printed = skinrig(&["schema", kind]).code(0).json();
         let shipped = std::fs::read_to_string(format!("{ROOT}/protocols/{file}")).unwrap();

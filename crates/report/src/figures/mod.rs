@@ -173,7 +173,7 @@ impl<'a> Canvas<'a> {
 }
 
 /// The smallest of 1, 1.5, 2, 3, 4, 5, 6, 8, 10 times a power of ten that is not below `value`.
-fn nice_above(value: f64) -> f64 {
+pub(crate) fn nice_above(value: f64) -> f64 {
     if !(value.is_finite() && value > 0.0) {
         return 1.0;
     }

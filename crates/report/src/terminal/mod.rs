@@ -110,17 +110,17 @@ pub(crate) fn plain(text: &str) -> String {
         .collect()
 }
 
-struct Paint(bool);
+pub(crate) struct Paint(pub(crate) bool);
 
 impl Paint {
-    fn bold(&self, s: &str) -> String {
+    pub(crate) fn bold(&self, s: &str) -> String {
         if self.0 {
             format!("\x1b[1m{s}\x1b[0m")
         } else {
             s.to_owned()
         }
     }
-    fn warn(&self, s: &str) -> String {
+    pub(crate) fn warn(&self, s: &str) -> String {
         if self.0 && !s.is_empty() {
             format!("\x1b[33m{s}\x1b[0m")
         } else {
@@ -131,7 +131,7 @@ impl Paint {
 
 /// Words of `text` in lines of at most `WIDTH` columns; the first begins with `first`, the others with as
 /// many spaces. Words longer than a line are cut.
-fn wrap(first: &str, text: &str) -> String {
+pub(crate) fn wrap(first: &str, text: &str) -> String {
     let indent = " ".repeat(first.chars().count());
     let room = WIDTH - indent.len();
     let mut lines = vec![String::new()];

@@ -1,0 +1,127 @@
+//! Owns the facts of a session that a comparison looks at.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use serde_json::Value;
+use skinrig_compare::{Facts, flatten};
+use skinrig_model::{CameraId, DeviceRole, RunHeader};
+use skinrig_protocol::Protocol;
+use skinrig_recorder::{RecorderError, SessionReader};
+
+use crate::exit::Failure;
+use crate::results::RigDocument;
+
+/// Keys of a protocol that are compared elsewhere, or that name it only.
+const NOT_OF_PROTOCOL: [&str; 10] = [
+    "file_name",
+    "text",
+    "sha256",
+    "overrides",
+    "analysis",
+    "locations",
+    "depths_mm",
+    "description",
+    "operator",
+    "scene",
+];
+
+/// Reads the facts of the session at `path`.
+pub(super) fn facts(
+    path: &Path,
+    reader: &SessionReader,
+    header: &RunHeader,
+) -> Result<Facts, Failure> {
+    let unreadable = |e: RecorderError| Failure::input(e);
+    let mut values = BTreeMap::new();
+    let mut add = |name: &str, value: String| {
+        values.insert(name.to_owned(), value);
+    };
+    add("rig.kind", header.rig_kind.clone());
+    add("rig.name", header.rig_name.clone());
+    add("rig.level", level(&header.rig_name));
+    add("software.recorded", header.software.clone());
+    let sealed = reader.seal().map_err(unreadable)?.is_some();
+    add("session.sealed", sealed.to_string());
+    let end = reader.end().map_err(unreadable)?;
+    add(
+        "session.end",
+        end.map_or("not ended", |(_, e)| e.name()).to_owned(),
+    );
+    let mut lost = 0;
+    for camera in CameraId::ALL {
+        let chunks = reader.chunk_index(camera).map_err(unreadable)?;
+        lost += chunks.iter().map(|c| c.lost_before).sum::<u64>();
+    }
+    add("session.lost_bytes", lost.to_string());
+    for device in reader.devices().map_err(unreadable)? {
+        let role = device.role.name();
+        add(&format!("device.{role}.model"), device.identity.model);
+        add(&format!("device.{role}.serial"), device.identity.serial);
+        add(&format!("device.{role}.firmware"), device.identity.firmware);
+        if matches!(device.role, DeviceRole::Camera1 | DeviceRole::Camera2) {
+            for setting in device
+                .settings
+                .iter()
+                .filter(|s| s.name.starts_with("bias"))
+            {
+                add(
+                    &format!("bias.{role}.{}", setting.name),
+                    setting.read_back.clone(),
+                );
+            }
+        }
+    }
+    let mut flat = Vec::new();
+    flatten("protocol", &protocol(header), &mut flat);
+    let rig: Option<RigDocument> = serde_json::from_str(&header.rig_json).ok();
+    let kind = if header.rig_kind == "simulated" {
+        "simulation"
+    } else {
+        "bench"
+    };
+    flatten(kind, &rig.map_or(Value::Null, |r| r.rig), &mut flat);
+    values.extend(flat);
+    Ok(Facts {
+        file: path
+            .file_name()
+            .map(|n| n.to_string_lossy().into_owned())
+            .unwrap_or_default(),
+        session_id: reader.session_id().map_err(unreadable)?,
+        prototype: header.prototype.clone(),
+        started: header.started_at.clone(),
+        rig_kind: header.rig_kind.clone(),
+        rig_name: header.rig_name.clone(),
+        values,
+    })
+}
+
+/// The level in the name of a simulated rig: `simulated (geometric)`.
+fn level(rig_name: &str) -> String {
+    let named = rig_name
+        .split_once("simulated (")
+        .and_then(|(_, rest)| rest.split_once(')'));
+    named.map_or("none", |(level, _)| level).to_owned()
+}
+
+/// The protocol key by key. One that cannot be read any more (a schedule, a file that is not there) has its name and the
+/// digest of its plan.
+fn protocol(header: &RunHeader) -> Value {
+    let no_file = |p: &Path| Err(std::io::Error::other(p.display().to_string()));
+    let text = header.protocol_text.as_bytes();
+    let read = Protocol::parse(&header.protocol_name, text, &header.overrides, &no_file);
+    let Ok(read) = read else {
+        return serde_json::json!({ "name": header.protocol_name, "plan": header.plan_sha256 });
+    };
+    let mut value = serde_json::to_value(&read).unwrap_or(Value::Null);
+    if let Some(map) = value.as_object_mut() {
+        NOT_OF_PROTOCOL.iter().for_each(|key| {
+            map.remove(*key);
+        });
+        if let Some(prototype) = map.get_mut("prototype").and_then(Value::as_object_mut) {
+            // Which skin it is, is what is compared.
+            prototype.retain(|key, _| key == "tip");
+        }
+    }
+    value
+}

@@ -1,0 +1,125 @@
+//! Owns what `compare` is given: session files, folders or prototypes, and the results of each session.
+
+use std::path::{Path, PathBuf};
+
+use serde_json::{Value, json};
+use skinrig_analysis::{ANALYSIS_VERSION, Analysis};
+use skinrig_compare::{Session, Subject};
+use skinrig_recorder::{RecorderError, SessionReader, list};
+
+use super::facts::facts;
+use crate::args::CompareArgs;
+use crate::exit::Failure;
+use crate::paths::beside;
+use crate::results::{Choices, analyze_session};
+
+/// Most skins that are compared at once: letters A to H.
+const MOST: usize = 8;
+
+/// A skin and the files of its sessions.
+pub(super) struct Found {
+    pub subject: Subject,
+    pub paths: Vec<PathBuf>,
+}
+
+/// Every skin that was asked for.
+pub(super) fn subjects(args: &CompareArgs) -> Result<Vec<Found>, Failure> {
+    if args.skins.len() > MOST {
+        return Err(Failure::input(format!(
+            "expected at most {MOST} skins, found {}\n  next: compare them in groups with a common first one",
+            args.skins.len()
+        )));
+    }
+    let letters = 'A'..;
+    let found = args.skins.iter().zip(letters);
+    found
+        .map(|(text, letter)| one(text, letter, &args.sessions))
+        .collect()
+}
+
+fn one(text: &str, letter: char, folder: &Path) -> Result<Found, Failure> {
+    let place = Path::new(text);
+    let (name, paths) = if place.is_dir() {
+        (None, readable(place, None)?)
+    } else if place.is_file() {
+        (None, vec![place.to_owned()])
+    } else if text.contains(std::path::MAIN_SEPARATOR)
+        || text.ends_with(crate::paths::SESSION_SUFFIX)
+    {
+        return Err(Failure::input(format!(
+            "{text}: expected a session, a folder of sessions or the name of a prototype, found no such file\n  \
+             next: `skinrig sessions` lists what is there"
+        )));
+    } else {
+        (Some(text), readable(folder, Some(text))?)
+    };
+    if paths.is_empty() {
+        let (what, wanted) = match name {
+            Some(name) => (folder.display(), format!("sessions of prototype `{name}`")),
+            None => (place.display(), "sessions".to_owned()),
+        };
+        return Err(Failure::input(format!(
+            "{what}: expected {wanted}, found none\n  next: `skinrig sessions {what}` lists what is there; --sessions \
+             names another folder"
+        )));
+    }
+    let sessions: Result<Vec<Session>, Failure> = paths.iter().map(|p| session(p)).collect();
+    let sessions = sessions?;
+    let own = sessions.first().map(|s| s.facts.prototype.clone());
+    let name = name.map(str::to_owned).or(own).unwrap_or_default();
+    Ok(Found {
+        subject: Subject {
+            letter,
+            name,
+            sessions,
+        },
+        paths,
+    })
+}
+
+/// The sessions of a folder, of one prototype or all; a broken file there is an error, not skipped.
+fn readable(folder: &Path, prototype: Option<&str>) -> Result<Vec<PathBuf>, Failure> {
+    let all = list(folder).map_err(Failure::input)?;
+    let wanted = all
+        .into_iter()
+        .filter(|s| prototype.is_none() || s.prototype() == prototype);
+    Ok(wanted.map(|s| s.path).collect())
+}
+
+fn session(path: &Path) -> Result<Session, Failure> {
+    let unreadable = |e: RecorderError| Failure::input(e);
+    let reader = SessionReader::open(path).map_err(unreadable)?;
+    let header = reader.header().map_err(unreadable)?;
+    let facts = facts(path, &reader, &header)?;
+    let analysis = match results_beside(path, &facts.session_id) {
+        Some(analysis) => analysis,
+        None => {
+            analyze_session(path, Choices::default())
+                .map_err(|f| Failure {
+                    message: format!("{}\n  ({}: no results)", f.message, path.display()),
+                    ..f
+                })?
+                .analysis
+        }
+    };
+    Ok(Session { facts, analysis })
+}
+
+/// The results beside a session, when they are its own and of this version of the analysis.
+fn results_beside(path: &Path, session_id: &str) -> Option<Analysis> {
+    let text = std::fs::read(beside(path, ".results.json")).ok()?;
+    let mut document: Value = serde_json::from_slice(&text).ok()?;
+    let own = document["provenance"]["session_id"].as_str() == Some(session_id);
+    let current = document["analysis"]["version"].as_u64() == Some(u64::from(ANALYSIS_VERSION));
+    if !(own && current) {
+        return None;
+    }
+    let mut analysis = document["analysis"].take();
+    // Bulk data for figures, which results leave out.
+    let none = json!({ "start_s": 0.0, "bin_s": 0.0, "mean_per_s": [], "peak_per_s": [] });
+    analysis["rates"] = json!([none, none]);
+    for field in ["pictures", "zooms", "activity"] {
+        analysis[field] = json!([]);
+    }
+    serde_json::from_value(analysis).ok()
+}

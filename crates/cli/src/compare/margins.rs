@@ -1,0 +1,48 @@
+//! Owns the margins of a comparison: from the file of limits and from the command line.
+
+use std::path::Path;
+
+use skinrig_compare::{Choices, Metric};
+use skinrig_protocol::Limits;
+
+use crate::args::CompareArgs;
+use crate::exit::Failure;
+
+/// The file that is read when it is there and no other is named.
+const FILE: &str = "limits.yaml";
+
+/// What the command line asks for.
+pub(super) fn choices(args: &CompareArgs) -> Result<Choices, Failure> {
+    let named = args.limits.as_deref();
+    let file = named.or_else(|| Some(Path::new(FILE)).filter(|p| p.is_file()));
+    let read = file.map(|path| {
+        let name = path.display().to_string();
+        let bytes = std::fs::read(path).map_err(|e| {
+            Failure::input(format!(
+                "{name}: cannot read: {e}\n  next: name a file of limits with --limits"
+            ))
+        })?;
+        Limits::parse(&name, &bytes).map_err(|found| Failure::findings(&found))
+    });
+    let mut limits = read.transpose()?.unwrap_or(Limits {
+        file_name: String::new(),
+        sha256: String::new(),
+        name: String::new(),
+        within_mm: None,
+        margins: Vec::new(),
+    });
+    for margin in &args.margins {
+        limits.set(*margin);
+    }
+    let margins = Metric::ALL.into_iter().filter_map(|metric| {
+        let found = limits.margins.iter().find(|m| m.metric == metric.key())?;
+        Some((metric, metric.margin(found.value)))
+    });
+    Ok(Choices {
+        margins: margins.collect(),
+        limits: (!limits.name.is_empty()).then(|| limits.name.clone()),
+        within_mm: args.within.or(limits.within_mm),
+        despite: args.despite.clone(),
+        ..Choices::default()
+    })
+}

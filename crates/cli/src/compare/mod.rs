@@ -1,0 +1,181 @@
+//! `skinrig compare`: which skin is better, whether that may be asked, and why.
+
+mod facts;
+mod inputs;
+mod margins;
+
+use std::io::IsTerminal;
+use std::path::PathBuf;
+
+use skinrig_analysis::{Analysis, AnalysisError};
+use skinrig_compare::{Comparison, Exchanged, Session, Subject, compare as compare_skins};
+use skinrig_model::AnalysisSettings;
+use skinrig_report::compare as report;
+
+use crate::args::CompareArgs;
+use crate::exit::{Exit, Failure, Outcome};
+use crate::results::{Choices, Opened, open, write};
+
+/// The name of the page when none is given.
+const PAGE: &str = "comparison.html";
+
+/// `skinrig compare`.
+///
+/// # Errors
+/// [`Failure::input`] for what is no session or prototype, for limits that do not parse, and for skins that may not be
+/// compared; [`Failure::internal`] when a file cannot be written.
+pub fn compare(args: &CompareArgs, json: bool) -> Outcome {
+    let choices = margins::choices(args)?;
+    let found = inputs::subjects(args)?;
+    let subjects: Vec<Subject> = found.iter().map(|f| f.subject.clone()).collect();
+    // Without their right to be compared nothing is analysed again.
+    let allowed = skinrig_compare::differences(&subjects, &choices.despite);
+    let may = allowed.iter().all(|d| d.next.is_none() || d.lifted);
+    let exchanged = if may { exchanged(&found)? } else { Vec::new() };
+    let result = compare_skins(&subjects, &exchanged, &choices);
+    let blocked = refusal(&result, args);
+    let mut document = report::json(&result);
+    if blocked.is_none() {
+        let page = args.out.clone().unwrap_or_else(|| beside(&found));
+        let results = page.with_extension("json");
+        let html = report::html(&result).map_err(Failure::internal)?;
+        let text = serde_json::to_string_pretty(&document).map_err(Failure::internal)?;
+        write(&page, html.as_bytes())?;
+        write(&results, text.as_bytes())?;
+        if json {
+            document["files"] = serde_json::json!({ "page": page, "results": results });
+            crate::print_json(&document);
+        } else {
+            let table = report::terminal_table(&result, std::io::stdout().is_terminal());
+            crate::terminal::out(format_args!("{table}"));
+            outln!("\npage      {}", page.display());
+            outln!("results   {}", results.display());
+        }
+        return Ok(Exit::Ok);
+    }
+    if json {
+        crate::print_json(&document);
+    } else {
+        let table = report::terminal_table(&result, std::io::stdout().is_terminal());
+        crate::terminal::out(format_args!("{table}"));
+    }
+    Err(Failure::input(blocked.unwrap_or_default()))
+}
+
+/// Beside the first session.
+fn beside(found: &[inputs::Found]) -> PathBuf {
+    let folder = found
+        .first()
+        .and_then(|f| f.paths.first())
+        .map(|p| crate::paths::folder_of(p).to_owned());
+    folder.unwrap_or_default().join(PAGE)
+}
+
+/// Why the skins may not be compared, and what to do; `None` when they may. Also for a key to lift that lifts nothing.
+fn refusal(result: &Comparison, args: &CompareArgs) -> Option<String> {
+    let lines: Vec<String> = result
+        .blocking()
+        .map(|d| {
+            let values: Vec<String> = result
+                .skins
+                .iter()
+                .zip(&d.values)
+                .map(|(skin, value)| format!("{} {value}", skin.letter))
+                .collect();
+            let next = d.next.as_deref().unwrap_or("see docs/comparison.md");
+            format!(
+                "{}: {} ({})\n  next: {next}, or go on in spite of it with --despite {}",
+                d.what,
+                d.reason,
+                values.join(", "),
+                d.key
+            )
+        })
+        .collect();
+    if !lines.is_empty() {
+        return Some(format!(
+            "these skins may not be compared\n  {}",
+            lines.join("\n  ")
+        ));
+    }
+    let idle = args.despite.iter().find(|key| {
+        let known = skinrig_compare::RULES.iter().any(|r| r.key == key.as_str());
+        !known && !result.differences.iter().any(|d| d.key == key.as_str())
+    });
+    idle.map(|key| {
+        format!("--despite {key}: expected the key of a blocking difference, found one that no rule has\n  next: leave it out, or see docs/comparison.md")
+    })
+}
+
+/// Each skin but the first, analysed with the settings of the first, and the first with its; where they differ.
+fn exchanged(found: &[inputs::Found]) -> Result<Exchanged, Failure> {
+    let Some((first, others)) = found.split_first() else {
+        return Ok(Vec::new());
+    };
+    let own = |f: &inputs::Found| settings_of(&f.subject);
+    others
+        .iter()
+        .map(|other| match (own(first), own(other)) {
+            (Some(a), Some(b)) if !same_numbers(&a, &b) => {
+                Ok(Some([again(first, &b)?, again(other, &a)?]))
+            }
+            _ => Ok(None),
+        })
+        .collect()
+}
+
+fn settings_of(subject: &Subject) -> Option<AnalysisSettings> {
+    subject
+        .sessions
+        .first()
+        .map(|s| s.analysis.settings.clone())
+}
+
+/// True when the settings locate presses alike: what studies and intervals do is no cause.
+fn same_numbers(a: &AnalysisSettings, b: &AnalysisSettings) -> bool {
+    let plain = |s: &AnalysisSettings| AnalysisSettings {
+        exclude_presses: Vec::new(),
+        ..only_locating(s.clone())
+    };
+    plain(a) == plain(b)
+}
+
+/// The settings without studies: what remains decides where presses are found.
+fn only_locating(settings: AnalysisSettings) -> AnalysisSettings {
+    let plain = AnalysisSettings::default();
+    AnalysisSettings {
+        study_presses: 0,
+        reduction: plain.reduction,
+        latency: plain.latency,
+        cmre: plain.cmre,
+        bits_per_event: plain.bits_per_event,
+        within_mm: plain.within_mm,
+        failure_penalty_mm: None,
+        bootstrap_resamples: 2,
+        seed: plain.seed,
+        rate_bin_ms: plain.rate_bin_ms,
+        ..settings
+    }
+}
+
+/// The sessions of a skin, analysed with other settings; studies are left out.
+fn again(found: &inputs::Found, settings: &AnalysisSettings) -> Result<Subject, Failure> {
+    let mut subject = found.subject.clone();
+    for (session, path) in subject.sessions.iter_mut().zip(&found.paths) {
+        let Opened {
+            mut input, events, ..
+        } = open(path, Choices::default())?;
+        let own = input.settings.exclude_presses.clone();
+        input.settings = AnalysisSettings {
+            exclude_presses: own,
+            seed: settings.seed,
+            ..only_locating(settings.clone())
+        };
+        let analysed: Result<Analysis, AnalysisError> = skinrig_analysis::analyze(&input, &events);
+        *session = Session {
+            facts: session.facts.clone(),
+            analysis: analysed.map_err(|e| Failure::input(format!("{}: {e}", path.display())))?,
+        };
+    }
+    Ok(subject)
+}

@@ -1,0 +1,38 @@
+//! Owns the flattening of structured values to paths and texts.
+
+use serde::Serialize;
+use serde_json::Value;
+
+/// The leaves of `value` as (path, text): maps by key, short lists of numbers and words as one text, others by index.
+pub fn flatten(path: &str, value: &Value, into: &mut Vec<(String, String)>) {
+    match value {
+        Value::Object(map) => {
+            for (key, value) in map {
+                flatten(&format!("{path}.{key}"), value, into);
+            }
+        }
+        Value::Array(items) if items.iter().any(|i| i.is_object() || i.is_array()) => {
+            for (i, value) in (1..).zip(items) {
+                flatten(&format!("{path}.{i}"), value, into);
+            }
+        }
+        Value::Array(items) => {
+            let items: Vec<String> = items.iter().map(leaf).collect();
+            into.push((path.to_owned(), format!("[{}]", items.join(", "))));
+        }
+        value => into.push((path.to_owned(), leaf(value))),
+    }
+}
+
+fn leaf(value: &Value) -> String {
+    match value {
+        Value::String(text) => text.clone(),
+        Value::Null => "none".to_owned(),
+        other => other.to_string(),
+    }
+}
+
+/// The name that serde writes for a variant without fields.
+pub(crate) fn word<T: Serialize>(variant: &T) -> String {
+    serde_json::to_value(variant).map_or_else(|_| String::new(), |v| leaf(&v))
+}

@@ -1,0 +1,302 @@
+//! A simulated session with one planted cause: plan, clocks and events of the geometric level, without devices.
+
+use skinrig_analysis::{Analysis, EventSource, SessionInput, analyze};
+use skinrig_compare::{Facts, Session, Subject};
+use skinrig_model::{
+    AnalysisSettings, AttemptId, CalibrationModel, CameraId, CdEvent, HostTime, Mark, MarkKind,
+    PlannedPress, Point2, Point3, PressId, PressOutcome, PressRole, PressTiming, PressVerdict,
+    PulseTrain, RigGeometry, SentMark, SimLevel, Skin, StereoGeometry, TriggerEdge,
+};
+use skinrig_sim::SimConfig;
+use skinrig_sim::geometric::GeometricModel;
+use skinrig_sim::scene::{GRID_NS, PixelModel, TipSample};
+
+/// From press to press, ms.
+const PERIOD_MS: i64 = 1_400;
+/// The first press, ms; the tip then goes down for 100 ms, stays for 100 ms and comes up for 100 ms.
+const FIRST_MS: i64 = 600;
+const SIDE: u32 = 5;
+const DEPTH_MM: f64 = 2.0;
+
+/// What is wrong with a skin, its cameras or its robot.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Plant {
+    /// Nothing.
+    Nothing,
+    /// Camera 1 was pushed after the calibration: this far along x (mm) and turned (degrees).
+    Camera(f64, f64),
+    /// So many times the events per mm of travel.
+    Signal(f64),
+    /// So many times the background events.
+    Noise(f64),
+    /// Standard deviation of the halo about the tip, mm.
+    Spread(f64),
+    /// Standard deviation of the robot's position about the measured one, per axis, mm.
+    Robot(f64),
+    /// One event in so many is used by the analysis.
+    Settings(u32),
+}
+
+struct Events([Vec<CdEvent>; 2]);
+
+impl EventSource for Events {
+    fn for_each_slice(
+        &self,
+        camera: CameraId,
+        each: &mut dyn FnMut(&[CdEvent]),
+    ) -> Result<(), String> {
+        each(&self.0[camera.index()]);
+        Ok(())
+    }
+}
+
+/// Seeded and roughly normal.
+pub struct Dice(pub u64);
+
+impl Dice {
+    fn unit(&mut self) -> f64 {
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    fn normal(&mut self) -> f64 {
+        (0..12).map(|_| self.unit()).sum::<f64>() - 6.0
+    }
+}
+
+/// What a session is made from, so that it can be analysed again.
+pub struct Recorded {
+    input: SessionInput,
+    events: Events,
+    facts: Facts,
+}
+
+/// Records a session: one repetition that calibrates, two that score.
+pub fn record(seed: u64, plant: Plant) -> Recorded {
+    let mut config = SimConfig::new(seed, SimLevel::Geometric);
+    let g = &mut config.geometric;
+    // Half of the published events, soon over: quicker, and what was pressed before leaves less.
+    g.relax_s = 0.2;
+    for rate in [
+        &mut g.press_per_mm,
+        &mut g.release_per_mm,
+        &mut g.relax_per_mm,
+    ] {
+        *rate /= 2.0;
+        if let Plant::Signal(times) = plant {
+            *rate *= times;
+        }
+    }
+    g.dead_share = 0.0;
+    match plant {
+        Plant::Noise(times) => g.background_hz *= times,
+        Plant::Spread(halo_mm) => g.halo_mm = halo_mm,
+        _ => {}
+    }
+    let truth = config.true_geometry();
+    let mut moved = truth;
+    if let Plant::Camera(mm, deg) = plant {
+        moved.cameras[0].position.x_mm += mm;
+        moved.cameras[0].skew_deg += deg;
+    }
+    let mut dice = Dice(seed ^ 0x5eed);
+    let mut input = input(&config, plant);
+    let mut pressed = Vec::new();
+    for i in 0..3 * SIDE * SIDE {
+        let place = i % (SIDE * SIDE);
+        let at = Point2::new(
+            -14.0 + 11.0 * f64::from(place / SIDE),
+            -20.0 + 11.0 * f64::from(place % SIDE),
+        );
+        // The robot goes where it was told, but for what it does not know itself.
+        let scatter = if let Plant::Robot(mm) = plant {
+            mm
+        } else {
+            0.0
+        };
+        let measured = Point2::new(
+            at.x_mm + 0.02 * dice.normal() + scatter * dice.normal(),
+            at.y_mm + 0.02 * dice.normal() + scatter * dice.normal(),
+        );
+        pressed.push(at);
+        add(&mut input, i, at, measured);
+    }
+    let events = [0, 1].map(|k| events(&config, [&truth, &moved], &pressed, k));
+    Recorded {
+        input,
+        events: Events(events),
+        facts: Facts {
+            file: format!("{seed}.session.sqlite"),
+            session_id: format!("{seed:032x}"),
+            prototype: format!("{plant:?}"),
+            rig_kind: "simulated".into(),
+            rig_name: "simulated (geometric)".into(),
+            ..Facts::default()
+        },
+    }
+}
+
+impl Recorded {
+    /// As a skin, analysed with its own settings or another thinning.
+    pub fn skin(&self, letter: char, thinning: Option<u32>) -> Subject {
+        let mut input = self.input.clone();
+        input.settings.thinning = thinning.unwrap_or(input.settings.thinning);
+        let analysis: Analysis = analyze(&input, &self.events).unwrap();
+        let session = Session {
+            facts: self.facts.clone(),
+            analysis,
+        };
+        Subject {
+            letter,
+            name: self.facts.prototype.clone(),
+            sessions: vec![session],
+        }
+    }
+}
+
+fn input(config: &SimConfig, plant: Plant) -> SessionInput {
+    SessionInput {
+        planned: Vec::new(),
+        outcomes: Vec::new(),
+        earlier: Vec::new(),
+        edges: [Vec::new(), Vec::new()],
+        marks: Vec::new(),
+        gaps: [Vec::new(), Vec::new()],
+        box_reports: Vec::new(),
+        pose_interval_us: None,
+        crossing_se_us: None,
+        legs: Vec::new(),
+        rig: RigGeometry {
+            outline: config.outline,
+            nominal: config.nominal,
+            trigger_channel: Some(0),
+        },
+        settings: AnalysisSettings {
+            bootstrap_resamples: 2,
+            study_presses: 0,
+            calibration: CalibrationModel::Full,
+            thinning: if let Plant::Settings(n) = plant { n } else { 1 },
+            ..AnalysisSettings::default()
+        },
+    }
+}
+
+fn contact_ms(press: u32) -> i64 {
+    FIRST_MS + i64::from(press) * PERIOD_MS
+}
+
+fn add(input: &mut SessionInput, number: u32, at: Point2, measured: Point2) {
+    let id = PressId(number);
+    let (repetition, location) = (number / (SIDE * SIDE), number % (SIDE * SIDE));
+    let role = if repetition == 0 {
+        PressRole::Calibrate
+    } else {
+        PressRole::Score
+    };
+    input.planned.push(PlannedPress {
+        id,
+        role,
+        repetition,
+        location,
+        at,
+        depth_mm: DEPTH_MM,
+    });
+    let t = |ms: i64| HostTime((contact_ms(number) + ms) * 1_000_000);
+    let timing = PressTiming {
+        approach: t(-50),
+        contact: t(0),
+        at_depth: t(100),
+        retract: t(200),
+        release: t(300),
+        clear: t(350),
+    };
+    input.outcomes.push(Some(PressOutcome {
+        attempt: AttemptId {
+            press: id,
+            number: 1,
+        },
+        verdict: PressVerdict::Valid,
+        timing: Some(timing),
+        measured_at: Some(measured),
+        measured_depth_mm: Some(DEPTH_MM),
+        touched_mm: None,
+        peak_force_n: None,
+        scheduled: false,
+    }));
+    for (kind, t) in [
+        (MarkKind::Contact, timing.contact),
+        (MarkKind::Release, timing.release),
+    ] {
+        let mark = Mark { kind, press: id };
+        input.marks.push(SentMark {
+            mark,
+            t,
+            uncertainty_ns: 500,
+        });
+        for edges in &mut input.edges {
+            for (rise, width) in PulseTrain::new(mark).unwrap().pulses() {
+                for (after, rising) in [(rise, true), (rise + width, false)] {
+                    edges.push(TriggerEdge {
+                        t_us: (t.0 / 1_000) as u64 + after,
+                        channel: 0,
+                        rising,
+                    });
+                }
+            }
+        }
+    }
+}
+
+/// The events of camera `k`: before the camera was moved, and after.
+fn events(
+    config: &SimConfig,
+    geometry: [&StereoGeometry; 2],
+    pressed: &[Point2],
+    k: usize,
+) -> Vec<CdEvent> {
+    let mut scene = config.scene(CameraId::ALL[k]);
+    let model = |scene: &_| GeometricModel::new(scene, &config.geometric);
+    scene.camera = geometry[0].cameras[k];
+    let mut pixels = model(&scene);
+    let moved_at = (SIDE * SIDE) as usize;
+    let mut out = Vec::new();
+    for (i, at) in pressed.iter().enumerate() {
+        if i == moved_at && geometry[0] != geometry[1] {
+            scene.camera = geometry[1].cameras[k];
+            pixels = model(&scene);
+        }
+        let from = contact_ms(i as u32) - FIRST_MS.min(PERIOD_MS - 400);
+        let tips: Vec<TipSample> = (from..from + PERIOD_MS)
+            .map(|ms| {
+                let after = (ms - contact_ms(i as u32)) as f64;
+                let down =
+                    (after / 100.0).clamp(0.0, 1.0) - ((after - 200.0) / 100.0).clamp(0.0, 1.0);
+                let z = if (0.0..=300.0).contains(&after) {
+                    -DEPTH_MM * down
+                } else {
+                    2.0
+                };
+                let position: Point3<Skin> = Point3::new(at.x_mm, at.y_mm, z);
+                TipSample {
+                    t_ns: ms * GRID_NS,
+                    position,
+                }
+            })
+            .collect();
+        pixels.advance(&tips, &mut out);
+    }
+    let mut events: Vec<CdEvent> = out
+        .iter()
+        .map(|e| CdEvent {
+            t_us: (e.t_ns / 1_000) as u64,
+            x: e.x,
+            y: e.y,
+            polarity: e.polarity,
+        })
+        .collect();
+    events.sort_by_key(|e| e.t_us);
+    events
+}

@@ -1,0 +1,57 @@
+// Behaviour of the page of a comparison: theme, print, downloads. No dependencies.
+'use strict';
+(() => {
+  const $ = (q, from = document) => from.querySelector(q);
+  const $$ = (q, from = document) => [...from.querySelectorAll(q)];
+  const data = JSON.parse($('#report-data').textContent);
+
+  // Theme: follows the system until the button is used.
+  const root = document.documentElement;
+  const button = $('#theme');
+  const systemDark = matchMedia('(prefers-color-scheme: dark)');
+  const isDark = () => (root.dataset.theme || (systemDark.matches ? 'dark' : 'light')) === 'dark';
+  const label = () => { button.textContent = isDark() ? 'Light' : 'Dark'; };
+  const store = value => { try { localStorage.setItem('skinrig-theme', value); } catch { /* a page may be denied storage */ } };
+  try { const kept = localStorage.getItem('skinrig-theme'); if (kept === 'dark' || kept === 'light') root.dataset.theme = kept; } catch { /* same */ }
+  const asked = location.hash.match(/theme=(dark|light)/);
+  if (asked) root.dataset.theme = asked[1];
+  button.addEventListener('click', () => { root.dataset.theme = isDark() ? 'light' : 'dark'; store(root.dataset.theme); label(); });
+  systemDark.addEventListener('change', label);
+  label();
+  let before;
+  addEventListener('beforeprint', () => { before = root.dataset.theme; root.dataset.theme = 'light'; });
+  addEventListener('afterprint', () => { if (before) root.dataset.theme = before; else delete root.dataset.theme; });
+  $('#print').addEventListener('click', () => print());
+
+  // Downloads.
+  const save = (name, type, content) => {
+    const url = URL.createObjectURL(new Blob([content], { type }));
+    const a = document.createElement('a');
+    a.href = url;
+    a.download = (data.session + '_' + name).replace(/[^A-Za-z0-9._-]+/g, '-');
+    a.click();
+    setTimeout(() => URL.revokeObjectURL(url), 1000);
+  };
+  const cell = v => v === null || v === undefined ? '' : /[",\r\n]/.test(v) ? '"' + String(v).replaceAll('"', '""') + '"' : String(v);
+  const csv = t => {
+    const n = t.data.length ? t.data[0].length : 0;
+    const lines = [t.columns.join(',')];
+    for (let i = 0; i < n; i++) lines.push(t.data.map(c => cell(c[i])).join(','));
+    return lines.join('\r\n') + '\r\n';
+  };
+  const file = svg => {
+    const copy = svg.cloneNode(true);
+    const style = document.createElementNS('http://www.w3.org/2000/svg', 'style');
+    style.textContent = $('#figure-style').textContent;
+    copy.insertBefore(style, copy.firstChild);
+    return '<?xml version="1.0" encoding="UTF-8"?>\n' + new XMLSerializer().serializeToString(copy);
+  };
+  for (const b of $$('[data-save]')) {
+    b.addEventListener('click', () => {
+      const box = b.closest('[data-figure]');
+      const name = box.dataset.figure;
+      if (b.dataset.save === 'svg') save(name + '.svg', 'image/svg+xml', file($('svg', box)));
+      else save(name + '.csv', 'text/csv', csv(data.tables[box.dataset.table]));
+    });
+  }
+})();

@@ -1,0 +1,224 @@
+//! Owns the page of a comparison: what its template and its script receive.
+
+use minijinja::value::Serde;
+use minijinja::{AutoEscape, Environment, Value, context};
+use serde::Serialize;
+use skinrig_compare::statistics::Verdict;
+use skinrig_compare::{Comparison, Weight};
+
+use super::figures::{self, Drawn};
+use super::{tables, words};
+use crate::ReportError;
+use crate::format::number;
+use crate::page::{PAGE_CSS, script_json};
+use crate::svg::{FIGURE_CSS, plain_css};
+
+const TEMPLATES: [(&str, &str); 2] = [
+    ("page.html", include_str!("../../assets/compare/page.html")),
+    ("macros.html", include_str!("../../assets/macros.html")),
+];
+const CSS: &str = include_str!("../../assets/compare/page.css");
+const SCRIPT: &str = include_str!("../../assets/compare/page.js");
+
+/// A skin against the first, as the template takes it.
+#[derive(Serialize)]
+struct Versus {
+    letter: char,
+    name: String,
+    verdict: &'static str,
+    headline: String,
+    beyond: bool,
+    margin: Option<String>,
+    needed: Option<String>,
+    rows: Vec<Line>,
+    figures: Vec<Value>,
+    causes: Option<Why>,
+}
+
+#[derive(Serialize)]
+struct Line {
+    name: String,
+    a: String,
+    b: String,
+    difference: String,
+    interval: String,
+    margin: String,
+    verdict: &'static str,
+    key: &'static str,
+    note: String,
+}
+
+#[derive(Serialize)]
+struct Why {
+    carried_by: Option<&'static str>,
+    measured: Vec<[String; 3]>,
+    exchanged: Vec<[String; 4]>,
+    places: u32,
+    presses: [u32; 2],
+}
+
+/// The comparison as one HTML page that needs no network and no other file.
+///
+/// # Errors
+/// [`ReportError`] when the template or the script data cannot be written; no input is known to cause it.
+pub fn html(result: &Comparison) -> Result<String, ReportError> {
+    let mut env = Environment::new();
+    env.set_auto_escape_callback(|_| AutoEscape::Html);
+    for (name, source) in TEMPLATES {
+        env.add_template(name, source)?;
+    }
+    let safe = |text: &str| Value::from_safe_string(text.to_owned());
+    let versus: Vec<Versus> = (1..result.skins.len()).map(|k| versus(result, k)).collect();
+    let of = |weight: Weight| {
+        let rows = result
+            .differences
+            .iter()
+            .filter(move |d| d.weight == weight);
+        rows.map(|d| {
+            context! {
+                key => d.key, what => d.what.clone(), reason => d.reason.clone(), lifted => d.lifted,
+                values => result.skins.iter().zip(&d.values)
+                    .map(|(s, v)| (s.letter.to_string(), v.clone())).collect::<Vec<_>>(),
+            }
+        })
+        .collect::<Vec<Value>>()
+    };
+    let heading = match versus.as_slice() {
+        [one] => format!("{} against {}", one.name, result.skins[0].name),
+        many => format!("{} skins against {}", many.len(), result.skins[0].name),
+    };
+    let data = tables::script_data(result);
+    Ok(env.get_template("page.html")?.render(context! {
+        page_css => safe(PAGE_CSS),
+        own_css => safe(CSS),
+        figure_css => safe(FIGURE_CSS),
+        plain_css => safe(&plain_css()),
+        script => safe(SCRIPT),
+        data => safe(&script_json(&data)?),
+        heading,
+        stand_in => words::stand_in(result),
+        limits => result.limits.clone(),
+        margins => result.table.iter().any(|r| r.margin.is_some()),
+        alone => result.skins.iter().all(|s| s.sessions.len() == 1),
+        several => result.skins.len() > 2,
+        skins => result.skins.iter().map(|s| context! {
+            letter => s.letter.to_string(), name => s.name.clone(), text => words::skin(s),
+            sessions => s.sessions.iter().map(|f| context! {
+                file => f.file.clone(), id => f.session_id.clone(), started => f.started.clone(), rig => f.rig_name.clone(),
+            }).collect::<Vec<_>>(),
+        }).collect::<Vec<_>>(),
+        blocking => of(Weight::Blocking),
+        confounding => of(Weight::Confounding),
+        harmless => of(Weight::Harmless),
+        versus => Value::from(Serde(versus)),
+    })?)
+}
+
+fn versus(result: &Comparison, k: usize) -> Versus {
+    let skin = &result.skins[k];
+    let row = result.headline();
+    let found = row.and_then(|r| r.against_first.iter().find(|a| a.subject == k));
+    let compared = found.and_then(|f| f.comparison.as_ref());
+    let margin = row.and_then(|r| Some(format!("{} mm", words::value(r, Some(r.margin?)))));
+    let why = result.causes.get(k - 1).and_then(Option::as_ref);
+    let drawn = [
+        figures::maps(result, k),
+        figures::margins(result, k),
+        figures::locations(result, k),
+        why.map(|of| figures::causes(result, k, of)),
+    ];
+    Versus {
+        letter: skin.letter,
+        name: skin.name.clone(),
+        verdict: words::verdict(found.and_then(|f| f.verdict)),
+        headline: found
+            .map(|f| words::headline(result, f))
+            .unwrap_or_default(),
+        beyond: compared.is_some_and(|c| c.beyond_margin),
+        margin,
+        needed: compared.and_then(words::needed),
+        rows: lines(result, k),
+        figures: drawn.into_iter().map(figure).collect(),
+        causes: why.map(|of| Why {
+            carried_by: of.carried_by.map(skinrig_compare::Factor::name),
+            measured: of
+                .measured
+                .iter()
+                .map(|m| {
+                    let digits = |v: Option<f64>| match v {
+                        Some(v) if v.abs() >= 100.0 => 0,
+                        _ => 3,
+                    };
+                    let [a, b] = m.values.map(|v| number(v, digits(v)));
+                    [format!("{} ({})", m.what, m.unit), a, b]
+                })
+                .collect(),
+            exchanged: of
+                .exchanged
+                .iter()
+                .map(|x| {
+                    let rmse = format!(
+                        "{} ({} of {})",
+                        number(x.rmse_mm, 2),
+                        x.located[0],
+                        x.located[1]
+                    );
+                    [
+                        x.presses.to_string(),
+                        x.calibration.to_string(),
+                        x.settings.to_string(),
+                        rmse,
+                    ]
+                })
+                .collect(),
+            places: of.places,
+            presses: of.presses,
+        }),
+    }
+}
+
+/// For the template; nothing for a figure without data.
+fn figure(drawn: Option<Drawn>) -> Value {
+    drawn.map_or(Value::from(()), |f| {
+        context! {
+            id => f.id, title => f.title, caption => f.caption, svg => Value::from_safe_string(f.svg),
+            table => f.table, interaction => f.interaction,
+        }
+    })
+}
+
+fn lines(result: &Comparison, k: usize) -> Vec<Line> {
+    let line = |row: &skinrig_compare::Row| {
+        let found = row.against_first.iter().find(|a| a.subject == k)?;
+        let c = found.comparison.as_ref();
+        let own = |i: usize| row.values.get(i).and_then(|v| v.value).map(|v| v.value);
+        let sure = matches!(found.verdict, Some(Verdict::Undecided) | None);
+        Some(Line {
+            name: words::heading(row),
+            a: words::value(row, c.map(|c| c.a.value).or(own(0))),
+            b: words::value(row, c.map(|c| c.b.value).or(own(k))),
+            difference: c.map_or_else(
+                || crate::format::NONE.to_owned(),
+                |c| words::signed(row, c.difference.value),
+            ),
+            interval: c.map_or_else(
+                || crate::format::NONE.to_owned(),
+                |c| words::interval(row, &c.difference),
+            ),
+            margin: row.margin.map_or_else(
+                || crate::format::NONE.to_owned(),
+                |m| format!("± {}", words::value(row, Some(m))),
+            ),
+            verdict: words::verdict(found.verdict),
+            key: row.metric.key(),
+            note: match (c, &found.refused) {
+                (_, Some(why)) => why.clone(),
+                (Some(c), None) if sure && row.margin.is_some() => {
+                    words::needed(c).unwrap_or_default()
+                }
+                _ => String::new(),
+            },
+        })
+    };
+    result.table.iter().filter_map(line).collect()
+}

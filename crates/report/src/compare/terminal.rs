@@ -1,0 +1,197 @@
+//! Owns the table of a comparison for a terminal.
+
+use std::fmt::Write as _;
+
+use skinrig_compare::statistics::Verdict;
+use skinrig_compare::{Causes, Comparison, Difference, Weight};
+
+use super::words;
+use crate::format::{NONE, number};
+use crate::terminal::{Paint, plain, wrap};
+
+/// Harmless differences with a line of their own; the page lists all.
+const MOST_HARMLESS: usize = 4;
+
+/// The table: at most 80 columns, ends with a newline. `color` adds ANSI escapes, nothing that changes the layout.
+#[must_use]
+pub fn terminal_table(result: &Comparison, color: bool) -> String {
+    let paint = Paint(color);
+    let mut out = String::new();
+    for skin in &result.skins {
+        out += &wrap(&format!("{:<10}", skin.letter), &plain(&words::skin(skin)));
+    }
+    if let Some(word) = words::stand_in(result) {
+        let text = format!("{}, not measured on hardware", word.to_uppercase());
+        out += &paint.warn(&wrap("rig       ", &text));
+    }
+    if let Some(limits) = &result.limits {
+        out += &wrap("limits    ", &plain(limits));
+    }
+    out.push('\n');
+    out += &comparability(result, &paint);
+    for (k, skin) in result.skins.iter().enumerate().skip(1) {
+        out += &against(result, k, skin.letter, &paint);
+        if let Some(Some(causes)) = result.causes.get(k - 1) {
+            out += &why(causes, skin.letter, &paint);
+        }
+    }
+    out
+}
+
+fn comparability(result: &Comparison, paint: &Paint) -> String {
+    let mut out = String::new();
+    let of = |weight: Weight| {
+        result
+            .differences
+            .iter()
+            .filter(move |d| d.weight == weight)
+    };
+    for difference in of(Weight::Blocking) {
+        let first = if difference.lifted {
+            "despite   "
+        } else {
+            "BLOCKING  "
+        };
+        out += &paint.warn(&wrap(first, &plain(&line(result, difference))));
+    }
+    for difference in of(Weight::Confounding) {
+        out += &paint.warn(&wrap("confounds ", &plain(&line(result, difference))));
+    }
+    let harmless: Vec<&Difference> = of(Weight::Harmless).collect();
+    for difference in harmless.iter().take(MOST_HARMLESS) {
+        out += &wrap("harmless  ", &plain(&line(result, difference)));
+    }
+    if let Some(more) = harmless.len().checked_sub(MOST_HARMLESS).filter(|n| *n > 0) {
+        out += &wrap(
+            "          ",
+            &format!("and {more} more harmless differences"),
+        );
+    }
+    if out.is_empty() {
+        out += "differ    in nothing that is recorded but the skin\n";
+    }
+    out.push('\n');
+    out
+}
+
+fn line(result: &Comparison, difference: &Difference) -> String {
+    let values = result.skins.iter().zip(&difference.values);
+    let values: Vec<String> = values.map(|(s, v)| format!("{} {v}", s.letter)).collect();
+    format!(
+        "{}: {} ({})",
+        difference.what,
+        values.join(", "),
+        difference.reason
+    )
+}
+
+fn against(result: &Comparison, k: usize, letter: char, paint: &Paint) -> String {
+    let mut out = String::new();
+    if result.table.is_empty() {
+        return out;
+    }
+    let head = format!(
+        "{:<26}{:>7}{:>8}{:>9}{:>18}  verdict on {letter}",
+        format!("{letter} against A"),
+        "A",
+        letter,
+        format!("{letter} - A"),
+        "95 % interval"
+    );
+    let _ = writeln!(out, "{}", paint.bold(&head));
+    let mut undecided = Vec::new();
+    for row in &result.table {
+        let Some(found) = row.against_first.iter().find(|a| a.subject == k) else {
+            continue;
+        };
+        let Some(c) = &found.comparison else {
+            let own = |i: usize| {
+                let value = row.values.get(i).and_then(|v| v.value);
+                words::value(row, value.map(|v| v.value))
+            };
+            let name = words::heading(row);
+            let _ = writeln!(
+                out,
+                "{name:<26}{:>7}{:>8}{NONE:>9}{NONE:>18}  not compared",
+                own(0),
+                own(k)
+            );
+            continue;
+        };
+        let text = format!(
+            "{:<26}{:>7}{:>8}{:>9}{:>18}  {}",
+            words::heading(row),
+            words::value(row, Some(c.a.value)),
+            words::value(row, Some(c.b.value)),
+            words::signed(row, c.difference.value),
+            words::interval(row, &c.difference),
+            words::verdict(found.verdict),
+        );
+        let text = match found.verdict {
+            Some(Verdict::Worse) => paint.warn(&text),
+            Some(Verdict::Better) => paint.bold(&text),
+            _ => text,
+        };
+        let _ = writeln!(out, "{text}");
+        if found.verdict == Some(Verdict::Undecided)
+            && row.margin.is_some()
+            && let Some(needed) = words::needed(c)
+        {
+            undecided.push((row.name.clone(), needed));
+        }
+    }
+    if result.table.iter().all(|r| r.margin.is_none()) {
+        out += &wrap(
+            "          ",
+            "no margins: nothing can be equivalent (--limits FILE or --margin rmse=0.5mm)",
+        );
+    }
+    out.push('\n');
+    for (name, needed) in undecided.iter().take(1) {
+        out += &wrap("undecided ", &format!("{name}: {needed}"));
+    }
+    out
+}
+
+fn why(causes: &Causes, letter: char, paint: &Paint) -> String {
+    let mm2 = |v: Option<f64>| number(v, 3);
+    let head = match causes.carried_by {
+        Some(factor) => format!("the change is carried by: {}", factor.name()),
+        None => "no single factor carries a change that is one".to_owned(),
+    };
+    let mut out = paint.bold(&wrap(&format!("why {letter}     "), &head));
+    let _ = writeln!(
+        out,
+        "          mean square error {} -> {} mm²: change {} [{}, {}]",
+        mm2(Some(causes.mse_mm2[0])),
+        mm2(Some(causes.mse_mm2[1])),
+        mm2(Some(causes.change_mm2.value)),
+        mm2(causes.change_mm2.low),
+        mm2(causes.change_mm2.high),
+    );
+    for c in &causes.contributions {
+        let _ = writeln!(
+            out,
+            "          {:<34}{:>9} [{}, {}]",
+            c.factor.name(),
+            mm2(Some(c.mm2.value)),
+            mm2(c.mm2.low),
+            mm2(c.mm2.high)
+        );
+    }
+    for x in &causes.exchanged {
+        let own = x.presses == x.calibration && x.presses == x.settings;
+        if !own {
+            let _ = writeln!(
+                out,
+                "          presses of {}, calibration of {}, settings of {}: RMSE {} mm",
+                x.presses,
+                x.calibration,
+                x.settings,
+                number(x.rmse_mm, 2)
+            );
+        }
+    }
+    out.push('\n');
+    out
+}
