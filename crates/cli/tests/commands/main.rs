@@ -2,6 +2,7 @@
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on must fail")]
 #![expect(clippy::print_stderr, reason = "a test that is skipped says why")]
 
+mod compare;
 mod damage;
 mod dataset;
 mod evaluation;

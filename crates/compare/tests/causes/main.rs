@@ -5,7 +5,8 @@ mod planted;
 
 use planted::{Plant, record};
 use skinrig_compare::causes::causes;
-use skinrig_compare::{Again, Factor};
+use skinrig_compare::statistics::Verdict;
+use skinrig_compare::{Again, Choices, Factor, Metric, compare};
 
 /// What is planted and what must be named.
 const PLANTS: [(Plant, Factor); 6] = [
@@ -78,4 +79,39 @@ fn where_nothing_was_planted_nothing_is_named() {
         let planted = [Factor::Signal, Factor::Noise, Factor::Spread, Factor::Robot];
         assert!(!planted.map(Some).contains(&found.carried_by), "{found:#?}");
     }
+}
+
+#[test]
+fn a_worse_skin_is_worse_and_another_session_of_the_same_is_not_better() {
+    let skin = |seed, plant, letter| record(seed, plant).skin(letter, None);
+    let choices = Choices {
+        margins: vec![(Metric::Rmse, 0.06)],
+        ..Choices::default()
+    };
+    let subjects = [
+        skin(1, Plant::Nothing, 'A'),
+        skin(2, Plant::Nothing, 'B'),
+        skin(3, Plant::Spread(9.0), 'C'),
+    ];
+    let result = compare(&subjects, &Vec::new(), &choices);
+    assert_eq!(result.blocking().count(), 0, "{:?}", result.differences);
+    assert_eq!(result.verdict(1), Some(Verdict::Equivalent));
+    assert_eq!(result.verdict(2), Some(Verdict::Worse));
+    let worse = result
+        .locations
+        .iter()
+        .filter(|l| l.skins[2].sign() == 1)
+        .count();
+    let better = result
+        .locations
+        .iter()
+        .filter(|l| l.skins[2].sign() == -1)
+        .count();
+    assert!(worse > better, "{worse} {better}");
+    let ranks: Vec<u32> = result
+        .locations
+        .iter()
+        .filter_map(|l| l.skins[2].rank)
+        .collect();
+    assert_eq!(ranks.iter().sum::<u32>(), (1..=25).sum());
 }

@@ -62,7 +62,7 @@ pub(in crate::compare) fn locations(result: &Comparison, k: usize) -> Option<Dra
             &[
                 ("cx", &Px(axes.x.at(*a))),
                 ("cy", &Px(axes.y.at(*b))),
-                ("r", &"4.6"),
+                ("r", &"5"),
                 ("style", &style),
             ],
         );

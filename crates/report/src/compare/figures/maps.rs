@@ -9,12 +9,12 @@ use crate::colour::viridis;
 use crate::format::number;
 use crate::svg::{Px, Svg, polyline};
 
-const SIZE: (f64, f64) = (1240.0, 560.0);
+const SIZE: (f64, f64) = (1240.0, 528.0);
 const LEFT: f64 = 62.0;
 const PANEL: f64 = 350.0;
 const STEP: f64 = 400.0;
 const TOP: f64 = 40.0;
-const BAR_Y: f64 = 482.0;
+const BAR_Y: f64 = 450.0;
 
 /// The maps of skin `k` beside the first.
 pub(in crate::compare) fn maps(result: &Comparison, k: usize) -> Option<Drawn> {

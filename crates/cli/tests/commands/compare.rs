@@ -1,0 +1,190 @@
+//! Which skin is better: two sessions of one skin are not, what may not be compared is refused, and what is read is stable.
+
+use serde_json::Value;
+
+use crate::json::shape;
+use crate::support::{Lab, files, only, skinrig, text};
+
+/// One small session of a skin, and its path.
+fn record(lab: &Lab, folder: &str, seed: &str, more: &[&str]) -> String {
+    let mut arguments = vec!["--seed", seed, "--set", "analysis.bootstrap_resamples=50"];
+    arguments.extend_from_slice(more);
+    text(&lab.record(folder, &arguments))
+}
+
+fn row<'a>(document: &'a Value, metric: &str) -> &'a Value {
+    let rows = document["table"].as_array().unwrap();
+    rows.iter().find(|r| r["metric"] == metric).unwrap()
+}
+
+#[test]
+fn one_skin_twice_is_not_better_and_the_page_is_whole() {
+    let lab = Lab::new();
+    let a = record(&lab, "a", "1", &[]);
+    let b = record(&lab, "b", "2", &[]);
+    let out = lab.text("page/c.html");
+    std::fs::create_dir(lab.path("page")).unwrap();
+    let limits = "protocols/comparison.limits.yaml";
+    let arguments = [
+        "compare",
+        &a,
+        &b,
+        "--limits",
+        limits,
+        "--margin",
+        "rmse=8 mm",
+        "--out",
+        &out,
+    ];
+    let said = skinrig(&arguments).code(0);
+    assert!(
+        said.out.lines().all(|l| l.chars().count() <= 80),
+        "{}",
+        said.out
+    );
+    // Numbers and names are of this run; what stands where is not.
+    let layout: String = said
+        .out
+        .lines()
+        .skip_while(|l| !l.starts_with("B against"))
+        .collect::<Vec<_>>()
+        .join("\n");
+    let layout: Vec<&str> = layout
+        .lines()
+        .map(|l| l.get(..26).unwrap_or(l).trim_end())
+        .collect();
+    let end = layout.iter().position(|l| l.is_empty()).unwrap();
+    insta::assert_snapshot!("compare_table", layout[..end].join("\n"));
+    let document = crate::support::read_json(&lab.path("page/c.json"));
+    insta::assert_snapshot!("compare", shape_without_facts(document.clone()));
+    let rmse = row(&document, "rmse");
+    assert_eq!(rmse["margin"], 8.0, "the command line goes before the file");
+    assert_eq!(rmse["against_first"][0]["verdict"], "equivalent", "{rmse}");
+    assert_eq!(row(&document, "taxels")["margin"], 50.0);
+    assert_eq!(document["locations"].as_array().unwrap().len(), 4);
+    let page = std::fs::read_to_string(&out).unwrap();
+    for part in [
+        "figure-maps-1",
+        "figure-margins-1",
+        "figure-causes-1",
+        "data-testid=\"simulated\"",
+        "</html>",
+    ] {
+        assert!(page.contains(part), "{part} is missing");
+    }
+    assert!(
+        !page.contains("http://") || !page.contains("src=\"http"),
+        "loads something"
+    );
+}
+
+/// The keys of the document; of a session's facts only that there are some.
+fn shape_without_facts(mut document: Value) -> String {
+    for skin in document["skins"].as_array_mut().unwrap() {
+        for session in skin["sessions"].as_array_mut().unwrap() {
+            session["values"] = Value::from(session["values"].as_object().unwrap().len());
+        }
+    }
+    shape(&document)
+}
+
+#[test]
+fn what_may_not_be_compared_is_refused_and_can_be_lifted_by_name() {
+    let lab = Lab::new();
+    let a = record(&lab, "a", "1", &[]);
+    let deeper = record(&lab, "b", "2", &["--set", "depth=1 mm"]);
+    let refused = skinrig(&["compare", &a, &deeper]).code(2);
+    assert!(
+        refused.out.contains("BLOCKING") && !refused.out.contains("RMSE"),
+        "{refused:?}"
+    );
+    refused.complains(&["depths", "no depth is shared", "--despite depths"]);
+    assert!(
+        files(&lab.path("a"), ".html").is_empty(),
+        "a page of what may not be compared"
+    );
+    let json = skinrig(&["--json", "compare", &a, &deeper]).code(2).json();
+    assert_eq!(json["blocked"], true);
+    assert_eq!(json["table"].as_array().unwrap().len(), 0);
+    let same = skinrig(&["compare", &a, &a]).code(2);
+    same.complains(&["same-session", "one session stands on both sides"]);
+    let lifted = skinrig(&["compare", &a, &a, "--despite", "same-session"]).code(0);
+    assert!(lifted.out.contains("despite   session"), "{lifted:?}");
+    let page = std::fs::read_to_string(only(&lab.path("a"), "comparison.html")).unwrap();
+    assert!(
+        page.contains("data-testid=\"despite\""),
+        "not on the first screen"
+    );
+    let other_level = record(&lab, "c", "3", &["--level", "kinematic"]);
+    skinrig(&["compare", &a, &other_level]).code(2).complains(&[
+        "rig.level",
+        "sim-level",
+        "scored presses that count",
+    ]);
+}
+
+#[test]
+fn other_places_are_blocking_and_then_independent() {
+    let lab = Lab::new();
+    let a = record(&lab, "a", "1", &[]);
+    let places = "path.points=[[12 mm, 4 mm], [-8 mm, 20 mm], [2 mm, -16 mm], [23 mm, 15 mm]]";
+    let b = record(&lab, "b", "2", &["--set", places]);
+    skinrig(&["compare", &a, &b])
+        .code(2)
+        .complains(&["fewer than two places are shared", "--despite locations"]);
+    let json = skinrig(&["--json", "compare", &a, &b, "--despite", "locations"])
+        .code(0)
+        .json();
+    assert_eq!(json["settings"]["pairing"], "independent");
+    assert!(row(&json, "rmse")["against_first"][0]["comparison"].is_object());
+    assert!(
+        json["causes"][0].is_null(),
+        "nothing is shared to take apart"
+    );
+}
+
+#[test]
+fn strangers_are_refused_with_what_to_do() {
+    let lab = Lab::new();
+    let a = record(&lab, "a", "1", &[]);
+    let wrong = lab.path("limits.yaml");
+    std::fs::write(
+        &wrong,
+        "skinrig_limits: 1\nname: x\nmargins: {rsme: 1 mm}\n",
+    )
+    .unwrap();
+    for (arguments, parts) in [
+        (vec![a.as_str()], vec!["2", "SKIN"]),
+        (
+            vec![&a, "README.md"],
+            vec!["README.md", "expected a skinrig session"],
+        ),
+        (
+            vec![&a, "no such skin", "--sessions", "docs"],
+            vec!["no such skin", "--sessions"],
+        ),
+        (
+            vec![&a, "no/such.session.sqlite"],
+            vec!["no/such.session.sqlite", "skinrig sessions"],
+        ),
+        (
+            vec![&a, &a, "--margin", "rmse=1"],
+            vec!["the bare number `1`"],
+        ),
+        (
+            vec![&a, &a, "--margin", "rsme=1mm"],
+            vec!["did you mean `rmse`?"],
+        ),
+        (
+            vec![&a, &a, "--limits", wrong.to_str().unwrap()],
+            vec!["limits.yaml:3", "did you mean `rmse`?"],
+        ),
+        (
+            vec![&a, &a, "--limits", "no/limits.yaml"],
+            vec!["no/limits.yaml", "cannot read"],
+        ),
+    ] {
+        let all: Vec<&str> = std::iter::once("compare").chain(arguments).collect();
+        skinrig(&all).code(2).complains(&parts);
+    }
+}
