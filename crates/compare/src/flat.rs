@@ -28,6 +28,15 @@ fn leaf(value: &Value) -> String {
     match value {
         Value::String(text) => text.clone(),
         Value::Null => "none".to_owned(),
+        Value::Number(number) if number.is_f64() => {
+            let shortest = number.to_string();
+            let value = number.as_f64().unwrap_or_default();
+            match shortest.len() {
+                0..=8 => shortest,
+                _ if value.abs() < 1e-2 => format!("{value:.4e}"),
+                _ => format!("{value:.4}"),
+            }
+        }
         other => other.to_string(),
     }
 }

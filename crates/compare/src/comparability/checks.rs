@@ -1,17 +1,13 @@
-//! Owns the checks that no single fact decides: shared places and depths, alignment, doubles, ambient light, camera places.
+//! Owns the checks that no single fact decides: shared places and depths, alignment, results, doubles.
 
 use std::collections::BTreeSet;
 
 use skinrig_analysis::result::AlignmentStatus;
 
+use super::sights::{ambient, cameras};
 use super::{Difference, Weight};
-use crate::places::{Attempt, Places};
+use crate::places::Places;
 use crate::subject::{Session, Subject, joined};
-
-/// Idle event rates that differ by more than this factor are another light, or other noise.
-const IDLE_FACTOR: f64 = 1.25;
-/// Calibrated parameters that differ by more standard errors than this: the cameras stood elsewhere.
-const MOVED_SIGMAS: f64 = 4.0;
 
 pub(super) fn all(subjects: &[Subject], places: &Places) -> Vec<Difference> {
     let mut found = Vec::new();
@@ -28,7 +24,7 @@ pub(super) fn all(subjects: &[Subject], places: &Places) -> Vec<Difference> {
     found
 }
 
-fn difference(
+pub(super) fn difference(
     key: &'static str,
     what: &str,
     weight: Weight,
@@ -266,73 +262,4 @@ fn plausible(subjects: &[Subject]) -> Option<Difference> {
             reason,
         )
     })
-}
-
-/// Ambient light is not recorded; what the cameras see between presses is.
-fn ambient(subjects: &[Subject], places: &Places) -> Option<Difference> {
-    let idle = |s: &Subject| {
-        let rate = |p: &Attempt<'_>| {
-            let views = [p.press.views[0]?, p.press.views[1]?];
-            let known = views.iter().all(|v| v.idle_s > 0.0);
-            known.then(|| views[0].idle_rate_per_s + views[1].idle_rate_per_s)
-        };
-        let rates: Vec<f64> = places.attempts(s).filter_map(|p| rate(&p)).collect();
-        (!rates.is_empty()).then(|| rates.iter().sum::<f64>() / rates.len() as f64)
-    };
-    let rates: Option<Vec<f64>> = subjects.iter().map(idle).collect();
-    let rates = rates?;
-    let (low, high) = rates
-        .iter()
-        .fold((f64::INFINITY, 0.0f64), |(l, h), r| (l.min(*r), h.max(*r)));
-    (high > IDLE_FACTOR * low).then(|| {
-        let values = rates
-            .iter()
-            .map(|r| format!("{:.2} kev/s", r * 1e-3))
-            .collect();
-        let reason =
-            "other light, other noise or another bias; ambient light itself is not recorded";
-        difference(
-            "ambient",
-            "events between presses",
-            Weight::Confounding,
-            values,
-            reason,
-        )
-    })
-}
-
-/// Calibrated parameters of the first session of each skin against the first's.
-fn cameras(subjects: &[Subject]) -> Vec<Difference> {
-    let calibration = |s: &Subject| {
-        s.sessions
-            .first()
-            .and_then(|s| s.analysis.calibration.clone())
-    };
-    let all: Option<Vec<_>> = subjects.iter().map(calibration).collect();
-    let Some(all) = all else { return Vec::new() };
-    let Some(first) = all.first() else {
-        return Vec::new();
-    };
-    let moved = |name: &str| {
-        let of = |c: &skinrig_analysis::result::CalibrationResult| {
-            let i = c.names.iter().position(|n| n == name)?;
-            Some((c.values[i], c.standard_errors[i]?))
-        };
-        let (a, sa) = of(first)?;
-        let values: Option<Vec<_>> = all.iter().map(of).collect();
-        let values = values?;
-        let far = values
-            .iter()
-            .any(|(b, sb)| (b - a).abs() > MOVED_SIGMAS * libm::hypot(sa, *sb));
-        far.then(|| {
-            let values = values
-                .iter()
-                .map(|(v, se)| format!("{v:.2} ± {se:.2}"))
-                .collect();
-            let what = format!("calibrated {name}");
-            let reason = "the cameras stood elsewhere; each session's own calibration takes it up";
-            difference("camera-places", &what, Weight::Harmless, values, reason)
-        })
-    };
-    first.names.iter().filter_map(|n| moved(n)).collect()
 }

@@ -6,6 +6,7 @@
 
 mod checks;
 mod rules;
+mod sights;
 
 use std::collections::BTreeSet;
 

@@ -91,7 +91,7 @@ fn against(result: &Comparison, k: usize, letter: char, paint: &Paint) -> String
         return out;
     }
     let head = format!(
-        "{:<26}{:>7}{:>8}{:>9}{:>18}  verdict on {letter}",
+        "{:<26}{:>7}{:>8}{:>9}{:>18}  verdict",
         format!("{letter} against A"),
         "A",
         letter,

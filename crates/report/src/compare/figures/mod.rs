@@ -4,6 +4,7 @@ mod causes;
 mod locations;
 mod maps;
 mod margins;
+mod scales;
 
 pub(super) use causes::causes;
 pub(super) use locations::locations;

@@ -1,0 +1,56 @@
+//! The parts add up, and what changed carries the change.
+
+use super::*;
+
+fn taken(rest: f64, per_event: f64, width2: f64, excess: f64, idle: f64) -> Taken {
+    Taken {
+        mse: rest,
+        calibration: 0.0,
+        robot: 0.0,
+        scatter: rest,
+        bias: 0.0,
+        per_event: per_event.ln(),
+        width2: width2.ln(),
+        excess: excess.ln(),
+        idle: idle.ln(),
+    }
+}
+
+#[test]
+fn parts_add_up_and_one_changed_factor_carries_all() {
+    let a = taken(1.0, 1e-3, 100.0, 1.5, 2_000.0);
+    // A quarter of the events, in clusters that noise spoils more for it.
+    let parts = change(&[a, taken(4.0, 4e-3, 100.0, 1.5, 2_000.0)]);
+    assert!(
+        (parts[3] - 3.0).abs() < 1e-12 && parts[6].abs() < 1e-12,
+        "{parts:?}"
+    );
+    let parts = change(&[a, taken(6.0, 4e-3, 100.0, 2.25, 2_000.0)]);
+    assert!((parts[3] - 5.0).abs() < 1e-12, "{parts:?}");
+    // Five times the noise.
+    let parts = change(&[a, taken(3.0, 1e-3, 100.0, 4.5, 10_000.0)]);
+    assert!((parts[4] - 2.0).abs() < 1e-12, "{parts:?}");
+    // Twice as wide, and something else that is not known.
+    let parts = change(&[a, taken(5.0, 1e-3, 400.0, 1.5, 2_000.0)]);
+    assert!(parts[5] > 3.0 && parts[6] > 0.0, "{parts:?}");
+    assert!((parts.iter().sum::<f64>() - 4.0).abs() < 1e-12);
+}
+
+#[test]
+fn what_was_not_measured_carries_nothing() {
+    let a = taken(1.0, 1e-3, f64::NAN, f64::NAN, 2_000.0);
+    let parts = change(&[a, taken(2.0, 1e-3, 100.0, 1.0, 2_000.0)]);
+    assert!((parts[6] - 1.0).abs() < 1e-12, "{parts:?}");
+    let parts = change(&[taken(-0.1, 1e-3, 1.0, 1.0, 1.0), a]);
+    assert!((parts[6] - 1.1).abs() < 1e-12, "{parts:?}");
+}
+
+#[test]
+fn draws_are_seeded_and_within_range() {
+    let all: Vec<Vec<usize>> = draws(5, 100, 3).collect();
+    assert_eq!(all, draws(5, 100, 3).collect::<Vec<_>>());
+    assert_ne!(all, draws(5, 100, 4).collect::<Vec<_>>());
+    let mut seen = [0; 5];
+    all.iter().flatten().for_each(|i| seen[*i] += 1);
+    assert!(seen.iter().all(|n| *n > 60), "{seen:?}");
+}
