@@ -144,6 +144,7 @@ pub fn latency(noise: &mut Noise, presses: &[PressResult]) -> Latency {
             background_per_s: [14_000.0, 20_900.0, 31_000.0],
         },
         sweep,
+        backgrounds: Vec::new(),
         onsets,
     }
 }
