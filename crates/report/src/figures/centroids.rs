@@ -1,9 +1,10 @@
 //! Owns the centroid tracks: where each camera saw each press.
 
-use super::{Canvas, Figure};
+use super::{Canvas, Figure, LINKED, press_path};
 use crate::ReportInput;
 use crate::axes::{Axes, Scale};
 use crate::svg::dots;
+use skinrig_analysis::result::PressResult;
 use skinrig_model::SENSOR_WIDTH;
 
 /// Centroid column of every press against its number, one panel per camera (as the paper's figure
@@ -32,7 +33,7 @@ pub fn centroid_tracks(input: &ReportInput<'_>) -> Figure {
         "Centroid tracks",
         caption,
         size,
-        &[],
+        &[LINKED],
     );
     let range = |pick: fn(f64, f64) -> f64, start: f64| {
         presses
@@ -62,24 +63,23 @@ pub fn centroid_tracks(input: &ReportInput<'_>) -> Figure {
         svg.text((66.0, top - 9.0), "panel", "start", &name);
         let px = |p: u32, u: f64| (axes.x.at(f64::from(p)), axes.y.at(u));
         let class = format!("dots c{}", camera + 1);
-        svg.path(
-            &class,
-            &dots(
-                seen(camera)
-                    .filter(|(p, _)| p.verdict == "valid")
-                    .map(|(p, u)| px(p.press.0, u)),
-            ),
-        );
+        let (valid, others): (Vec<_>, Vec<_>) =
+            seen(camera).partition(|(p, _)| p.verdict == "valid");
+        let numbers = |of: &[(&PressResult, f64)]| of.iter().map(|(p, _)| p.press.0).collect();
+        let points = valid.iter().map(|(p, u)| px(p.press.0, *u));
+        let all: Vec<u32> = numbers(&valid);
+        press_path(svg, &class, &dots(points), &all);
         let mut squares = String::new();
-        for (p, u) in seen(camera).filter(|(p, _)| p.verdict != "valid") {
-            let (x, y) = px(p.press.0, u);
+        for (p, u) in &others {
+            let (x, y) = px(p.press.0, *u);
             squares.push_str(&format!(
                 "M{} {}h6v6h-6Z",
                 crate::svg::Px(x - 3.0),
                 crate::svg::Px(y - 3.0)
             ));
         }
-        svg.path("other", &squares);
+        let all: Vec<u32> = numbers(&others);
+        press_path(svg, "other", &squares, &all);
         if counts[camera] == 0 {
             svg.text(
                 (645.0, top + 104.0),

@@ -1,6 +1,6 @@
 //! Owns the error figures: distribution, and x against y.
 
-use super::{Canvas, Figure, nice_above};
+use super::{Canvas, Figure, LINKED, nice_above, press_path};
 use crate::ReportInput;
 use crate::axes::{Axes, Scale, tick_label};
 use crate::derive;
@@ -22,14 +22,6 @@ pub fn error_distribution(input: &ReportInput<'_>) -> Figure {
         mm(m.p95_mm.value)
     );
     let size = (620.0, 480.0);
-    let mut canvas = Canvas::new(
-        input,
-        "error-distribution",
-        "Error distribution",
-        caption,
-        size,
-        &[],
-    );
     let end = nice_above(errors.last().copied().unwrap_or(1.0));
     let (bins, width) = histogram(&errors, end);
     let x = Scale::new((0.0, end), (66.0, 600.0));
@@ -48,6 +40,23 @@ pub fn error_distribution(input: &ReportInput<'_>) -> Figure {
         y_label: format!("presses per {} mm", bin_width(width)),
         tick_count: (8, 4),
     };
+    let mut canvas = Canvas::new(
+        input,
+        "error-distribution",
+        "Error distribution",
+        caption,
+        size,
+        &[
+            LINKED,
+            ("data-x0", &x.px.0),
+            ("data-per-mm", &x.per_unit()),
+            ("data-bin", &width),
+            ("data-top", &upper.y.px.1),
+            ("data-middle", &upper.y.px.0),
+            ("data-bottom", &lower.y.px.0),
+            ("data-per-press", &lower.y.per_unit()),
+        ],
+    );
     let svg = &mut canvas.svg;
     upper.draw(svg);
     lower.draw(svg);
@@ -136,13 +145,10 @@ fn histogram(errors: &[f64], end: f64) -> (Vec<u32>, f64) {
 /// The error vectors: y against x, with the bias and a circle of radius RMSE.
 #[must_use]
 pub fn error_scatter(input: &ReportInput<'_>) -> Figure {
-    let errors: Vec<_> = input
-        .analysis
-        .presses
-        .iter()
-        .filter(|p| derive::counts(p))
-        .filter_map(|p| p.error_mm())
-        .collect();
+    let counted = input.analysis.presses.iter().filter(|p| derive::counts(p));
+    let (numbers, errors): (Vec<_>, Vec<_>) = counted
+        .filter_map(|p| Some((p.press.0, p.error_mm()?)))
+        .unzip();
     let m = &input.analysis.scored;
     let caption = format!(
         "Error of {} scored presses along x and y (estimate minus truth). Circle: radius RMSE ({} mm) about \
@@ -159,7 +165,7 @@ pub fn error_scatter(input: &ReportInput<'_>) -> Figure {
         "Error along x and y",
         caption,
         size,
-        &[],
+        &[LINKED],
     );
     let most = errors
         .iter()
@@ -182,10 +188,8 @@ pub fn error_scatter(input: &ReportInput<'_>) -> Figure {
         (left, axes.y.at(0.0)),
         (left + side, axes.y.at(0.0)),
     );
-    svg.path(
-        "dots dot-ink",
-        &dots(errors.iter().map(|(x, y)| (axes.x.at(*x), axes.y.at(*y)))),
-    );
+    let points = errors.iter().map(|(x, y)| (axes.x.at(*x), axes.y.at(*y)));
+    press_path(svg, "dots dot-ink", &dots(points), &numbers);
     if let Some(r) = m.rmse_mm.value.filter(|r| r.is_finite()) {
         svg.leaf(
             "circle",

@@ -4,7 +4,7 @@ use skinrig_analysis::result::PressResult;
 use skinrig_model::{Point2, PressRole};
 
 use super::skin::{Layout, colour_bar};
-use super::{Canvas, Figure, nice_above};
+use super::{Canvas, Figure, LINKED, nice_above, press_path};
 use crate::ReportInput;
 use crate::colour::viridis;
 use crate::derive::{self, LocationSummary};
@@ -30,7 +30,7 @@ fn discs(
     end: f64,
 ) {
     let r = layout.radius(locations);
-    svg.open("g", &[("class", &"locations")]);
+    svg.open("g", &[("class", &"locations"), ("data-end", &end)]);
     for l in locations {
         let Some(v) = value(l) else { continue };
         let (x, y) = layout.px(l.planned);
@@ -38,6 +38,7 @@ fn discs(
             "circle",
             &[
                 ("class", &"press"),
+                ("data-location", &l.location),
                 ("cx", &Px(x)),
                 ("cy", &Px(y)),
                 ("r", &Px(r)),
@@ -102,7 +103,12 @@ pub fn skin_map(input: &ReportInput<'_>) -> Figure {
         "Skin map",
         caption,
         SIZE,
-        &[("data-ox", &ox), ("data-oy", &oy), ("data-k", &k)],
+        &[
+            ("data-ox", &ox),
+            ("data-oy", &oy),
+            ("data-k", &k),
+            LINKED,
+        ],
     );
     backdrop(&mut canvas, &layout);
     let svg = &mut canvas.svg;
@@ -160,21 +166,24 @@ pub fn skin_map(input: &ReportInput<'_>) -> Figure {
     discs(svg, &layout, &locations, |l| Some(l.mean_error_mm), end);
     let mut vectors = String::new();
     let mut tips = Vec::with_capacity(counted.len());
+    let mut numbers = Vec::with_capacity(counted.len());
     for p in &counted {
         if let (Some(t), Some(e)) = (p.truth, p.estimate()) {
             vectors.push_str(&polyline([layout.px(t), layout.px(e)], false));
             tips.push(layout.px(e));
+            numbers.push(p.press.0);
         }
     }
     let dense = if counted.len() > 600 { " dense" } else { "" };
     svg.open("g", &[("class", &format_args!("layer-vectors{dense}"))]);
-    svg.path("vector", &vectors);
-    svg.path("dots tips", &dots(tips));
+    press_path(svg, "vector", &vectors, &numbers);
+    press_path(svg, "dots tips", &dots(tips), &numbers);
     svg.close();
-    let mut squares = String::new();
+    let (mut squares, mut numbers) = (String::new(), Vec::new());
     let disc = |p: &PressResult| locations.iter().any(|l| l.location == p.location);
     for p in others.iter().filter(|p| p.timing.is_some() || !disc(p)) {
         let (x, y) = layout.px(p.truth.unwrap_or(p.planned));
+        numbers.push(p.press.0);
         squares.push_str(&polyline(
             [
                 (x - 5.0, y - 5.0),
@@ -186,7 +195,7 @@ pub fn skin_map(input: &ReportInput<'_>) -> Figure {
         ));
     }
     svg.open("g", &[("class", &"layer-others")]);
-    svg.path("other", &squares);
+    press_path(svg, "other", &squares, &numbers);
     svg.close();
     layout.cameras(svg, input);
     colour_bar(

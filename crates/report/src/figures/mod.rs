@@ -160,7 +160,7 @@ impl<'a> Canvas<'a> {
         let foot = format!("{invalid}session {}{stand_in}", or_missing(&p.session_id));
         let (w, h) = self.size;
         self.svg.text((10.0, h - 8.0), "foot", "start", &foot);
-        self.svg.text((w - 10.0, h - 8.0), "foot", "end", n);
+        self.svg.text((w - 10.0, h - 8.0), "foot count", "end", n);
         Figure {
             id: self.id,
             title: self.title,
@@ -170,6 +170,29 @@ impl<'a> Canvas<'a> {
             interaction,
         }
     }
+}
+
+/// Attribute of an `<svg>` whose drawing follows the page's filter.
+const LINKED: (&str, &dyn std::fmt::Display) = ("data-linked", &"");
+
+/// A path with one piece (`M...`) for each of these presses, which the page's filter can take out.
+fn press_path(svg: &mut Svg, class: &str, data: &str, presses: &[u32]) {
+    if data.is_empty() {
+        return;
+    }
+    let runs = presses.chunk_by(|a, b| a.checked_add(1) == Some(*b));
+    let runs = runs.map(|run| match run {
+        [one] => one.to_string(),
+        run => format!("{}-{}", run[0], run[run.len() - 1]),
+    });
+    svg.leaf(
+        "path",
+        &[
+            ("class", &class),
+            ("d", &data),
+            ("data-presses", &runs.collect::<Vec<_>>().join(" ")),
+        ],
+    );
 }
 
 /// The smallest of 1, 1.5, 2, 3, 4, 5, 6, 8, 10 times a power of ten that is not below `value`.

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use skinrig_analysis::result::{RateSeries, RateZoom};
 
-use super::{Canvas, Figure, nice_above};
+use super::{Canvas, Figure, LINKED, nice_above, press_path};
 use crate::ReportInput;
 use crate::axes::{Axes, Scale};
 use crate::format::number;
@@ -65,12 +65,10 @@ pub fn event_rates(input: &ReportInput<'_>) -> Figure {
     for (s, _) in series.iter_mut().zip(aligned).filter(|(_, a)| !a) {
         s.start_s = 0.0;
     }
-    let contacts: Vec<f64> = input
-        .analysis
-        .presses
-        .iter()
-        .filter_map(|p| p.timing.map(|t| t.contact.as_secs_f64()))
-        .collect();
+    let presses = input.analysis.presses.iter();
+    let (pressed, contacts): (Vec<u32>, Vec<f64>) = presses
+        .filter_map(|p| Some((p.press.0, p.timing?.contact.as_secs_f64())))
+        .unzip();
     let ends = series
         .iter()
         .filter(|s| !s.mean_per_s.is_empty())
@@ -107,6 +105,7 @@ pub fn event_rates(input: &ReportInput<'_>) -> Figure {
             ("data-t1", &extra[1]),
             ("data-x0", &plot.0),
             ("data-x1", &plot.1),
+            LINKED,
         ],
     );
     let svg = &mut canvas.svg;
@@ -153,7 +152,7 @@ pub fn event_rates(input: &ReportInput<'_>) -> Figure {
                 .iter()
                 .map(|t| format!("M{} 240v12", Px(x.at(*t))))
                 .collect();
-            svg.path("marks", &marks);
+            press_path(svg, "marks", &marks, &pressed);
         }
         svg.path(
             &format!("line thin c{}", camera + 1),

@@ -1,7 +1,7 @@
 //! Owns the HTML page: what the template and the script receive.
 //!
 //! The template is `assets/page.html` with `assets/sections/*.html` (minijinja, auto-escaped), the style `assets/page.css` and
-//! `assets/figure.css`, the script `assets/report.js`. The script gets one JSON value with named tables
+//! `assets/figure.css`, the script `assets/script/*.js`. The script gets one JSON value with named tables
 //! (columns and column-wise data): the press table, tooltips and CSV downloads all read it.
 
 mod alignment;
@@ -15,9 +15,12 @@ mod reduction;
 
 use std::collections::BTreeMap;
 
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
 use minijinja::value::Serde;
 use minijinja::{AutoEscape, Environment, Value, context};
 use serde::Serialize;
+use sha2::{Digest, Sha256};
 use skinrig_analysis::result::Analysis;
 
 use crate::derive;
@@ -30,12 +33,16 @@ use crate::terminal::{clock_method, metric_rows};
 use crate::{ReportError, ReportInput};
 
 /// The templates: the page, its macros, and one file per section.
-const TEMPLATES: [(&str, &str); 14] = [
+const TEMPLATES: [(&str, &str); 15] = [
     ("page.html", include_str!("../../assets/page.html")),
     ("macros.html", include_str!("../../assets/macros.html")),
     (
         "sections/results.html",
         include_str!("../../assets/sections/results.html"),
+    ),
+    (
+        "sections/filter.html",
+        include_str!("../../assets/sections/filter.html"),
     ),
     (
         "sections/skin.html",
@@ -83,7 +90,16 @@ const TEMPLATES: [(&str, &str); 14] = [
     ),
 ];
 pub(crate) const PAGE_CSS: &str = include_str!("../../assets/page.css");
-const SCRIPT: &str = include_str!("../../assets/report.js");
+/// One script: each part but the first stands in a function of its own.
+const SCRIPT: &str = concat!(
+    include_str!("../../assets/script/core.js"),
+    include_str!("../../assets/script/theme.js"),
+    include_str!("../../assets/script/filter.js"),
+    include_str!("../../assets/script/download.js"),
+    include_str!("../../assets/script/map.js"),
+    include_str!("../../assets/script/rates.js"),
+    include_str!("../../assets/script/presses.js"),
+);
 
 /// JSON that may stand inside `<script>`: `<`, `>`, `&` and the line separators of JavaScript are written as
 /// escapes, so no text can end the element or open a comment.
@@ -106,6 +122,11 @@ pub fn script_json<T: Serialize>(value: &T) -> Result<String, serde_json::Error>
     Ok(out)
 }
 
+/// The script's digest as a content security policy names it: nothing else on the page may run.
+fn script_hash() -> String {
+    format!("sha256-{}", STANDARD.encode(Sha256::digest(SCRIPT)))
+}
+
 /// See [`crate::html`].
 pub(crate) fn render(input: &ReportInput<'_>) -> Result<String, ReportError> {
     let mut env = Environment::new();
@@ -126,6 +147,7 @@ pub(crate) fn render(input: &ReportInput<'_>) -> Result<String, ReportError> {
         figure_css => safe(FIGURE_CSS),
         plain_css => safe(&plain_css()),
         script => safe(SCRIPT),
+        script_hash => safe(&script_hash()),
         data => safe(&script_json(&tables::script_data(input))?),
         session => or_missing(&p.session_id),
         heading => heading(&p.protocol_name),
@@ -337,8 +359,12 @@ fn metrics(input: &ReportInput<'_>) -> Vec<Value> {
 }
 
 fn provenance_rows(p: &Provenance, analysis_version: u32) -> Vec<Value> {
-    let row =
-        |key: &str, value: &str, code: bool| context! { key, value => or_missing(value), code };
+    let row = |key: &str, value: &str, code: bool| {
+        // The first characters of a digest name it among others; the whole stands in its title and is printed.
+        let digest = value.len() == 64 && value.bytes().all(|b| b.is_ascii_hexdigit());
+        let short = digest.then(|| &value[..12]);
+        context! { key, value => or_missing(value), code, short }
+    };
     let mut rows = vec![
         row("session", &p.session_id, true),
         row("started", &p.started, false),

@@ -1,6 +1,7 @@
 //! Owns the data tables of the page (press table, tooltips, CSV downloads) and the small tables of settings
 //! and calibration.
 
+mod packing;
 mod studies;
 
 use serde_json::{Map, Value, json};
@@ -8,6 +9,7 @@ use skinrig_analysis::result::{Analysis, CalibrationResult};
 
 use crate::ReportInput;
 use crate::derive;
+use packing::packed;
 
 /// A number rounded to `digits` decimals; missing or non-finite ones are null.
 fn rounded(value: Option<f64>, digits: i32) -> Value {
@@ -50,16 +52,6 @@ impl Table {
     }
 }
 
-/// A column as it stands in the page: its cells, or, where that is shorter, `{"runs": [value, count, ...]}`
-/// with runs of equal cells. The script unpacks it.
-fn packed(cells: Vec<Value>) -> Value {
-    let runs: Vec<&[Value]> = cells.chunk_by(|a, b| a == b).collect();
-    if 2 * runs.len() >= cells.len() {
-        return Value::Array(cells);
-    }
-    let pairs = runs.iter().flat_map(|r| [r[0].clone(), json!(r.len())]);
-    json!({ "runs": pairs.collect::<Vec<_>>() })
-}
 
 /// Everything the script needs: session id and the named tables.
 pub(crate) fn script_data(input: &ReportInput<'_>) -> Value {
@@ -70,11 +62,7 @@ pub(crate) fn script_data(input: &ReportInput<'_>) -> Value {
     };
     put("presses", presses(a));
     put("locations", locations(a));
-    let errors = derive::sorted_errors_mm(a);
-    put(
-        "errors",
-        Table::new().column("error_mm", errors.iter().map(|e| rounded(Some(*e), 4))),
-    );
+    put("errors", errors(a));
     put("rates", rates(a));
     put("press_rates", press_rates(a));
     put("pictures", pictures(a));
@@ -173,6 +161,18 @@ fn presses(a: &Analysis) -> Table {
         )
         .column("rule", rows.iter().map(|p| json!(p.rule)))
         .column("reason", rows.iter().map(|p| json!(p.reason)))
+}
+
+/// The errors behind the distribution, ascending.
+fn errors(a: &Analysis) -> Table {
+    let counted = a.presses.iter().filter(|p| derive::counts(p));
+    let mut rows: Vec<(f64, u32)> = counted
+        .filter_map(|p| Some((derive::error_norm_mm(p)?, p.press.0)))
+        .collect();
+    rows.sort_by(|a, b| a.0.total_cmp(&b.0));
+    Table::new()
+        .column("press", rows.iter().map(|r| json!(r.1)))
+        .column("error_mm", rows.iter().map(|r| rounded(Some(r.0), 4)))
 }
 
 fn locations(a: &Analysis) -> Table {
