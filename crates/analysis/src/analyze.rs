@@ -169,6 +169,7 @@ pub fn analyze_and_keep(
         warnings: [one.warnings, two.warnings, warnings].concat(),
         pictures: [one.pictures, two.pictures].concat(),
         zooms: [one.zooms, two.zooms].concat(),
+        motion: None,
     };
     evaluate(&mut analysis, input, &kept);
     Ok((analysis, kept))

@@ -34,6 +34,7 @@ pub mod kept;
 pub mod latency;
 pub mod legs;
 pub mod metrics;
+pub mod motion;
 mod pixels;
 pub mod rates;
 pub mod reduction;

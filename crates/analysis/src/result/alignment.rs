@@ -35,6 +35,9 @@ pub struct Alignment {
     pub resets: u32,
     /// The map from host to camera time, piecewise affine between these knots, for camera 1 and camera 2.
     pub camera_from_host: [Vec<Knot>; 2],
+    /// What each fitted map leaves of its points, for drawing; empty when not certified.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub residuals: Vec<ClockResiduals>,
 }
 
 impl Alignment {
@@ -146,6 +149,28 @@ impl ClockMap {
             coverage_n: 0,
         }
     }
+}
+
+/// What one map leaves of the points that it is fitted to.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ClockResiduals {
+    /// Which map.
+    pub map: MapName,
+    /// Points of the map, left-out ones included.
+    pub n: u32,
+    /// In order of time; of more than a few hundred the one furthest from the map in each of equal runs of neighbours.
+    pub points: Vec<ClockResidual>,
+}
+
+/// One point of a map.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct ClockResidual {
+    /// When, on the host's clock, s.
+    pub host_s: f64,
+    /// Observed minus mapped time, µs.
+    pub residual_us: f64,
+    /// False for one that the fit left out.
+    pub used: bool,
 }
 
 /// Edges on the trigger input of one camera, from the first train that it saw to the last.

@@ -5,10 +5,13 @@ mod audit;
 mod calibration;
 mod coverage;
 mod latency;
+mod motion;
 mod reduction;
 mod reference;
 
-pub use alignment::{Alignment, AlignmentStatus, ClockMap, Knot, LineCounts, MapName};
+pub use alignment::{
+    Alignment, AlignmentStatus, ClockMap, ClockResidual, ClockResiduals, Knot, LineCounts, MapName,
+};
 pub use audit::{Fault, Finding, Law};
 pub use calibration::{CalibrationResult, ModelComparison, ThresholdChoice};
 pub use coverage::{Activity, BitRates, Cmre, Coverage};
@@ -16,6 +19,7 @@ pub use latency::{
     ContactLatency, ContactTiming, Latency, LatencyCourse, ReducedLatency, ThresholdRow,
     TrialBackground,
 };
+pub use motion::{Motion, MotionBin, PressMotion, TipSample};
 pub use reduction::{Reduction, ReductionCurve, ReductionRow, Thinning};
 pub use reference::{ReferenceCode, ReferenceReduction};
 
@@ -89,6 +93,9 @@ pub struct Analysis {
     pub pictures: Vec<PressPicture>,
     /// The event rates around a few scored presses.
     pub zooms: Vec<RateZoom>,
+    /// How the robot followed its commands; `None` when no pose was handed over ([`crate::motion`]).
+    #[serde(default)]
+    pub motion: Option<Motion>,
 }
 
 /// How the presses ended. Sync presses are counted apart.

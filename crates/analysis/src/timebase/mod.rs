@@ -8,6 +8,7 @@ mod edges;
 mod epochs;
 mod host;
 mod piecewise;
+mod residuals;
 
 use skinrig_model::{AlignmentSettings, BoxReport, HostTime, TriggerEdge};
 
@@ -128,6 +129,7 @@ impl TimeBase {
             lines: [0, 1].map(|k| base.counts(k)).to_vec(),
             resets,
             camera_from_host: [0, 1].map(|k| base.knots(k)),
+            residuals: base.residuals(),
         };
         // What could not be mapped matters where the session has presses.
         for k in 0..2 {

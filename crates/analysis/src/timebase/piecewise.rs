@@ -39,6 +39,8 @@ pub struct Piecewise {
     pub max_us: f64,
     /// For each point, whether it was used.
     pub used: Vec<bool>,
+    /// For each point, when it was on the first clock and its residual, µs.
+    pub residuals: Vec<(f64, f64)>,
     /// Rate difference over all, and its standard error.
     pub drift: f64,
     pub drift_se: f64,
@@ -116,6 +118,7 @@ impl Piecewise {
             rms_us: (squares / n).sqrt(),
             max_us: inliers.iter().fold(0.0, |m, r| r.abs().max(m)),
             used,
+            residuals: points.iter().map(|p| p.from_us).zip(residuals).collect(),
             drift: line.drift,
             drift_se: line.drift_se,
         })

@@ -1,0 +1,115 @@
+//! What each map leaves of its points, thinned so that it can be drawn.
+
+use super::{FLOOR_US, Piece, SPACING_US, TimeBase, pairs};
+use crate::result::{ClockResidual, ClockResiduals, MapName};
+use crate::timebase::piecewise::Piecewise;
+
+/// Points of one map, at most.
+const MOST: usize = 600;
+
+impl TimeBase {
+    /// Of every fitted map, in the order of the certificate.
+    pub(super) fn residuals(&self) -> Vec<ClockResiduals> {
+        let of_host = |p: &Piece| left(p, &p.host.fit, |at| at);
+        let of_camera = |k: usize| {
+            let each = self.pieces.iter();
+            each.filter_map(move |p| Some(left(p, &p.cameras[k].as_ref()?.map, |at| at)))
+        };
+        let maps = [
+            (
+                MapName::HostFromBox,
+                self.pieces.iter().flat_map(of_host).collect(),
+            ),
+            (MapName::Camera1FromBox, of_camera(0).flatten().collect()),
+            (MapName::Camera2FromBox, of_camera(1).flatten().collect()),
+            (
+                MapName::Camera2FromCamera1,
+                self.pieces.iter().flat_map(of_cameras).collect(),
+            ),
+            (MapName::Camera1FromHost, self.of_line(0)),
+            (MapName::Camera2FromHost, self.of_line(1)),
+        ];
+        let there = maps.into_iter().filter(|(_, points)| !points.is_empty());
+        there
+            .map(|(map, points)| ClockResiduals {
+                map,
+                n: points.len() as u32,
+                points: thinned(points),
+            })
+            .collect()
+    }
+
+    /// The trains of camera `k` about the one line through all of them.
+    fn of_line(&self, k: usize) -> Vec<ClockResidual> {
+        let Some(line) = self.clocks[k] else {
+            return Vec::new();
+        };
+        let of = |p: &Piece| {
+            let Some(camera) = &p.cameras[k] else {
+                return Vec::new();
+            };
+            let trains = camera.sent_us.iter().zip(&camera.instants);
+            let seen = trains.filter_map(|(sent, at)| Some((p.host.host_us(*sent), (*at)?)));
+            seen.map(|(host_us, at)| ClockResidual {
+                host_s: host_us * 1e-6,
+                residual_us: camera.reference_us as f64 + at - line.camera_us(host_us),
+                used: true,
+            })
+            .collect()
+        };
+        self.pieces.iter().flat_map(of).collect()
+    }
+}
+
+/// The residuals of a fit over box time; `box_us` finds it from the fit's own clock.
+fn left(piece: &Piece, fit: &Piecewise, box_us: impl Fn(f64) -> f64) -> Vec<ClockResidual> {
+    let points = fit.residuals.iter().zip(&fit.used);
+    points
+        .map(|((at, residual_us), used)| ClockResidual {
+            host_s: piece.host.host_us(box_us(*at)) * 1e-6,
+            residual_us: *residual_us,
+            used: *used,
+        })
+        .collect()
+}
+
+/// Camera 2 over camera 1 at the trains that both saw.
+fn of_cameras(piece: &Piece) -> Vec<ClockResidual> {
+    let Some(fit) = Piecewise::fit(&pairs(piece), SPACING_US, FLOOR_US) else {
+        return Vec::new();
+    };
+    let Some(one) = &piece.cameras[0] else {
+        return Vec::new();
+    };
+    // To the accuracy of a drawing: the deviation is nearly the same at both times.
+    left(piece, &fit, |at| at - (one.map.value(at) - at))
+}
+
+/// Of each run of neighbours the one furthest from the map.
+fn thinned(points: Vec<ClockResidual>) -> Vec<ClockResidual> {
+    let run = points.len().div_ceil(MOST).max(1);
+    let size = |p: &&ClockResidual| p.residual_us.abs();
+    let furthest = points.chunks(run).filter_map(|run| {
+        run.iter().max_by(|a, b| size(a).total_cmp(&size(b)))
+    });
+    furthest.copied().collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn thinning_keeps_order_and_outliers() {
+        let points = (0..5006).map(|k| ClockResidual {
+            host_s: f64::from(k),
+            residual_us: if k == 4001 { -90.0 } else { f64::from(k % 7) },
+            used: k != 4001,
+        });
+        let kept = thinned(points.collect());
+        assert_eq!(kept.len(), 5006usize.div_ceil(9));
+        assert!(kept.is_sorted_by_key(|p| p.host_s));
+        assert_eq!(kept.iter().filter(|p| !p.used).count(), 1);
+        assert!(kept.iter().all(|p| p.residual_us.abs() >= 5.0));
+    }
+}
