@@ -86,6 +86,7 @@ const RESTRICTED: &[(&str, &[&str])] = &[
 const HARNESSES: &[&str] = &[
     "skinrig-tests",
     "skinrig-bench",
+    "skinrig-browser",
     "skinrig-fuzz",
     "skinrig-emulated-libdrd",
     "skinrig-emulated-bench",

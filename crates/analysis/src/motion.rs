@@ -201,7 +201,10 @@ mod tests {
         let [path] = &motion.presses[..] else {
             panic!("{} presses", motion.presses.len());
         };
-        assert_eq!((path.press, path.kept_each, path.samples.len()), (PressId(7), 3, 334));
+        assert_eq!(
+            (path.press, path.kept_each, path.samples.len()),
+            (PressId(7), 3, 334)
+        );
         assert!((path.samples[0].since_contact_s + 0.1).abs() < 1e-12);
         assert_eq!(MotionCourse::new([]).finish(), None);
     }

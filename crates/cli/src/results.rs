@@ -4,9 +4,12 @@ use std::io::{IsTerminal, Write as _};
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
+use skinrig_analysis::motion::MotionCourse;
 use skinrig_analysis::reference_code::reference_code;
+use skinrig_analysis::result::{Motion, PressResult};
+use skinrig_analysis::tradeoff::Tradeoff;
 use skinrig_analysis::{Analysis, EarlierAttempt, Keep, LegStart, SessionInput};
-use skinrig_model::{AnalysisSettings, CameraId, RigGeometry, RunHeader};
+use skinrig_model::{AnalysisSettings, CameraId, HostTime, RigGeometry, RunHeader};
 use skinrig_recorder::{AttemptRow, RecorderError, SessionReader};
 use skinrig_report::{Provenance, ReportInput};
 
@@ -34,6 +37,8 @@ pub struct Results {
     pub analysis: Analysis,
     /// Where they come from.
     pub provenance: Provenance,
+    /// The tradeoff that lies beside the session, or why it cannot be read.
+    pub tradeoff: Option<Result<Tradeoff, String>>,
 }
 
 impl Results {
@@ -43,6 +48,10 @@ impl Results {
         ReportInput {
             analysis: &self.analysis,
             provenance: self.provenance.clone(),
+            tradeoff: self
+                .tradeoff
+                .as_ref()
+                .map(|t| t.as_ref().map_err(String::as_str)),
         }
     }
 }
@@ -109,13 +118,25 @@ pub fn analyze_session(path: &Path, choices: Choices<'_>) -> Result<Results, Fai
     analysis.reference = choices
         .reference_code
         .then(|| reference_code(input, &analysis, &kept));
+    analysis.motion = motion(&session.reader, &analysis).map_err(Failure::input)?;
     let provenance = crate::provenance::provenance(&session.reader, &session.header, &analysis)
         .map_err(|e: RecorderError| Failure::input(e))?;
     Ok(Results {
         session: path.to_owned(),
         analysis,
         provenance,
+        tradeoff: crate::tradeoff::beside_session(path),
     })
+}
+
+/// The robot's path against its commands, in full around the presses that the report looks at closely.
+fn motion(reader: &SessionReader, analysis: &Analysis) -> Result<Option<Motion>, RecorderError> {
+    let close = |p: &&PressResult| analysis.zooms.iter().any(|z| z.press == p.press);
+    let presses = analysis.presses.iter().filter(close);
+    let mut course = MotionCourse::new(presses.filter_map(|p| Some((p.press, p.timing?))));
+    let ever = (HostTime(i64::MIN), HostTime(i64::MAX));
+    reader.for_each_pose_block(ever.0, ever.1, |samples| course.push(samples))?;
+    Ok(course.finish())
 }
 
 /// The settings of the session's own protocol or schedule, with the choices.

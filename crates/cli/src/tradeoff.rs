@@ -1,8 +1,10 @@
 //! `skinrig tradeoff`: what speed costs in accuracy, measured on a session.
 
 use std::io::IsTerminal;
+use std::path::Path;
 
 use rustix::time::{ClockId, clock_gettime};
+use serde::Deserialize;
 use skinrig_analysis::AnalysisError;
 use skinrig_analysis::tradeoff::{Cost, Plan, Row, Tradeoff, measure};
 use skinrig_report::tradeoff::{label, page, protocol_lines, terminal_table};
@@ -11,6 +13,43 @@ use crate::args::{CostKind, TradeoffArgs};
 use crate::exit::{Exit, Failure, Outcome};
 use crate::paths::beside;
 use crate::results::{Choices, Opened, open, write};
+
+/// Values of the document's `format` and `format_version`.
+const FORMAT: (&str, u32) = ("skinrig-tradeoff", 1);
+
+/// The tradeoff that an earlier `skinrig tradeoff` left beside a session: `None` where there is none, and why it cannot be read.
+pub(crate) fn beside_session(session: &Path) -> Option<Result<Tradeoff, String>> {
+    let path = beside(session, ".tradeoff.json");
+    let text = match std::fs::read_to_string(&path) {
+        Ok(text) => text,
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return None,
+        Err(e) => return Some(Err(format!("{}: {e}", path.display()))),
+    };
+    let parsed = serde_json::from_str::<Document>(&text).map_err(|e| e.to_string());
+    let fits = parsed.and_then(|d| {
+        if (d.format.as_str(), d.format_version) == FORMAT {
+            Ok(d.tradeoff)
+        } else {
+            Err(format!("found {} version {}", d.format, d.format_version))
+        }
+    });
+    Some(fits.map_err(|found| {
+        format!(
+            "{}: expected {} version {}, {found}; next: `skinrig tradeoff` writes it anew",
+            path.display(),
+            FORMAT.0,
+            FORMAT.1
+        )
+    }))
+}
+
+/// What is read of the document again.
+#[derive(Deserialize)]
+struct Document {
+    format: String,
+    format_version: u32,
+    tradeoff: Tradeoff,
+}
 
 /// CPU time of this thread, s.
 fn thread_cpu_s() -> f64 {
@@ -97,7 +136,7 @@ pub fn tradeoff(args: &TradeoffArgs, json: bool) -> Outcome {
         other => Failure::input(other),
     })?;
     let answers = answers(&result, args);
-    let mut document = serde_json::json!({ "format": "skinrig-tradeoff", "format_version": 1, "rig": rig, "tradeoff": result });
+    let mut document = serde_json::json!({ "format": FORMAT.0, "format_version": FORMAT.1, "rig": rig, "tradeoff": result });
     let found = answers.iter().map(|a| {
         serde_json::json!({
             "question": a.question,

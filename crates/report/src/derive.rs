@@ -21,6 +21,13 @@ pub fn error_norm_mm(press: &PressResult) -> Option<f64> {
         .filter(|e| e.is_finite())
 }
 
+/// The 95 % interval of a value with this standard error: 1.96 of them to either side (normal).
+#[must_use]
+pub fn interval_95(value: f64, standard_error: f64) -> (f64, f64) {
+    let half = 1.96 * standard_error;
+    (value - half, value + half)
+}
+
 /// What the map shows at one location.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LocationSummary {

@@ -10,7 +10,7 @@ pub const JSON_FORMAT: &str = "skinrig-report";
 pub const JSON_VERSION: u32 = 1;
 
 /// Fields of the analysis that are bulk data for figures.
-const BULK: [&str; 4] = ["rates", "pictures", "zooms", "activity"];
+const BULK: [&str; 5] = ["rates", "pictures", "zooms", "activity", "motion"];
 
 /// See [`crate::json`].
 pub(crate) fn json(input: &ReportInput<'_>) -> Value {
@@ -19,6 +19,9 @@ pub(crate) fn json(input: &ReportInput<'_>) -> Value {
     if let Some(map) = analysis.as_object_mut() {
         for field in BULK {
             map.remove(field);
+        }
+        if let Some(alignment) = map.get_mut("alignment").and_then(Value::as_object_mut) {
+            alignment.remove("residuals");
         }
     }
     object!({

@@ -34,6 +34,7 @@ pub use provenance::{
 };
 
 use skinrig_analysis::result::Analysis;
+use skinrig_analysis::tradeoff::Tradeoff;
 
 /// What a report is made from.
 #[derive(Debug, Clone)]
@@ -42,6 +43,8 @@ pub struct ReportInput<'a> {
     pub analysis: &'a Analysis,
     /// Where they come from.
     pub provenance: Provenance,
+    /// What speed costs in accuracy, when that was measured on this session: the result, or why it cannot be read.
+    pub tradeoff: Option<Result<&'a Tradeoff, &'a str>>,
 }
 
 /// Why a report could not be written.
@@ -66,7 +69,7 @@ pub fn html(input: &ReportInput<'_>) -> Result<String, ReportError> {
 /// The results as JSON for programs: `format` ([`JSON_FORMAT`]), `format_version` ([`JSON_VERSION`]),
 /// `valid` (false when the alignment certificate is beyond its limits: the numbers are not to be used),
 /// `provenance` ([`Provenance`]), `analysis` (the fields of [`Analysis`] without the bulk series `rates`, `pictures`,
-/// `zooms` and `activity`) and `comparison` ([`comparison::Row`]s: the session beside the published numbers).
+/// `zooms`, `activity` and `motion`, and without `alignment.residuals`) and `comparison` ([`comparison::Row`]s: the session beside the published numbers).
 ///
 /// A field that has no value is `null`. Fields are added without a new version; a field that changes its
 /// meaning or disappears raises the version.

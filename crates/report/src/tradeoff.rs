@@ -223,7 +223,7 @@ pub fn page(result: &Tradeoff, session: &str, rig: &str) -> String {
     page.holding("p", &[("class", &"sub")], rig);
     page.close().close().close();
     page.open("main", &[]);
-    let figure = figure::fronts(result, rig);
+    let figure = figure::fronts(result, rig, &format!("session {session}"));
     page.open(
         "figure",
         &[

@@ -8,6 +8,7 @@ fn input(analysis: &skinrig_analysis::result::Analysis) -> ReportInput<'_> {
     ReportInput {
         analysis,
         provenance: support::provenance(),
+        tradeoff: None,
     }
 }
 
@@ -74,6 +75,7 @@ fn hostile_text_stays_text() {
     let input = ReportInput {
         analysis: &analysis,
         provenance,
+        tradeoff: None,
     };
     let page = html(&input).unwrap();
     assert!(!page.contains("<img"), "an element came through");

@@ -10,6 +10,7 @@ fn terminal_table_reads_like_this() {
     let input = ReportInput {
         analysis: &analysis,
         provenance: support::provenance(),
+        tradeoff: None,
     };
     let table = terminal_table(&input, false);
     insta::assert_snapshot!("terminal_table", table);
@@ -34,6 +35,7 @@ fn terminal_table_of_an_empty_session() {
     let input = ReportInput {
         analysis: &analysis,
         provenance,
+        tradeoff: None,
     };
     insta::assert_snapshot!("terminal_table_empty", terminal_table(&input, false));
 }
@@ -48,6 +50,7 @@ fn a_terminal_gets_no_foreign_control_characters() {
         &ReportInput {
             analysis: &analysis,
             provenance,
+            tradeoff: None,
         },
         false,
     );
@@ -65,6 +68,7 @@ fn counts_that_do_not_add_up_are_called_out() {
     let input = ReportInput {
         analysis: &analysis,
         provenance: support::provenance(),
+        tradeoff: None,
     };
     assert!(terminal_table(&input, false).contains("do not add up"));
     assert!(
@@ -82,6 +86,7 @@ fn an_invalid_session_says_so_in_the_place_of_every_metric() {
         let input = ReportInput {
             analysis,
             provenance: support::provenance(),
+            tradeoff: None,
         };
         let page = skinrig_report::html(&input).unwrap();
         (terminal_table(&input, false), json(&input), page)
@@ -137,6 +142,7 @@ fn json_document_has_this_layout() {
     let input = ReportInput {
         analysis: &analysis,
         provenance: support::provenance(),
+        tradeoff: None,
     };
     let document = json(&input);
     assert_eq!(document["format_version"], JSON_VERSION);
@@ -155,6 +161,7 @@ fn terminal_table_begins_with_findings() {
     let input = ReportInput {
         analysis: &analysis,
         provenance: support::provenance(),
+        tradeoff: None,
     };
     let table = terminal_table(&input, false);
     let fault = table.find("fault     cameras swapped. Broken:").unwrap();
@@ -194,6 +201,7 @@ fn several_depths_have_lines_of_their_own_and_the_unit_says_so() {
     let input = ReportInput {
         analysis: &analysis,
         provenance: support::provenance(),
+        tradeoff: None,
     };
     let table = terminal_table(&input, false);
     assert!(table.contains("RMSE at 2.25 mm depth"), "{table}");

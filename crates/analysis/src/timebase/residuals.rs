@@ -89,9 +89,9 @@ fn of_cameras(piece: &Piece) -> Vec<ClockResidual> {
 fn thinned(points: Vec<ClockResidual>) -> Vec<ClockResidual> {
     let run = points.len().div_ceil(MOST).max(1);
     let size = |p: &&ClockResidual| p.residual_us.abs();
-    let furthest = points.chunks(run).filter_map(|run| {
-        run.iter().max_by(|a, b| size(a).total_cmp(&size(b)))
-    });
+    let furthest = points
+        .chunks(run)
+        .filter_map(|run| run.iter().max_by(|a, b| size(a).total_cmp(&size(b))));
     furthest.copied().collect()
 }
 

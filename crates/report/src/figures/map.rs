@@ -103,12 +103,7 @@ pub fn skin_map(input: &ReportInput<'_>) -> Figure {
         "Skin map",
         caption,
         SIZE,
-        &[
-            ("data-ox", &ox),
-            ("data-oy", &oy),
-            ("data-k", &k),
-            LINKED,
-        ],
+        &[("data-ox", &ox), ("data-oy", &oy), ("data-k", &k), LINKED],
     );
     backdrop(&mut canvas, &layout);
     let svg = &mut canvas.svg;

@@ -2,6 +2,7 @@
 
 mod activity;
 mod centroids;
+mod clocks;
 mod correlation;
 mod errors;
 mod latency_course;
@@ -10,6 +11,7 @@ mod latency_roc;
 mod legend;
 mod map;
 mod models;
+mod motion;
 mod pictures;
 mod raster;
 mod rates;
@@ -21,6 +23,7 @@ pub(crate) mod tradeoff;
 
 pub use activity::activity;
 pub use centroids::centroid_tracks;
+pub use clocks::clock_residuals;
 pub use correlation::correlation;
 pub use errors::{error_distribution, error_scatter};
 pub use latency_course::latency_course;
@@ -29,6 +32,7 @@ pub use latency_roc::latency_roc;
 pub use map::{repeat_map, skin_map};
 pub(crate) use models::model_name;
 pub use models::models;
+pub use motion::{pose_course, pose_presses};
 pub use pictures::press_pictures;
 pub use rates::{event_rates, press_rates};
 pub use reduction::reduction;
@@ -92,9 +96,32 @@ pub fn all(input: &ReportInput<'_>) -> Vec<Figure> {
         latency_course,
         latency_roc,
         latency_onsets,
+        clock_residuals,
+        pose_course,
+        pose_presses,
+        speed_accuracy,
     ];
     figures.extend(optional.into_iter().filter_map(|draw| draw(input)));
     figures
+}
+
+/// Error against cost, when a tradeoff was measured on the session.
+#[must_use]
+pub fn speed_accuracy(input: &ReportInput<'_>) -> Option<Figure> {
+    let result = input.tradeoff.as_ref()?.as_ref().ok()?;
+    let rig = "CPU times are those of the machine that measured them.";
+    Some(tradeoff::fronts(result, rig, &foot(input)))
+}
+
+/// Session, and what stands in for hardware: the foot line of every figure.
+fn foot(input: &ReportInput<'_>) -> String {
+    let p = &input.provenance;
+    let stand_in = p
+        .stand_in()
+        .map_or_else(String::new, |word| format!(" · {word} rig"));
+    let usable = input.analysis.alignment.is_usable();
+    let invalid = if usable { "" } else { "INVALID · " };
+    format!("{invalid}session {}{stand_in}", or_missing(&p.session_id))
 }
 
 /// A figure being drawn.
@@ -151,13 +178,7 @@ impl<'a> Canvas<'a> {
 
     /// Writes the foot line (session, simulated or not, n) and closes.
     fn finish(mut self, n: &str, table: &'static str, interaction: &'static str) -> Figure {
-        let p = &self.input.provenance;
-        let stand_in = p
-            .stand_in()
-            .map_or_else(String::new, |word| format!(" · {word} rig"));
-        let usable = self.input.analysis.alignment.is_usable();
-        let invalid = if usable { "" } else { "INVALID · " };
-        let foot = format!("{invalid}session {}{stand_in}", or_missing(&p.session_id));
+        let foot = foot(self.input);
         let (w, h) = self.size;
         self.svg.text((10.0, h - 8.0), "foot", "start", &foot);
         self.svg.text((w - 10.0, h - 8.0), "foot count", "end", n);

@@ -37,9 +37,9 @@ fn value(cost: Cost, row: &Row) -> f64 {
     }
 }
 
-/// The three panels. Points are choices, one mark per estimator; hollow ones locate too few presses to compete.
+/// `foot` names the session. The three panels. Points are choices, one mark per estimator; hollow ones locate too few presses to compete.
 #[must_use]
-pub fn fronts(result: &Tradeoff, rig: &str) -> Figure {
+pub fn fronts(result: &Tradeoff, rig: &str, foot: &str) -> Figure {
     let shown = result.rows.iter().filter_map(|r| r.rmse_mm.value);
     let shown: Vec<f64> = shown.filter(|e| *e > 0.0).collect();
     let (low, high) = shown
@@ -81,6 +81,13 @@ pub fn fronts(result: &Tradeoff, rig: &str) -> Figure {
         let left = 62.0 + i as f64 * (WIDTH + 42.0);
         panel(&mut svg, result, cost, left, y, i == 0);
     }
+    svg.text((10.0, SIZE.1 - 8.0), "foot", "start", foot);
+    let n = format!(
+        "n = {} presses, {} choices",
+        result.scored.0,
+        result.rows.len()
+    );
+    svg.text((SIZE.0 - 10.0, SIZE.1 - 8.0), "foot count", "end", &n);
     Figure {
         id: "tradeoff",
         title,
@@ -127,15 +134,8 @@ fn mark(svg: &mut Svg, estimator: Estimator, at: (f64, f64), solid: bool, title:
         Estimator::HistogramPeak => format!("M{} {}l4.6 8h-9.2Z", Px(x), Px(y - 5.0)),
         Estimator::Streaming => format!("M{} {}l5 5l-5 5l-5 -5Z", Px(x), Px(y - 5.0)),
     };
-    let style = if solid {
-        "stroke:var(--paper);stroke-width:.8"
-    } else {
-        "fill:none;stroke-width:1.1;opacity:.55"
-    };
-    svg.open(
-        "path",
-        &[("class", &class), ("d", &data), ("style", &style)],
-    );
+    let class = format!("{class} {}", if solid { "solid" } else { "hollow" });
+    svg.open("path", &[("class", &class), ("d", &data)]);
     svg.holding("title", &[], title);
     svg.close();
 }
@@ -247,11 +247,7 @@ fn labels(
             &[
                 ("x", &Px(from)),
                 ("y", &Px(y)),
-                ("class", &"tick"),
-                (
-                    "style",
-                    &"paint-order:stroke;stroke:var(--paper);stroke-width:3px",
-                ),
+                ("class", &"tick halo"),
             ],
             &text,
         );

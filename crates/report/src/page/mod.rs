@@ -226,6 +226,7 @@ pub(crate) fn render(input: &ReportInput<'_>) -> Result<String, ReportError> {
         clocks => clocks(input),
         calibration => calibration(input),
         settings => tables::settings(a),
+        tradeoff_unreadable => input.tradeoff.and_then(Result::err),
         fig,
         press_total => a.presses.len(),
     })?;
@@ -413,7 +414,8 @@ fn calibration(input: &ReportInput<'_>) -> Option<Value> {
         .into_iter()
         .map(|r| {
             context! { name => r.name, before => number(r.before, 4), after => number(r.after, 4),
-            se => number(r.standard_error, 4), determined => r.standard_error.is_some() }
+            se => number(r.standard_error, 4), determined => r.standard_error.is_some(),
+            interval => r.interval.map(|(low, high)| format!("[{}, {}]", number(Some(low), 4), number(Some(high), 4))) }
         })
         .collect();
     Some(context! {

@@ -3,6 +3,7 @@
 
 mod packing;
 mod studies;
+mod traces;
 
 use serde_json::{Map, Value, json};
 use skinrig_analysis::result::{Analysis, CalibrationResult};
@@ -52,7 +53,6 @@ impl Table {
     }
 }
 
-
 /// Everything the script needs: session id and the named tables.
 pub(crate) fn script_data(input: &ReportInput<'_>) -> Value {
     let a = input.analysis;
@@ -76,10 +76,18 @@ pub(crate) fn script_data(input: &ReportInput<'_>) -> Value {
             .column(
                 "standard_error",
                 rows.iter().map(|r| rounded(r.standard_error, 6)),
+            )
+            .column(
+                "low_95",
+                rows.iter().map(|r| rounded(r.interval.map(|i| i.0), 6)),
+            )
+            .column(
+                "high_95",
+                rows.iter().map(|r| rounded(r.interval.map(|i| i.1), 6)),
             );
         put("calibration", table);
     }
-    for (name, table) in studies::all(a) {
+    for (name, table) in studies::all(a).into_iter().chain(traces::all(input)) {
         tables.insert(name.to_owned(), table.finish());
     }
     json!({ "session": input.provenance.session_id, "tables": tables })
@@ -306,20 +314,26 @@ pub(crate) struct ParameterRow {
     pub(crate) before: Option<f64>,
     pub(crate) after: Option<f64>,
     pub(crate) standard_error: Option<f64>,
+    /// 95 % interval: 1.96 standard errors to either side.
+    pub(crate) interval: Option<(f64, f64)>,
 }
 
 /// The calibrated parameters with the values they started from.
 pub(crate) fn calibration(c: &CalibrationResult) -> Vec<ParameterRow> {
-    c.names
-        .iter()
-        .enumerate()
-        .map(|(i, name)| ParameterRow {
+    let row = |(i, name): (usize, &String)| {
+        let after = c.values.get(i).copied();
+        let standard_error = c.standard_errors.get(i).copied().flatten();
+        ParameterRow {
             name: name.clone(),
             before: c.start_values.get(i).copied(),
-            after: c.values.get(i).copied(),
-            standard_error: c.standard_errors.get(i).copied().flatten(),
-        })
-        .collect()
+            after,
+            standard_error,
+            interval: after
+                .zip(standard_error)
+                .map(|(v, se)| derive::interval_95(v, se)),
+        }
+    };
+    c.names.iter().enumerate().map(row).collect()
 }
 
 /// The analysis settings as (name, value) texts.

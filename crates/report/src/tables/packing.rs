@@ -81,8 +81,16 @@ pub(super) mod tests {
     #[test]
     fn every_form_holds_every_cell_to_the_last_bit() {
         let columns: [(Vec<Value>, &str); 5] = [
-            ((0..90).map(|k| json!(f64::from(k) * 190.0 / 1e3)).collect(), "steps"),
-            ((0..90).map(|k| json!(f64::from(k * k % 7919) / 1e4 + 100.0)).collect(), "steps"),
+            (
+                (0..90).map(|k| json!(f64::from(k) * 190.0 / 1e3)).collect(),
+                "steps",
+            ),
+            (
+                (0..90)
+                    .map(|k| json!(f64::from(k * k % 7919) / 1e4 + 100.0))
+                    .collect(),
+                "steps",
+            ),
             (vec![json!("located"); 40], "runs"),
             (vec![json!(0.1 + 0.2), Value::Null, json!(1e300)], ""),
             (vec![], ""),

@@ -180,6 +180,7 @@ pub fn analysis(side: u32, repetitions: u32) -> Analysis {
         warnings: vec!["camera 2 has no trigger marks; its clock was fitted from the event rates of the sync presses".into()],
         pictures,
         zooms,
+        motion: Some(studies::motion()),
     }
 }
 
@@ -217,6 +218,7 @@ fn alignment() -> Alignment {
         lines: vec![line; 2],
         resets: 0,
         camera_from_host: [vec![], vec![]],
+        residuals: studies::clock_residuals(),
     }
 }
 

@@ -335,3 +335,58 @@ pub fn findings() -> Vec<Finding> {
         },
     ]
 }
+
+/// A map with a point that it leaves out far away, and one that bends.
+pub fn clock_residuals() -> Vec<ClockResiduals> {
+    let map = |map, size_us: f64| ClockResiduals {
+        map,
+        n: 200,
+        points: (0..200)
+            .map(|k| ClockResidual {
+                host_s: f64::from(k) * 3.0,
+                residual_us: if k == 77 {
+                    900.0
+                } else {
+                    size_us * (f64::from(k) * 0.7).sin()
+                },
+                used: k != 77,
+            })
+            .collect(),
+    };
+    vec![
+        map(MapName::HostFromBox, 60.0),
+        map(MapName::Camera1FromBox, 0.6),
+        map(MapName::Camera2FromBox, 0.7),
+    ]
+}
+
+/// A tip that lags by 10 ms.
+pub fn motion() -> Motion {
+    let path = |t: f64| [0.0, 0.0, 5.0 - 20.0 * t.clamp(0.0, 0.35)];
+    let samples = (0..300).map(|k| f64::from(k) * 2e-3);
+    Motion {
+        samples: 600_000,
+        broken: 2,
+        rms_mm: 0.05,
+        max_mm: 0.3,
+        bin_s: 0.4,
+        course: (0..1500)
+            .map(|k| MotionBin {
+                start_s: f64::from(k) * 0.4,
+                rms_mm: 0.05,
+                max_mm: 0.2 + 0.1 * f64::from(k % 2),
+            })
+            .collect(),
+        presses: vec![PressMotion {
+            press: PressId(9),
+            kept_each: 2,
+            samples: samples
+                .map(|t| TipSample {
+                    since_contact_s: t - 0.25,
+                    commanded_mm: path(t),
+                    measured_mm: path(t - 0.01),
+                })
+                .collect(),
+        }],
+    }
+}

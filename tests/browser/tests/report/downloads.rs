@@ -1,0 +1,113 @@
+//! Downloads: every figure as SVG, its data as CSV.
+
+use serde_json::{Value, json};
+use skinrig_browser::Page;
+
+use crate::{counted, with_report};
+
+fn rows(bytes: &[u8]) -> (Vec<String>, usize) {
+    // The reader refuses rows of another length than the head's.
+    let mut reader = csv::Reader::from_reader(bytes);
+    let head = reader
+        .headers()
+        .unwrap()
+        .iter()
+        .map(str::to_owned)
+        .collect();
+    (head, reader.records().map(|r| r.unwrap()).count())
+}
+
+fn buttons(page: &mut Page<'_>, kind: &str) -> Vec<String> {
+    let found = page
+        .ask(&format!("[...document.querySelectorAll('[data-save={kind}]')].map(b => b.closest('[data-figure]').dataset.figure)"))
+        .unwrap();
+    let found = found.as_array().unwrap().iter();
+    found.map(|f| f.as_str().unwrap().to_owned()).collect()
+}
+
+#[test]
+fn every_figure_is_a_drawing_of_its_own_and_names_its_session() {
+    with_report(|page, session| {
+        let figures = page
+            .ask("document.querySelectorAll('svg.fig').length")
+            .unwrap();
+        let all = buttons(page, "svg");
+        assert_eq!(json!(all.len()), figures);
+        for figure in all {
+            let (name, bytes) = page
+                .download(&format!("[data-figure={figure}] [data-save=svg]"))
+                .unwrap();
+            assert!(
+                name.ends_with(&format!("{figure}.svg")) && name.contains(session.id()),
+                "{name}"
+            );
+            let text = String::from_utf8(bytes).unwrap();
+            assert!(
+                text.contains(session.id()) && text.contains("simulated"),
+                "{figure}"
+            );
+            assert!(!text.contains("var("), "{figure} needs the page's style");
+            let parsed = page
+                .ask(&format!(
+                    "(() => {{ const d = new DOMParser().parseFromString({}, 'image/svg+xml'); \
+                     return [d.documentElement.localName, d.querySelectorAll('parsererror').length, d.querySelectorAll('text').length]; }})()",
+                    json!(text)
+                ))
+                .unwrap();
+            assert_eq!(
+                (&parsed[0], &parsed[1]),
+                (&json!("svg"), &json!(0)),
+                "{figure}"
+            );
+            assert!(parsed[2].as_u64().unwrap() > 5, "{figure}");
+        }
+    });
+}
+
+#[test]
+fn every_figure_gives_its_data() {
+    with_report(|page, session| {
+        let all = buttons(page, "csv");
+        assert!(all.len() > 20, "{all:?}");
+        let a = &session.results["analysis"];
+        let length = |v: &Value| v.as_array().unwrap().len();
+        for figure in &all {
+            let (name, bytes) = page
+                .download(&format!("[data-figure={figure}] [data-save=csv]"))
+                .unwrap();
+            assert!(name.ends_with(".csv"), "{name}");
+            let (head, n) = rows(&bytes);
+            assert!(
+                head.iter().all(|h| !h.is_empty()) && n > 0,
+                "{figure}: {head:?}, {n} rows"
+            );
+            let wanted = match figure.as_str() {
+                "skin-map" | "press-table" | "error-scatter" => session.presses().len(),
+                "error-distribution" => session.count(counted),
+                "models" => length(&a["calibration"]["compared"]),
+                "latency-onsets" => length(&a["latency"]["onsets"]),
+                _ => continue,
+            };
+            assert_eq!(n, wanted, "{figure}");
+        }
+    });
+}
+
+#[test]
+fn data_that_are_filtered_are_downloaded_filtered_and_say_so() {
+    with_report(|page, session| {
+        page.ask("(() => { const s = document.querySelector('[data-testid=filter-depth]'); s.value = '1'; s.dispatchEvent(new Event('input')); })()")
+            .unwrap();
+        let shallow = |p: &Value| p["depth_mm"] == 1.0;
+        let (name, bytes) = page.download("[data-testid=press-table-csv]").unwrap();
+        assert!(name.ends_with("press-table_filtered.csv"), "{name}");
+        assert_eq!(rows(&bytes).1, session.count(shallow));
+        let (_, bytes) = page
+            .download("[data-testid=error-distribution-csv]")
+            .unwrap();
+        assert_eq!(rows(&bytes).1, session.count(|p| shallow(p) && counted(p)));
+        let (name, bytes) = page.download("[data-testid=skin-map-svg]").unwrap();
+        assert!(name.ends_with("skin-map_filtered.svg"), "{name}");
+        assert!(String::from_utf8(bytes).unwrap().contains("depth (mm) 1"));
+    });
+}

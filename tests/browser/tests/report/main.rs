@@ -1,0 +1,123 @@
+//! The report of a real run on the simulated rig, read in a headless Chromium. Pictures for a person to look at are kept in
+//! `target/browser/`.
+#![expect(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    reason = "a test that cannot drive the browser must fail, and one that has none must say so"
+)]
+
+mod acting;
+mod downloads;
+mod reading;
+
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+
+use serde_json::Value;
+use skinrig::exit::Exit;
+use skinrig_browser::{Browser, BrowserError, Page};
+
+/// A run at two depths, its results and its report.
+struct Session {
+    report: PathBuf,
+    results: Value,
+}
+
+impl Session {
+    fn presses(&self) -> &[Value] {
+        self.results["analysis"]["presses"].as_array().unwrap()
+    }
+
+    /// How many presses are like that.
+    fn count(&self, like: impl Fn(&Value) -> bool) -> usize {
+        self.presses().iter().filter(|p| like(p)).count()
+    }
+
+    fn id(&self) -> &str {
+        self.results["provenance"]["session_id"].as_str().unwrap()
+    }
+}
+
+/// True for the presses that the figures of errors show.
+fn counted(press: &Value) -> bool {
+    press["role"] == "score"
+        && press["verdict"] == "valid"
+        && !press["truth"].is_null()
+        && press["location_outcome"]["at"].is_object()
+}
+
+fn kept_folder() -> PathBuf {
+    let target = Path::new(env!("CARGO_TARGET_TMPDIR")).parent().unwrap();
+    target.join("browser")
+}
+
+fn skinrig(arguments: &[&str]) {
+    let all = std::iter::once("skinrig").chain(arguments.iter().copied());
+    let exit = skinrig::main_with(all.map(OsString::from));
+    assert!(matches!(exit, Exit::Ok), "skinrig {arguments:?}");
+}
+
+/// The one session of this test program.
+fn session() -> &'static Session {
+    static SESSION: OnceLock<Session> = OnceLock::new();
+    SESSION.get_or_init(|| {
+        let folder = kept_folder().join("session");
+        let _ = std::fs::remove_dir_all(&folder);
+        let protocol = concat!(
+            env!("CARGO_MANIFEST_DIR"),
+            "/../../protocols/depth-sweep.yaml"
+        );
+        let to = folder.to_str().unwrap();
+        skinrig(&[
+            "run",
+            protocol,
+            "--sessions",
+            to,
+            "--set",
+            "path.random.count=12",
+            "--set",
+            "depths=[1 mm, 2 mm]",
+        ]);
+        let ending = |ending: &str| {
+            let files = std::fs::read_dir(&folder)
+                .unwrap()
+                .map(|f| f.unwrap().path());
+            let mut found = files.filter(|f| f.to_string_lossy().ends_with(ending));
+            found.next().unwrap()
+        };
+        let file = ending(".session.sqlite");
+        let file = file.to_str().unwrap();
+        skinrig(&["tradeoff", file, "--repeats", "1"]);
+        skinrig(&["report", file]);
+        let results = std::fs::read(ending(".results.json")).unwrap();
+        Session {
+            report: ending(".report.html"),
+            results: serde_json::from_slice(&results).unwrap(),
+        }
+    })
+}
+
+/// Runs a test with the report open; says so and passes on a machine without a browser.
+fn with_report(test: impl FnOnce(&mut Page<'_>, &Session)) {
+    let mut browser = match Browser::start() {
+        Ok(browser) => browser,
+        Err(BrowserError::Absent(reason)) => {
+            println!("skipped: no browser: {reason}");
+            return;
+        }
+        Err(e) => panic!("{e}"),
+    };
+    let session = session();
+    let mut page = browser.page().unwrap();
+    page.open(&session.report).unwrap();
+    test(&mut page, session);
+}
+
+/// Keeps a picture of the page.
+fn keep(page: &mut Page<'_>, name: &str, whole: bool) {
+    let folder = kept_folder();
+    std::fs::create_dir_all(&folder).unwrap();
+    let picture = page.picture(whole).unwrap();
+    std::fs::write(folder.join(format!("{name}.png")), picture).unwrap();
+}

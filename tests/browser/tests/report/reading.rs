@@ -1,0 +1,285 @@
+//! Reading: loading, first screen, structure, names, dark mode, print, phone, without script.
+
+use serde_json::json;
+use skinrig_browser::{Page, Size};
+
+use crate::{keep, kept_folder, with_report};
+
+/// Everything that a page can complain of, and every request but its own.
+fn complaints(page: &mut Page<'_>) -> Vec<String> {
+    let events = page.events().into_iter();
+    let bad = events.filter(|e| match e.method.as_str() {
+        "Runtime.exceptionThrown" => true,
+        "Runtime.consoleAPICalled" => e.params["type"] != "log",
+        "Log.entryAdded" => true,
+        "Network.requestWillBeSent" => {
+            let url = e.params["request"]["url"].as_str().unwrap_or_default();
+            !(url.starts_with("file:") && url.ends_with(".report.html"))
+                && !url.starts_with("data:")
+        }
+        _ => false,
+    });
+    bad.map(|e| format!("{}: {}", e.method, e.params)).collect()
+}
+
+#[test]
+fn it_loads_without_a_word_and_asks_nobody() {
+    with_report(|page, session| {
+        assert_eq!(page.ask("document.readyState").unwrap(), "complete");
+        let rows = "document.querySelectorAll('#press-table tbody tr').length";
+        assert_eq!(
+            page.ask(rows).unwrap(),
+            json!(session.presses().len().min(50))
+        );
+        // Every part of the script ran to its end: the last one writes this.
+        assert!(
+            page.text("document.querySelector('#page-state').textContent")
+                .unwrap()
+                .contains("presses")
+        );
+        let found = complaints(page);
+        assert!(found.is_empty(), "{found:#?}");
+        // The policy of the page holds against what is not its own script.
+        page.ask("document.body.insertAdjacentHTML('beforeend', '<img src=x onerror=\"window.ran = 1\">')")
+            .unwrap();
+        page.ask("new Promise(done => setTimeout(done, 50))")
+            .unwrap();
+        assert!(!complaints(page).is_empty(), "the complaints are not seen");
+        assert_eq!(page.ask("window.ran === undefined").unwrap(), json!(true));
+        assert!(page.ask("eval('1')").is_err());
+    });
+}
+
+#[test]
+fn provenance_faults_and_exclusions_stand_on_the_first_screen() {
+    with_report(|page, session| {
+        for card in [
+            "provenance",
+            "notices",
+            "exclusions",
+            "counts",
+            "metric-rmse",
+        ] {
+            let bottom = page
+                .ask(&format!(
+                    "document.querySelector('[data-testid={card}]').getBoundingClientRect().bottom"
+                ))
+                .unwrap();
+            assert!(
+                bottom.as_f64().unwrap() <= f64::from(Size::LAPTOP.height),
+                "{card}: {bottom}"
+            );
+        }
+        let block = page
+            .text("document.querySelector('[data-testid=provenance]').textContent")
+            .unwrap();
+        let wanted = &session.results["provenance"];
+        for key in [
+            "session_id",
+            "protocol_sha256",
+            "plan_sha256",
+            "results_hash",
+            "software",
+            "operator",
+        ] {
+            assert!(
+                block.contains(wanted[key].as_str().unwrap()),
+                "{key}: {block}"
+            );
+        }
+        keep(page, "first-screen", false);
+        keep(page, "light", true);
+    });
+}
+
+#[test]
+fn headings_landmarks_and_tables_are_in_order() {
+    with_report(|page, _| {
+        let levels = page
+            .ask("[...document.querySelectorAll('h1,h2,h3,h4')].map(h => Number(h.tagName[1]))")
+            .unwrap();
+        let levels: Vec<u64> = levels
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|l| l.as_u64().unwrap())
+            .collect();
+        assert_eq!(levels.iter().filter(|l| **l == 1).count(), 1);
+        for pair in levels.windows(2) {
+            assert!(
+                pair[1] <= pair[0] + 1,
+                "a heading of level {} follows one of {}",
+                pair[1],
+                pair[0]
+            );
+        }
+        for landmark in [
+            "header",
+            "nav[aria-label]",
+            "main",
+            "footer",
+            "form[role=search][aria-label]",
+        ] {
+            let n = page
+                .ask(&format!("document.querySelectorAll('{landmark}').length"))
+                .unwrap();
+            assert_eq!(n, json!(1), "{landmark}");
+        }
+        let bare = "[...document.querySelectorAll('th')].filter(th => !th.scope).length";
+        assert_eq!(page.ask(bare).unwrap(), json!(0));
+        let uncaptioned = "[...document.querySelectorAll('table')].filter(t => !t.caption).length";
+        assert_eq!(page.ask(uncaptioned).unwrap(), json!(0));
+        let untold = "[...document.querySelectorAll('svg.fig')].filter(s => !s.querySelector('title')?.textContent || !s.querySelector('desc')?.textContent).length";
+        assert_eq!(page.ask(untold).unwrap(), json!(0));
+        // The first stop of the keyboard leads past the head, and shows itself.
+        page.key("Tab").unwrap();
+        assert_eq!(
+            page.ask("document.activeElement.className").unwrap(),
+            "skip"
+        );
+        assert!(
+            page.ask("document.activeElement.getBoundingClientRect().left")
+                .unwrap()
+                .as_f64()
+                .unwrap()
+                >= 0.0
+        );
+        page.key("Tab").unwrap();
+        let outline = page
+            .text("getComputedStyle(document.activeElement).outlineStyle")
+            .unwrap();
+        assert_eq!(outline, "solid", "the focus is not to be seen");
+    });
+}
+
+#[test]
+fn everything_that_can_be_used_has_a_name() {
+    with_report(|page, _| {
+        let tree = page.call("Accessibility.getFullAXTree", json!({})).unwrap();
+        let nodes = tree["nodes"].as_array().unwrap();
+        let used = [
+            "button",
+            "link",
+            "checkbox",
+            "combobox",
+            "spinbutton",
+            "textbox",
+            "group",
+            "region",
+            "image",
+            "search",
+        ];
+        let mut seen = std::collections::BTreeMap::<&str, u32>::new();
+        for node in nodes.iter().filter(|n| n["ignored"] != true) {
+            let role = node["role"]["value"].as_str().unwrap_or_default();
+            let Some(role) = used.iter().find(|r| **r == role) else {
+                continue;
+            };
+            let name = node["name"]["value"].as_str().unwrap_or_default();
+            assert!(!name.trim().is_empty(), "a {role} without a name: {node}");
+            *seen.entry(role).or_default() += 1;
+        }
+        for role in [
+            "button",
+            "link",
+            "checkbox",
+            "combobox",
+            "spinbutton",
+            "image",
+        ] {
+            assert!(seen.contains_key(role), "no {role} among {seen:?}");
+        }
+        let still = "document.getAnimations().length";
+        assert_eq!(page.ask(still).unwrap(), json!(0));
+    });
+}
+
+/// How light a colour is, 0 to 255.
+const LIGHTNESS: &str = "(c => Math.max(...c.match(/\\d+/g).slice(0, 3).map(Number)))";
+
+#[test]
+fn dark_follows_the_system_and_the_button() {
+    with_report(|page, _| {
+        let lightness = |page: &mut Page<'_>| {
+            let body = format!("{LIGHTNESS}(getComputedStyle(document.body).backgroundColor)");
+            let figure = format!(
+                "{LIGHTNESS}(getComputedStyle(document.querySelector('#skin-map')).backgroundColor)"
+            );
+            [body, figure].map(|what| page.ask(&what).unwrap().as_f64().unwrap())
+        };
+        assert!(lightness(page).iter().all(|l| *l > 200.0));
+        page.media("", "dark").unwrap();
+        assert!(lightness(page).iter().all(|l| *l < 60.0));
+        keep(page, "dark", true);
+        page.click("#theme").unwrap();
+        assert!(lightness(page).iter().all(|l| *l > 200.0));
+        page.click("#theme").unwrap();
+        assert!(lightness(page).iter().all(|l| *l < 60.0));
+    });
+}
+
+#[test]
+fn it_prints_and_leaves_out_what_paper_cannot_do() {
+    with_report(|page, _| {
+        let pdf = page.pdf().unwrap();
+        std::fs::write(kept_folder().join("print.pdf"), &pdf).unwrap();
+        let text = String::from_utf8_lossy(&pdf);
+        let pages = text.matches("/Type /Page").count() - text.matches("/Type /Pages").count();
+        assert!(
+            text.starts_with("%PDF-") && (3..40).contains(&pages),
+            "{pages} pages"
+        );
+        page.media("print", "dark").unwrap();
+        for gone in ["nav", "#filters", ".tools", "#press-table", ".inspector"] {
+            let display = page
+                .text(&format!(
+                    "getComputedStyle(document.querySelector('{gone}')).display"
+                ))
+                .unwrap();
+            assert_eq!(display, "none", "{gone}");
+        }
+    });
+}
+
+#[test]
+fn a_phone_scrolls_one_way_only() {
+    with_report(|page, _| {
+        page.resize(Size::PHONE).unwrap();
+        let width = page.ask("document.documentElement.scrollWidth").unwrap();
+        assert!(
+            width.as_u64().unwrap() <= u64::from(Size::PHONE.width),
+            "{width}"
+        );
+        keep(page, "phone", true);
+    });
+}
+
+#[test]
+fn it_can_be_read_without_its_script() {
+    with_report(|page, session| {
+        page.call(
+            "Emulation.setScriptExecutionDisabled",
+            json!({ "value": true }),
+        )
+        .unwrap();
+        page.open(&session.report).unwrap();
+        let tree = page.call("Accessibility.getFullAXTree", json!({})).unwrap();
+        let nodes = tree["nodes"].as_array().unwrap();
+        let named = |name: &str| {
+            nodes.iter().any(|n| {
+                n["name"]["value"]
+                    .as_str()
+                    .is_some_and(|t| t.contains(name))
+            })
+        };
+        for name in [
+            "Localisation error, RMSE",
+            session.id(),
+            "Skin map",
+            "need JavaScript",
+        ] {
+            assert!(named(name), "{name}");
+        }
+        keep(page, "without-script", false);
+    });
+}
