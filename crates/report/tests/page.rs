@@ -250,9 +250,21 @@ fn everything_a_browser_test_needs_has_a_name() {
         "figure-latency-course",
         "figure-latency-roc",
         "figure-latency-onsets",
+        "figure-clock-residuals",
+        "figure-pose-course",
+        "figure-pose-presses",
+        "no-tradeoff",
         "press-table",
         "inspector",
+        "filters",
+        "filter-repetition",
+        "filter-depth",
+        "filter-outcome",
         "filter-verdict",
+        "filter-role",
+        "filter-press",
+        "filter-reset",
+        "filter-state",
         "theme",
     ] {
         assert_eq!(
@@ -384,37 +396,6 @@ fn the_head_names_protocol_prototype_and_extent() {
     assert!(head.contains("waveguide 3, second pour"));
     assert!(head.contains("3 repetitions, 16 locations"));
     assert!(head.contains("<code>2026-03-02_14-05-09_meander</code>"));
-}
-
-/// Columns with long runs are packed; unpacked they are what the analysis says.
-#[test]
-fn packed_columns_hold_every_cell() {
-    let analysis = support::analysis(4, 3);
-    let page = html(&input(&analysis)).unwrap();
-    let data = page.split("id=\"report-data\">").nth(1).unwrap();
-    let data: serde_json::Value =
-        serde_json::from_str(data.split("</script>").next().unwrap()).unwrap();
-    let table = &data["tables"]["presses"];
-    let at = |name: &str| {
-        let columns = table["columns"].as_array().unwrap();
-        let column = &table["data"][columns.iter().position(|c| c == name).unwrap()];
-        column.as_array().cloned().unwrap_or_else(|| {
-            let runs = column["runs"].as_array().unwrap();
-            let count = |c: &serde_json::Value| c.as_u64().unwrap() as usize;
-            let cells = runs
-                .chunks(2)
-                .flat_map(|r| vec![r[0].clone(); count(&r[1])]);
-            cells.collect()
-        })
-    };
-    let repetitions: Vec<u32> = analysis.presses.iter().map(|p| p.repetition).collect();
-    assert_eq!(
-        serde_json::json!(at("repetition")),
-        serde_json::json!(repetitions)
-    );
-    let roles: Vec<_> = analysis.presses.iter().map(|p| p.role).collect();
-    assert_eq!(serde_json::json!(at("role")), serde_json::json!(roles));
-    assert_eq!(at("press").len(), analysis.presses.len());
 }
 
 /// A camera without a clock fit has no place on the host's time axis.

@@ -244,11 +244,7 @@ fn labels(
         svg.line("grid", (px, py), (px.clamp(from, from + width), near));
         svg.holding(
             "text",
-            &[
-                ("x", &Px(from)),
-                ("y", &Px(y)),
-                ("class", &"tick halo"),
-            ],
+            &[("x", &Px(from)), ("y", &Px(y)), ("class", &"tick halo")],
             &text,
         );
     }

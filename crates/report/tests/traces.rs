@@ -1,0 +1,98 @@
+//! Clocks, robot and tradeoff in the page, and how columns of data stand in it.
+
+mod support;
+
+use skinrig_report::{ReportInput, html};
+
+fn input(analysis: &skinrig_analysis::result::Analysis) -> ReportInput<'_> {
+    ReportInput {
+        analysis,
+        provenance: support::provenance(),
+        tradeoff: None,
+    }
+}
+
+/// What cannot be shown is said, and why.
+#[test]
+fn clocks_robot_and_tradeoff_are_drawn_or_their_absence_is_told() {
+    let mut analysis = support::analysis(4, 3);
+    let mut with_reason = input(&analysis);
+    with_reason.tradeoff = Some(Err("s.tradeoff.json: expected <a> result"));
+    let page = html(&with_reason).unwrap();
+    assert!(page.contains("data-testid=\"tradeoff-unreadable\""));
+    assert!(page.contains("expected &lt;a&gt; result") && !page.contains("\"no-tradeoff\""));
+    let clocks = skinrig_report::figures::clock_residuals(&with_reason).unwrap();
+    // One panel per map; the point that each leaves out is drawn at the edge, and does not stretch the axis.
+    for panel in ["host from box", "camera 1 from box", "camera 2 from box"] {
+        assert!(clocks.svg.contains(panel), "{panel}");
+    }
+    assert_eq!(clocks.svg.matches("h6v6h-6Z").count(), 3);
+    assert!(
+        clocks.svg.contains(">-0.5<") || clocks.svg.contains(">-0.50<"),
+        "{}",
+        clocks.svg
+    );
+    let course = skinrig_report::figures::pose_course(&with_reason).unwrap();
+    assert!(
+        course
+            .caption
+            .contains("0.050 mm root mean square, 0.300 mm at most")
+    );
+    assert!(
+        course
+            .caption
+            .contains("2 samples without finite positions")
+    );
+    analysis.motion = None;
+    analysis.alignment.residuals.clear();
+    let page = html(&input(&analysis)).unwrap();
+    for id in ["no-clock-residuals", "no-pose", "no-tradeoff"] {
+        assert!(page.contains(&format!("data-testid=\"{id}\"")), "{id}");
+    }
+}
+
+/// A column as the page's script reads it.
+fn unpacked(column: &serde_json::Value) -> Vec<serde_json::Value> {
+    if let Some(runs) = column["runs"].as_array() {
+        let count = |c: &serde_json::Value| c.as_u64().unwrap() as usize;
+        let cells = runs.chunks(2);
+        return cells
+            .flat_map(|r| vec![r[0].clone(); count(&r[1])])
+            .collect();
+    }
+    if column["per"].is_u64() {
+        let (mut sum, per) = (0, column["per"].as_i64().unwrap());
+        let steps = unpacked(&column["steps"]).into_iter();
+        let whole = steps.map(|s| {
+            sum += s.as_i64().unwrap();
+            assert_eq!(sum % per, 0);
+            serde_json::json!(sum / per)
+        });
+        return whole.collect();
+    }
+    column.as_array().unwrap().clone()
+}
+
+/// Columns with long runs or small steps are packed; unpacked they are what the analysis says.
+#[test]
+fn packed_columns_hold_every_cell() {
+    let analysis = support::analysis(4, 3);
+    let page = html(&input(&analysis)).unwrap();
+    let data = page.split("id=\"report-data\">").nth(1).unwrap();
+    let data: serde_json::Value =
+        serde_json::from_str(data.split("</script>").next().unwrap()).unwrap();
+    let table = &data["tables"]["presses"];
+    let at = |name: &str| {
+        let columns = table["columns"].as_array().unwrap();
+        unpacked(&table["data"][columns.iter().position(|c| c == name).unwrap()])
+    };
+    let repetitions: Vec<u32> = analysis.presses.iter().map(|p| p.repetition).collect();
+    assert_eq!(
+        serde_json::json!(at("repetition")),
+        serde_json::json!(repetitions)
+    );
+    let roles: Vec<_> = analysis.presses.iter().map(|p| p.role).collect();
+    assert_eq!(serde_json::json!(at("role")), serde_json::json!(roles));
+    let numbers: Vec<u32> = analysis.presses.iter().map(|p| p.press.0).collect();
+    assert_eq!(serde_json::json!(at("press")), serde_json::json!(numbers));
+}
