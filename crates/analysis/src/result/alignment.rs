@@ -158,7 +158,7 @@ pub struct ClockResiduals {
     pub map: MapName,
     /// Points of the map, left-out ones included.
     pub n: u32,
-    /// In order of time; of more than a few hundred the one furthest from the map in each of equal runs of neighbours.
+    /// In order of time. Of more than a few hundred every n-th, with the largest of those used; left-out ones are thinned apart.
     pub points: Vec<ClockResidual>,
 }
 

@@ -21,7 +21,7 @@ pub fn clock_residuals(input: &ReportInput<'_>) -> Option<Figure> {
     }
     let caption = "What each map between two clocks leaves of the points that it is fitted to: observed minus mapped time, against the time of \
          the session. Dots: points that the fit uses; open squares at the edge: points that it leaves out, wherever they lie. Of more than 600 \
-         points the one furthest from the map in each of equal runs of neighbours is drawn. The last two panels show the one line through all \
+         points every n-th is drawn, and the largest. The last two panels show the one line through all \
          trains: what bends there is the wander of the rates, which the piecewise maps above follow."
         .to_owned();
     let rows = maps.len().div_ceil(2);

@@ -105,14 +105,14 @@ pub fn pose_presses(input: &ReportInput<'_>) -> Option<Figure> {
         let ticks = (6, if i == 0 { 5 } else { 0 });
         let upper = Axes {
             x,
-            y: Scale::new(heights, (200.0, 40.0)),
+            y: Scale::new(heights, (212.0, 54.0)),
             x_label: String::new(),
             y_label: label("height z (mm)"),
             tick_count: ticks,
         };
         let lower = Axes {
             x,
-            y: Scale::new((-off, off), (420.0, 256.0)),
+            y: Scale::new((-off, off), (426.0, 264.0)),
             x_label: "time since contact (s)".into(),
             y_label: label("measured - commanded (mm)"),
             tick_count: ticks,
@@ -121,7 +121,7 @@ pub fn pose_presses(input: &ReportInput<'_>) -> Option<Figure> {
         upper.draw(svg);
         lower.draw(svg);
         svg.text(
-            (left, 20.0),
+            (left, 42.0),
             "panel",
             "start",
             &format!("press {}", press.press.0),
