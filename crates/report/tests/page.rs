@@ -1,6 +1,8 @@
 //! The HTML page as a whole: size, self-containment, escaping, empty input.
 
 mod support;
+#[path = "page/traces.rs"]
+mod traces;
 
 use skinrig_report::{ReportInput, html};
 
@@ -378,7 +380,7 @@ fn presses_that_do_not_count_are_grouped_by_rule() {
     assert_eq!((counted[0].n + sync[0].n, sync[0].n), (all, 1));
     let page = html(&input(&analysis)).unwrap();
     let card = page.split("data-testid=\"exclusions\"").nth(1).unwrap();
-    let card = card.split("data-testid=\"counts\"").next().unwrap();
+    let card = card.split("data-testid=\"provenance\"").next().unwrap();
     assert_eq!(card.matches("<tr><td").count(), 2, "{card}");
     assert!(
         card.contains("for example: no response: 11 events"),

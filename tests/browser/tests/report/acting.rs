@@ -254,11 +254,9 @@ fn event_rates_zoom_by_button_key_and_wheel_and_back() {
             (span(half) / span(whole) - 0.5).abs() < 0.01,
             "{whole:?} {half:?}"
         );
-        assert!(
-            page.text("document.querySelector('#event-rates .zoomed').getAttribute('transform')")
-                .unwrap()
-                .contains("scale(2 1)")
-        );
+        let drawn = "Number(document.querySelector('#event-rates .zoomed').getAttribute('transform').match(/scale\\((\\S+)/)[1])";
+        let scale = page.ask(drawn).unwrap().as_f64().unwrap();
+        assert!((scale - 2.0).abs() < 1e-6, "{scale}");
         page.click("[data-zoom=right]").unwrap();
         assert!(range(page).0 > half.0);
         keep(page, "zoomed", false);

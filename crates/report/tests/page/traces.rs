@@ -1,16 +1,8 @@
 //! Clocks, robot and tradeoff in the page, and how columns of data stand in it.
 
-mod support;
+use skinrig_report::html;
 
-use skinrig_report::{ReportInput, html};
-
-fn input(analysis: &skinrig_analysis::result::Analysis) -> ReportInput<'_> {
-    ReportInput {
-        analysis,
-        provenance: support::provenance(),
-        tradeoff: None,
-    }
-}
+use crate::{input, support};
 
 /// What cannot be shown is said, and why.
 #[test]
