@@ -217,7 +217,7 @@ fn table_of_levels() {
         (Kind::Width, "latency width"),
         (Kind::CountRate, "count rate"),
     ] {
-        for locations in [8, 24] {
+        for locations in [8, 24, 60] {
             let world = World {
                 locations,
                 ..World::new(kind)
