@@ -46,6 +46,15 @@ const ALLOWED: &[(&str, &[&str])] = &[
         &["skinrig-compare", "skinrig-analysis", "skinrig-model"],
     ),
     (
+        "skinrig-export",
+        &[
+            "skinrig-analysis",
+            "skinrig-formats",
+            "skinrig-model",
+            "skinrig-recorder",
+        ],
+    ),
+    (
         "skinrig",
         &[
             "skinrig-model",
@@ -62,6 +71,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "skinrig-analysis",
             "skinrig-compare",
             "skinrig-report",
+            "skinrig-export",
         ],
     ),
 ];
@@ -73,6 +83,8 @@ const RESTRICTED: &[(&str, &[&str])] = &[
     ("serde_yaml", &["skinrig-protocol"]),
     ("serde-saphyr", &["skinrig-protocol"]),
     ("rust-hdf5", &["skinrig-formats"]),
+    ("parquet", &["skinrig-export"]),
+    ("zip", &["skinrig-export"]),
     ("clap", &["skinrig"]),
     ("indicatif", &["skinrig"]),
     ("chrono", &["skinrig", "skinrig-recorder"]),

@@ -84,9 +84,28 @@ pub enum Command {
         ctrl-C holds, rises and disarms; three times switches the motors off where the tip is. Coordinates are the robot's own. `help` lists what can be typed.")]
     Jog(JogArgs),
 
+    /// Follow a run in the terminal until it ends; reads only, and cannot hold the run up.
+    #[command(after_help = "Examples:\n  skinrig watch\n  \
+        skinrig watch sessions/NAME.session.sqlite --once")]
+    Watch(WatchArgs),
+
     /// List recorded sessions.
-    #[command(after_help = "Example:\n  skinrig sessions sessions/")]
+    #[command(after_help = "Examples:\n  skinrig sessions sessions/\n  \
+        skinrig sessions --prototype \"skin 7\" --tag good-skin")]
     Sessions(SessionsArgs),
+
+    /// List the prototypes of a folder: sessions, best and last RMSE, trend over time.
+    #[command(after_help = "Examples:\n  skinrig prototypes\n  \
+        skinrig prototypes sessions/ --prototype \"skin 7\"")]
+    Prototypes(PrototypesArgs),
+
+    /// Give a session tags, take tags away, or remark something after the fact; the session itself stays as it is.
+    #[command(
+        after_help = "Examples:\n  skinrig tag sessions/NAME.session.sqlite good-skin -bad\n  \
+        skinrig tag sessions/NAME.session.sqlite --note \"the lamp had been replaced\"\n\n\
+        Without tags and note: what was said of it so far. A tag has 1 to 40 of a-z, 0-9, `.`, `_`, `-`."
+    )]
+    Tag(TagArgs),
 
     /// Describe one session: protocol, rig, devices, presses, losses.
     #[command(after_help = "Example:\n  skinrig show sessions/NAME.session.sqlite --presses")]
@@ -122,8 +141,10 @@ pub enum Command {
     )]
     Tradeoff(TradeoffArgs),
 
-    /// Recompute every checksum, count and hash of a session.
-    #[command(after_help = "Example:\n  skinrig verify sessions/NAME.session.sqlite")]
+    /// Recompute every checksum, count and hash of a session, or of a bundle made by `export`.
+    #[command(
+        after_help = "Examples:\n  skinrig verify sessions/NAME.session.sqlite\n  skinrig verify NAME.bundle"
+    )]
     Verify(SessionArg),
 
     /// Copy what is whole of a damaged session into a new file; list what is lost.
@@ -142,7 +163,9 @@ pub enum Command {
 
     /// Write a session's data in other programs' formats.
     #[command(
-        after_help = "Example:\n  skinrig export sessions/NAME.session.sqlite --to raw --to presses --out export/"
+        after_help = "Examples:\n  skinrig export sessions/NAME.session.sqlite --to parquet --out export/\n  \
+        skinrig export sessions/NAME.session.sqlite --to csv --only presses --only results\n  \
+        skinrig export sessions/NAME.session.sqlite --to bundle --out NAME.bundle"
     )]
     Export(ExportArgs),
 
@@ -380,12 +403,67 @@ pub struct SessionsArgs {
     /// Only sessions of this prototype.
     #[arg(long)]
     pub prototype: Option<String>,
+
+    /// Only sessions with this tag. Can be given several times: with all of them.
+    #[arg(long = "tag", value_name = "TAG")]
+    pub tags: Vec<String>,
 }
 
-/// A session file.
+/// Arguments of `prototypes`.
+#[derive(Debug, Args)]
+pub struct PrototypesArgs {
+    /// The folder.
+    #[arg(default_value = "sessions")]
+    pub folder: PathBuf,
+
+    /// Only this prototype, with every session of it.
+    #[arg(long)]
+    pub prototype: Option<String>,
+}
+
+/// Arguments of `tag`.
+#[derive(Debug, Args)]
+pub struct TagArgs {
+    /// The session file; of a folder the session that is being written, else the newest.
+    pub session: PathBuf,
+
+    /// Tags to give, and with a `-` before them tags to take away.
+    #[arg(value_name = "TAG|-TAG")]
+    pub tags: Vec<String>,
+
+    /// A tag to take away: the same as `-TAG`.
+    #[arg(long, value_name = "TAG")]
+    pub remove: Vec<String>,
+
+    /// A remark.
+    #[arg(long, value_name = "TEXT")]
+    pub note: Option<String>,
+
+    /// Who says so; the name under which you are logged in when absent.
+    #[arg(long, value_name = "NAME")]
+    pub by: Option<String>,
+}
+
+/// Arguments of `watch`.
+#[derive(Debug, Args)]
+pub struct WatchArgs {
+    /// The session file; of a folder the session that is being written, else the newest. It need not be there yet.
+    #[arg(default_value = "sessions")]
+    pub session: PathBuf,
+
+    /// Show it once and end.
+    #[arg(long)]
+    pub once: bool,
+
+    /// How often to look.
+    #[arg(long, value_name = "TIME", default_value = "1 s", value_parser = time_s)]
+    pub every: f64,
+}
+
+/// A session file or a bundle.
 #[derive(Debug, Args)]
 pub struct SessionArg {
-    /// The session file.
+    /// The session file, or the folder of a bundle.
     pub session: PathBuf,
 }
 
@@ -609,19 +687,44 @@ pub struct ImportArgs {
     pub no_analysis: bool,
 }
 
-/// What `export` can write.
+/// In which formats `export` can write.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum ExportKind {
+    /// Tables as Parquet, one file each.
+    Parquet,
+    /// Tables as one numpy archive of structured arrays.
+    Npz,
+    /// Tables as CSV, one file each.
+    Csv,
     /// One Prophesee RAW file per camera, bytes as recorded.
     Raw,
-    /// The press table as CSV.
-    Presses,
-    /// The pose stream as CSV.
-    Poses,
     /// One bimvee HDF5 file per camera.
     Hdf5,
-    /// All of them.
+    /// A folder with the session, results, report, RAW files and tables, that `skinrig verify` proves elsewhere.
+    Bundle,
+    /// All of them but a bundle.
     All,
+}
+
+impl ExportKind {
+    /// Whether it holds tables.
+    #[must_use]
+    pub const fn is_tabular(self) -> bool {
+        matches!(self, Self::Parquet | Self::Npz | Self::Csv)
+    }
+}
+
+/// Which tables `export` writes; docs/python.md describes their columns.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum ExportTable {
+    /// One row per press, with what both cameras saw and where the skin says it was touched.
+    Presses,
+    /// One row per metric.
+    Results,
+    /// One row per sample of the robot's path.
+    Pose,
+    /// One row per event, a table for each camera.
+    Events,
 }
 
 /// Arguments of `export`.
@@ -630,13 +733,21 @@ pub struct ExportArgs {
     /// The session file.
     pub session: PathBuf,
 
-    /// What to write. Can be given several times.
+    /// The format. Can be given several times.
     #[arg(long = "to", value_enum, required = true)]
     pub kinds: Vec<ExportKind>,
 
-    /// Folder to write into; the session's own when absent.
+    /// Only these tables, in the formats that hold tables; all of them when absent. Can be given several times.
+    #[arg(long, value_enum)]
+    pub only: Vec<ExportTable>,
+
+    /// Folder to write into, and nowhere else; `NAME.export` (or `NAME.bundle`) beside the session when absent.
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+
+    /// Replace files of an earlier export.
+    #[arg(long)]
+    pub overwrite: bool,
 }
 
 /// Arguments of `inspect`.

@@ -124,7 +124,7 @@ fn is_noted(session: &Path, note: &str) -> bool {
 }
 
 /// The name under which somebody is logged in.
-fn user_name() -> String {
+pub(crate) fn user_name() -> String {
     let name = ["USER", "LOGNAME", "USERNAME"]
         .into_iter()
         .find_map(|key| std::env::var(key).ok().filter(|v| !v.is_empty()));

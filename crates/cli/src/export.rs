@@ -1,16 +1,18 @@
 //! `skinrig export`: a session's data in other programs' formats.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use skinrig_formats::Decoder;
-use skinrig_formats::hdf5::EventWriter;
-use skinrig_formats::raw::{RawMetadata, RawWriter};
-use skinrig_model::{CameraId, DeviceRole, HostTime, PoseSample, RunHeader};
-use skinrig_recorder::SessionReader;
+use skinrig_analysis::{Analysis, LegStart};
+use skinrig_export::{
+    CsvFiles, ExportError, Folder, NpzFile, ParquetFiles, Source, TableName, TableWriter,
+};
+use skinrig_model::{CameraId, RunHeader};
+use skinrig_recorder::{SessionReader, tags_path};
 
-use crate::args::{ExportArgs, ExportKind};
+use crate::args::{ExportArgs, ExportKind, ExportTable};
 use crate::exit::{Exit, Failure, Outcome};
-use crate::paths::beside;
+use crate::paths::{SESSION_SUFFIX, beside};
+use crate::results::{self, Choices, Results};
 
 /// Writes what was asked for and names the files.
 ///
@@ -19,45 +21,20 @@ use crate::paths::beside;
 pub fn export(args: &ExportArgs, json: bool) -> Outcome {
     let reader = SessionReader::open(&args.session).map_err(Failure::input)?;
     let header = reader.header().map_err(Failure::input)?;
-    let wants = |kind| args.kinds.contains(&kind) || args.kinds.contains(&ExportKind::All);
-    if let Some(folder) = &args.out {
-        std::fs::create_dir_all(folder)
-            .map_err(|e| Failure::internal(format!("{}: cannot make it: {e}", folder.display())))?;
+    let is_bundle = args.kinds.contains(&ExportKind::Bundle);
+    if is_bundle && (args.kinds.len() > 1 || !args.only.is_empty()) {
+        return Err(Failure::input(
+            "--to bundle: expected it alone, for a bundle has a place for each thing\n  next: a second `skinrig export`",
+        ));
     }
-    let target = |ending: &str| {
-        let path = beside(&args.session, ending);
-        match (&args.out, path.file_name()) {
-            (Some(folder), Some(name)) => folder.join(name),
-            _ => path,
-        }
+    let folder = folder(args, if is_bundle { ".bundle" } else { ".export" })?;
+    let written = if is_bundle {
+        bundle(&args.session, &reader, &header, &folder)?
+    } else {
+        files(args, &reader, &header, &folder)?
     };
-    let mut written = Vec::new();
-    if wants(ExportKind::Raw) {
-        for camera in CameraId::ALL {
-            let path = target(&format!(".camera{}.raw", camera.number()));
-            raw(&reader, &header, camera, &path)?;
-            written.push(path);
-        }
-    }
-    if wants(ExportKind::Hdf5) {
-        for camera in CameraId::ALL {
-            let path = target(&format!(".camera{}.hdf5", camera.number()));
-            hdf5(&reader, &header, camera, &path)?;
-            written.push(path);
-        }
-    }
-    if wants(ExportKind::Presses) {
-        let path = target(".presses.csv");
-        presses(&reader, &path)?;
-        written.push(path);
-    }
-    if wants(ExportKind::Poses) {
-        let path = target(".poses.csv");
-        poses(&reader, &path)?;
-        written.push(path);
-    }
     if json {
-        crate::print_json(&serde_json::json!({ "written": written }));
+        crate::print_json(&serde_json::json!({ "folder": folder.path(), "written": written }));
     } else {
         for path in &written {
             outln!("{}", path.display());
@@ -66,219 +43,247 @@ pub fn export(args: &ExportArgs, json: bool) -> Outcome {
     Ok(Exit::Ok)
 }
 
-fn failed<E: std::fmt::Display>(path: &Path) -> impl Fn(E) -> Failure + '_ {
-    move |e| {
-        Failure::internal(format!(
-            "{}: {e}\n  next: move an older export away, or choose another folder with --out",
+/// The folder that was named; beside the session one of its own when none was.
+fn folder(args: &ExportArgs, ending: &str) -> Result<Folder, Failure> {
+    let path = args
+        .out
+        .clone()
+        .unwrap_or_else(|| beside(&args.session, ending));
+    // A link in its place, in a folder from a stranger, would lead anywhere.
+    if args.out.is_none() && path.is_symlink() {
+        return Err(Failure::internal(format!(
+            "{}: expected a folder or nothing there, found a link\n  next: choose another folder with --out",
             path.display()
-        ))
+        )));
+    }
+    let stem = beside(&args.session, "");
+    let stem = stem.file_name().unwrap_or_default().to_string_lossy();
+    Folder::new(&path, &stem, args.overwrite).map_err(Failure::internal)
+}
+
+fn refused(e: ExportError) -> Failure {
+    match e {
+        ExportError::Session(e) => Failure::input(e),
+        e => Failure::internal(e),
     }
 }
 
-/// One camera's bytes as a Prophesee RAW file, unmodified.
-fn raw(
+/// The tables that were asked for, the small ones first.
+fn tables(only: &[ExportTable]) -> Vec<TableName> {
+    let wanted = |table: &TableName| {
+        let group = match table {
+            TableName::Presses => ExportTable::Presses,
+            TableName::Pose => ExportTable::Pose,
+            TableName::Results => ExportTable::Results,
+            TableName::Events(_) => ExportTable::Events,
+        };
+        only.is_empty() || only.contains(&group)
+    };
+    TableName::ALL.into_iter().filter(wanted).collect()
+}
+
+/// Each format that was asked for once.
+fn kinds(asked: &[ExportKind]) -> Vec<ExportKind> {
+    let all = [
+        ExportKind::Parquet,
+        ExportKind::Npz,
+        ExportKind::Csv,
+        ExportKind::Raw,
+        ExportKind::Hdf5,
+    ];
+    let wanted = |kind: &ExportKind| asked.contains(kind) || asked.contains(&ExportKind::All);
+    all.into_iter().filter(wanted).collect()
+}
+
+/// Everything but a bundle.
+fn files(
+    args: &ExportArgs,
     reader: &SessionReader,
     header: &RunHeader,
-    camera: CameraId,
-    path: &Path,
-) -> Result<(), Failure> {
-    let devices = reader.devices().map_err(Failure::input)?;
-    let device = devices
+    folder: &Folder,
+) -> Result<Vec<PathBuf>, Failure> {
+    let (kinds, tables) = (kinds(&args.kinds), tables(&args.only));
+    // A name that is taken is found before an hour of work.
+    let endings: Vec<String> = kinds
         .iter()
-        .find(|d| d.role == DeviceRole::of_camera(camera));
-    let serial = device.map_or("unknown", |d| d.identity.serial.as_str());
-    // RAW headers carry a civil date without a zone; the session's start is UTC.
-    let date = header
-        .started_at
-        .chars()
-        .take(19)
-        .collect::<String>()
-        .replace('T', " ");
-    let format = header.stream_formats[camera.index()];
-    let model = device.map_or("", |d| d.identity.model.as_str());
-    let more = if model.contains("re-encoded") {
-        vec![("skinrig_source".to_owned(), model.to_owned())]
+        .flat_map(|kind| endings(*kind, &tables))
+        .collect();
+    folder.check_free(&endings).map_err(refused)?;
+    let tabular = |kind: &ExportKind| kind.is_tabular();
+    let needed = kinds.iter().any(tabular) && tables.iter().any(|t| t.needs_analysis());
+    let results = if needed {
+        let found = results::analyze_session(&args.session, Choices::default());
+        Some(found.map_err(without_analysis)?)
     } else {
-        Vec::new()
+        None
     };
-    let metadata = RawMetadata {
-        more,
-        format,
-        ..RawMetadata::evk1(&date, serial)
+    let source = Source {
+        reader,
+        header,
+        analysis: results.as_ref().map(found),
     };
-    let mut writer = RawWriter::create(path, &metadata).map_err(failed(path))?;
-    let mut fault = None;
-    reader
-        .for_each_chunk(camera, 0, |_, bytes| {
-            if fault.is_none() {
-                fault = writer.write(bytes).err();
-            }
-        })
-        .map_err(Failure::input)?;
-    match fault {
-        Some(e) => Err(failed(path)(e)),
-        None => writer.finish().map_err(failed(path)),
+    let mut written = Vec::new();
+    for kind in &kinds {
+        written.extend(one_kind(*kind, &source, &tables, folder).map_err(refused)?);
+    }
+    Ok(written)
+}
+
+fn found(results: &Results) -> (&Analysis, &[LegStart]) {
+    (&results.analysis, &results.legs)
+}
+
+fn without_analysis(failure: Failure) -> Failure {
+    Failure {
+        message: format!(
+            "{}\n  next: `--only events --only pose` needs no analysis",
+            failure.message
+        ),
+        ..failure
     }
 }
 
-/// One camera's events as a bimvee HDF5 container; times count from the camera's first event.
-fn hdf5(
+/// What the names of the files end in.
+fn endings(kind: ExportKind, tables: &[TableName]) -> Vec<String> {
+    let each = |end: &str| {
+        tables
+            .iter()
+            .map(|t| format!(".{}.{end}", t.name()))
+            .collect()
+    };
+    match kind {
+        ExportKind::Parquet => each("parquet"),
+        ExportKind::Csv => each("csv"),
+        ExportKind::Npz => vec![".npz".to_owned()],
+        ExportKind::Raw => CameraId::ALL.map(|c| camera_ending(c, "raw")).into(),
+        ExportKind::Hdf5 => CameraId::ALL.map(|c| camera_ending(c, "hdf5")).into(),
+        ExportKind::Bundle | ExportKind::All => Vec::new(),
+    }
+}
+
+fn camera_ending(camera: CameraId, end: &str) -> String {
+    format!(".camera{}.{end}", camera.number())
+}
+
+fn one_kind(
+    kind: ExportKind,
+    source: &Source<'_>,
+    tables: &[TableName],
+    folder: &Folder,
+) -> Result<Vec<PathBuf>, ExportError> {
+    let all = |to: &mut dyn TableWriter| -> Result<(), ExportError> {
+        tables.iter().try_for_each(|table| source.write(*table, to))
+    };
+    let folder = folder.clone();
+    match kind {
+        ExportKind::Parquet => {
+            let mut to = ParquetFiles::new(folder);
+            all(&mut to).map(|()| to.written())
+        }
+        ExportKind::Csv => {
+            let mut to = CsvFiles::new(folder);
+            all(&mut to).map(|()| to.written())
+        }
+        ExportKind::Npz => {
+            let mut to = NpzFile::create(folder)?;
+            all(&mut to)?;
+            Ok(vec![to.finish()?])
+        }
+        ExportKind::Raw => cameras(&folder, "raw", |camera, path| {
+            skinrig_export::write_raw(source.reader, source.header, camera, path)
+        }),
+        ExportKind::Hdf5 => cameras(&folder, "hdf5", |camera, path| {
+            skinrig_export::write_hdf5(source.reader, source.header, camera, path)
+        }),
+        // A bundle is made of the others, and `all` stands for them.
+        ExportKind::Bundle | ExportKind::All => Ok(Vec::new()),
+    }
+}
+
+/// A file for each camera.
+fn cameras(
+    folder: &Folder,
+    end: &str,
+    write: impl Fn(CameraId, &Path) -> Result<(), ExportError>,
+) -> Result<Vec<PathBuf>, ExportError> {
+    let each = CameraId::ALL.into_iter();
+    each.map(|camera| folder.whole(&camera_ending(camera, end), |path| write(camera, path)))
+        .collect()
+}
+
+/// The session, what was found in it, its camera streams and its tables, in a folder that `verify` proves.
+fn bundle(
+    session: &Path,
     reader: &SessionReader,
     header: &RunHeader,
-    camera: CameraId,
-    path: &Path,
-) -> Result<(), Failure> {
-    let mut decoder = Decoder::new(header.stream_formats[camera.index()]);
-    let mut writer: Option<EventWriter> = None;
-    let mut fault = None;
-    reader
-        .for_each_chunk(camera, 0, |meta, bytes| {
-            if let Some(origin_us) = meta.restart_us {
-                decoder.restart(origin_us);
-            }
-            decoder.for_each_slice(bytes, |events| {
-                if fault.is_some() || events.is_empty() {
-                    return;
-                }
-                let appended = match &mut writer {
-                    Some(writer) => writer.append(events),
-                    None => EventWriter::create(path, events[0].t_us)
-                        .and_then(|w| writer.insert(w).append(events)),
-                };
-                fault = appended.err();
-            });
-        })
-        .map_err(Failure::input)?;
-    if let Some(e) = fault {
-        return Err(failed(path)(e));
+    folder: &Folder,
+) -> Result<Vec<PathBuf>, Failure> {
+    if reader.seal().map_err(Failure::input)?.is_none() {
+        return Err(Failure::input(format!(
+            "{}: expected a sealed session for a bundle, found one that is under way or was cut off\n  next: `skinrig resume` \
+             goes on with it and seals it",
+            session.display()
+        )));
     }
-    let writer = match writer {
-        Some(writer) => writer,
-        None => EventWriter::create(path, 0).map_err(failed(path))?,
+    let tables = [TableName::Presses, TableName::Results, TableName::Pose];
+    let mut names = vec![
+        SESSION_SUFFIX,
+        ".results.json",
+        ".report.html",
+        ".tags.jsonl",
+    ]
+    .into_iter()
+    .map(str::to_owned)
+    .collect::<Vec<_>>();
+    for kind in [ExportKind::Raw, ExportKind::Parquet, ExportKind::Csv] {
+        names.extend(endings(kind, &tables));
+    }
+    folder.check_free(&names).map_err(refused)?;
+    let results = results::analyze_session(session, Choices::default())?;
+    let copy = |from: &Path, ending: &str| {
+        folder.whole(ending, |to| {
+            let copied = std::fs::copy(from, to);
+            copied.map(drop).map_err(|e| ExportError::File {
+                path: to.to_owned(),
+                found: e.to_string(),
+            })
+        })
     };
-    writer.finish().map(drop).map_err(failed(path))
-}
-
-fn csv_file(path: &Path) -> Result<csv::Writer<std::fs::File>, Failure> {
-    std::fs::File::create_new(path)
-        .map(csv::Writer::from_writer)
-        .map_err(failed(path))
-}
-
-fn seconds(t: Option<HostTime>) -> String {
-    t.map_or_else(String::new, |t| format!("{:.9}", t.as_secs_f64()))
-}
-
-fn number(v: Option<f64>) -> String {
-    v.map_or_else(String::new, |v| format!("{v:.6}"))
-}
-
-/// One row per attempt; empty cells are values that do not exist.
-fn presses(reader: &SessionReader, path: &Path) -> Result<(), Failure> {
-    let mut out = csv_file(path)?;
-    let unwritable = |e: csv::Error| Failure::internal(format!("{}: {e}", path.display()));
-    out.write_record([
-        "press",
-        "role",
-        "repetition",
-        "location",
-        "x_mm",
-        "y_mm",
-        "depth_mm",
-        "attempt",
-        "verdict",
-        "reason",
-        "scheduled",
-        "approach_s",
-        "contact_s",
-        "at_depth_s",
-        "retract_s",
-        "release_s",
-        "clear_s",
-        "measured_x_mm",
-        "measured_y_mm",
-        "measured_depth_mm",
-        "peak_force_n",
-    ])
-    .map_err(unwritable)?;
-    for (planned, attempts) in reader.presses().map_err(Failure::input)? {
-        for attempt in attempts {
-            let o = attempt.outcome.as_ref();
-            let t = o.and_then(|o| o.timing);
-            let at = o.and_then(|o| o.measured_at);
-            let role = serde_json::to_value(planned.role).map_err(Failure::internal)?;
-            out.write_record([
-                planned.id.0.to_string(),
-                role.as_str().unwrap_or_default().to_owned(),
-                (planned.repetition + 1).to_string(),
-                (planned.location + 1).to_string(),
-                format!("{:.6}", planned.at.x_mm),
-                format!("{:.6}", planned.at.y_mm),
-                format!("{:.6}", planned.depth_mm),
-                attempt.id.number.to_string(),
-                o.map_or("open", |o| o.verdict.name()).to_owned(),
-                o.and_then(|o| o.verdict.reason())
-                    .unwrap_or_default()
-                    .to_owned(),
-                o.map_or_else(String::new, |o| o.scheduled.to_string()),
-                seconds(t.map(|t| t.approach)),
-                seconds(t.map(|t| t.contact)),
-                seconds(t.map(|t| t.at_depth)),
-                seconds(t.map(|t| t.retract)),
-                seconds(t.map(|t| t.release)),
-                seconds(t.map(|t| t.clear)),
-                number(at.map(|p| p.x_mm)),
-                number(at.map(|p| p.y_mm)),
-                number(o.and_then(|o| o.measured_depth_mm)),
-                number(o.and_then(|o| o.peak_force_n)),
-            ])
-            .map_err(unwritable)?;
-        }
+    let mut written = vec![copy(session, SESSION_SUFFIX).map_err(refused)?];
+    let tags = tags_path(session);
+    if tags.is_file() {
+        written.push(copy(&tags, ".tags.jsonl").map_err(refused)?);
     }
-    out.flush()
-        .map_err(|e| Failure::internal(format!("{}: {e}", path.display())))
-}
-
-/// One row per pose sample.
-fn poses(reader: &SessionReader, path: &Path) -> Result<(), Failure> {
-    let mut out = csv_file(path)?;
-    let unwritable = |e: csv::Error| Failure::internal(format!("{}: {e}", path.display()));
-    out.write_record([
-        "t_s",
-        "commanded_x_mm",
-        "commanded_y_mm",
-        "commanded_z_mm",
-        "measured_x_mm",
-        "measured_y_mm",
-        "measured_z_mm",
-        "force_n",
-    ])
-    .map_err(unwritable)?;
-    let mut fault = None;
-    reader
-        .for_each_pose_block(HostTime(i64::MIN), HostTime(i64::MAX), |block| {
-            for sample in block {
-                if fault.is_none() {
-                    fault = out.write_record(pose_row(sample)).err();
-                }
-            }
-        })
-        .map_err(Failure::input)?;
-    if let Some(e) = fault {
-        return Err(unwritable(e));
+    let (json, html) = (folder.file(".results.json"), folder.file(".report.html"));
+    let (json, html) = results::write_results(&results, Some(&json), Some(&html))?;
+    written.extend([json, html]);
+    let source = Source {
+        reader,
+        header,
+        analysis: Some(found(&results)),
+    };
+    for (kind, tables) in [
+        (ExportKind::Raw, &tables[..]),
+        (ExportKind::Parquet, &tables),
+        // The path of the robot is long, and a table of numbers only.
+        (ExportKind::Csv, &tables[..2]),
+    ] {
+        written.extend(one_kind(kind, &source, tables, folder).map_err(refused)?);
     }
-    out.flush()
-        .map_err(|e| Failure::internal(format!("{}: {e}", path.display())))
-}
-
-fn pose_row(s: &PoseSample) -> Vec<String> {
-    let mut row = vec![format!("{:.9}", s.t.as_secs_f64())];
-    let coordinates = [s.commanded.to_array(), s.measured.to_array()];
-    row.extend(coordinates.as_flattened().iter().map(|v| format!("{v:.6}")));
-    row.push(if s.force_n.is_nan() {
-        String::new()
-    } else {
-        format!("{:.4}", s.force_n)
-    });
-    row
+    let name = |path: &PathBuf| {
+        let name = path.file_name().unwrap_or_default();
+        name.to_string_lossy().into_owned()
+    };
+    let names: Vec<String> = written.iter().map(name).collect();
+    let session_id = reader.session_id().map_err(Failure::input)?;
+    skinrig_export::seal_bundle(
+        folder.path(),
+        &session_id,
+        &header.prototype,
+        &names[0],
+        &names,
+    )
+    .map_err(refused)?;
+    written.push(folder.path().join(skinrig_export::MANIFEST));
+    Ok(written)
 }

@@ -18,6 +18,7 @@ pub mod inspect;
 pub mod jog;
 pub mod paths;
 pub mod progress;
+pub mod prototypes;
 pub mod provenance;
 pub mod recording;
 pub mod remote;
@@ -35,8 +36,10 @@ pub mod sink;
 pub mod source;
 pub mod status;
 pub mod supervise;
+pub mod tag;
 pub mod tradeoff;
 pub mod verify;
+pub mod watch;
 
 use std::ffi::OsString;
 
@@ -48,7 +51,7 @@ use crate::exit::{Exit, Outcome};
 /// Runs the program with these arguments (the first is its own name) and says how it ended.
 pub fn main_with(arguments: impl IntoIterator<Item = OsString>) -> Exit {
     let arguments: Vec<OsString> = arguments.into_iter().collect();
-    let cli = match Cli::try_parse_from(&arguments) {
+    let cli = match Cli::try_parse_from(tag::spelled_out(arguments.clone())) {
         Ok(cli) => cli,
         Err(error) => {
             // Help and version are not errors; clap prints them to standard output.
@@ -86,6 +89,9 @@ fn dispatch(cli: &Cli, arguments: &[OsString]) -> Outcome {
         Command::Note(a) => control::note(a, json),
         Command::Devices(a) => devices::devices(a, json),
         Command::Jog(a) => jog::jog(a),
+        Command::Watch(a) => watch::watch(a, json),
+        Command::Prototypes(a) => prototypes::prototypes(a, json),
+        Command::Tag(a) => tag::tag(a, json),
         Command::Sessions(a) => sessions::sessions(a, json),
         Command::Show(a) => show::show(a, json),
         Command::Analyze(a) => results::analyze(a, json),

@@ -35,6 +35,8 @@ pub struct Results {
     pub session: PathBuf,
     /// The numbers.
     pub analysis: Analysis,
+    /// Where the session's further legs begin, as the analysis moved them.
+    pub legs: Vec<LegStart>,
     /// Where they come from.
     pub provenance: Provenance,
     /// The tradeoff that lies beside the session, or why it cannot be read.
@@ -124,6 +126,7 @@ pub fn analyze_session(path: &Path, choices: Choices<'_>) -> Result<Results, Fai
     Ok(Results {
         session: path.to_owned(),
         analysis,
+        legs: session.input.legs,
         provenance,
         tradeoff: crate::tradeoff::beside_session(path),
     })

@@ -19,6 +19,7 @@ pub fn sessions(args: &SessionsArgs, json: bool) -> Outcome {
     if let Some(wanted) = &args.prototype {
         found.retain(|s| s.prototype() == Some(wanted));
     }
+    found.retain(|s| args.tags.iter().all(|tag| s.has_tag(tag)));
     if json {
         crate::print_json(&serde_json::to_value(&found).map_err(Failure::internal)?);
         return Ok(Exit::Ok);
@@ -83,8 +84,8 @@ pub fn find_running(place: &Path) -> Result<PathBuf, Failure> {
     });
     Err(Failure::input(match state {
         Ok((true, ..)) => format!(
-            "{shown}: expected a run under way, found a sealed session, which never changes\n  next: write remarks about it \
-             beside it; `skinrig resume {shown}` goes on with one that was stopped"
+            "{shown}: expected a run under way, found a sealed session, which never changes\n  next: `skinrig tag {shown} --note \
+             TEXT` writes a remark beside it; `skinrig resume {shown}` goes on with one that was stopped"
         ),
         Ok(_) | Err(RecorderError::NotThere { .. }) => format!(
             "{shown}: expected a run under way, found a session that nobody runs\n  next: `skinrig resume {shown}` goes on \
@@ -161,6 +162,8 @@ fn line(session: &SessionSummary) -> String {
             end,
             sealed,
             presses,
+            sayings,
+            tags_problem,
             ..
         } => {
             let protocol = protocol_name.rsplit('/').next().unwrap_or_default();
@@ -171,8 +174,18 @@ fn line(session: &SessionSummary) -> String {
                 (None, _) if writer_of(&session.path).is_some() => "  (under way)".to_owned(),
                 (None, _) => "  (cut off)".to_owned(),
             };
+            let mut said = match sayings.tags.is_empty() {
+                true => String::new(),
+                false => format!("  [{}]", crate::tag::words(sayings)),
+            };
+            if !sayings.notes.is_empty() {
+                said += &format!("  {} note(s)", sayings.notes.len());
+            }
+            if let Some(problem) = tags_problem {
+                said += &format!("  tags unreadable: {problem}");
+            }
             format!(
-                "{:<19}  {:<14}  {:<22}  {:<24}  {:>13}  {:>8.1}  {file}{state}",
+                "{:<19}  {:<14}  {:<22}  {:<24}  {:>13}  {:>8.1}  {file}{state}{said}",
                 started_at.chars().take(19).collect::<String>(),
                 clip(prototype, 14),
                 clip(protocol, 22),
@@ -184,7 +197,8 @@ fn line(session: &SessionSummary) -> String {
     }
 }
 
-fn clip(text: &str, width: usize) -> String {
+/// At most `width` characters of `text`.
+pub(crate) fn clip(text: &str, width: usize) -> String {
     if text.chars().count() <= width {
         text.to_owned()
     } else {

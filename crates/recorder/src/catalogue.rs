@@ -7,6 +7,7 @@ use serde::Serialize;
 use crate::error::RecorderError;
 use crate::reader::SessionReader;
 use crate::rows::{PressTally, SessionTotals};
+use crate::tags::{Sayings, sayings};
 
 /// How session files end.
 pub const SESSION_SUFFIX: &str = ".session.sqlite";
@@ -51,6 +52,11 @@ pub enum SessionState {
         presses: PressTally,
         /// How its sync presses ended so far.
         sync: PressTally,
+        /// What was said of it later: tags and remarks.
+        #[serde(flatten)]
+        sayings: Sayings,
+        /// Why the log of tags beside it cannot be read, if so; then there are no tags here.
+        tags_problem: Option<String>,
         /// The counts of its seal; `None` for one that is not sealed, of which the whole file would have to be read.
         totals: Option<Box<SessionTotals>>,
     },
@@ -104,6 +110,12 @@ impl SessionSummary {
             SessionState::Broken { .. } => None,
         }
     }
+
+    /// Whether somebody gave it this tag.
+    #[must_use]
+    pub fn has_tag(&self, tag: &str) -> bool {
+        matches!(&self.state, SessionState::Readable { sayings, .. } if sayings.tags.contains(tag))
+    }
 }
 
 fn key(summary: &SessionSummary) -> (bool, &str, &Path) {
@@ -122,6 +134,10 @@ fn summarise(path: &Path) -> Result<SessionState, RecorderError> {
         Some(totals) => (totals.presses, totals.sync),
         None => reader.tallies()?,
     };
+    let (sayings, tags_problem) = match sayings(path, &brief.session_id) {
+        Ok(sayings) => (sayings, None),
+        Err(e) => (Sayings::default(), Some(e.to_string())),
+    };
     Ok(SessionState::Readable {
         session_id: brief.session_id,
         started_at: brief.started_at,
@@ -134,6 +150,8 @@ fn summarise(path: &Path) -> Result<SessionState, RecorderError> {
         sealed: totals.is_some(),
         presses,
         sync,
+        sayings,
+        tags_problem,
         totals,
     })
 }

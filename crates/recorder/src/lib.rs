@@ -16,6 +16,7 @@ pub mod codec;
 pub mod error;
 pub mod reader;
 pub mod rows;
+pub mod tags;
 pub mod verify;
 pub mod writer;
 
@@ -45,5 +46,6 @@ pub use rows::{
 };
 pub use salvage::{LostBytes, SalvageReport, SalvagedTable, salvage};
 pub use schema::SCHEMA_VERSION;
+pub use tags::{LaterNote, Saying, Sayings, TAGS_SUFFIX, is_tag, say, sayings, tags_path};
 pub use verify::{ChunkScanner, VerifyReport, verify};
 pub use writer::{Sealed, SessionWriter};

@@ -1,6 +1,8 @@
 //! Owns the JSON document of a report.
 
+use serde::{Deserialize, Serialize};
 use serde_json::{Value, json as object};
+use skinrig_analysis::result::{Estimate, PressCounts};
 
 use crate::{ReportInput, comparison};
 
@@ -11,6 +13,43 @@ pub const JSON_VERSION: u32 = 1;
 
 /// Fields of the analysis that are bulk data for figures.
 const BULK: [&str; 5] = ["rates", "pictures", "zooms", "activity", "motion"];
+
+/// What a list of many sessions shows of each. Stands at the end of the document, so that nobody has to read all of it for this.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Summary {
+    /// Names the session.
+    pub session_id: String,
+    /// Version of the analysis.
+    pub analysis_version: u32,
+    /// Hash of its result.
+    pub results_hash: String,
+    /// False when the numbers are not to be used: the clocks are not known well enough.
+    pub valid: bool,
+    /// How the presses ended.
+    pub counts: PressCounts,
+    /// RMSE of the scored presses.
+    pub rmse_mm: Estimate,
+    /// Std between repetitions.
+    pub repeat_std_mm: Estimate,
+    /// Share of scored presses that were located.
+    pub located_rate: Estimate,
+}
+
+impl Summary {
+    fn of(input: &ReportInput<'_>) -> Self {
+        let (analysis, scored) = (input.analysis, &input.analysis.scored);
+        Self {
+            session_id: input.provenance.session_id.clone(),
+            analysis_version: analysis.version,
+            results_hash: input.provenance.results_hash.clone(),
+            valid: analysis.alignment.is_usable(),
+            counts: analysis.counts,
+            rmse_mm: scored.rmse_mm,
+            repeat_std_mm: scored.repeat_std_mm,
+            located_rate: scored.located_rate,
+        }
+    }
+}
 
 /// See [`crate::json`].
 pub(crate) fn json(input: &ReportInput<'_>) -> Value {
@@ -27,9 +66,10 @@ pub(crate) fn json(input: &ReportInput<'_>) -> Value {
     object!({
         "format": JSON_FORMAT,
         "format_version": JSON_VERSION,
-        "valid": input.analysis.alignment.is_usable(),
-        "provenance": input.provenance,
         "analysis": analysis,
         "comparison": comparison::rows(input.analysis),
+        "provenance": input.provenance,
+        "summary": Summary::of(input),
+        "valid": input.analysis.alignment.is_usable(),
     })
 }

@@ -2,9 +2,29 @@
 
 use crate::support::{ROOT, skinrig};
 
-const COMMANDS: [&str; 19] = [
-    "check", "plan", "status", "control", "note", "run", "resume", "sessions", "show", "analyze",
-    "report", "verify", "salvage", "import", "export", "inspect", "schema", "tradeoff", "compare",
+const COMMANDS: [&str; 22] = [
+    "check",
+    "plan",
+    "status",
+    "control",
+    "note",
+    "run",
+    "resume",
+    "sessions",
+    "show",
+    "analyze",
+    "report",
+    "verify",
+    "salvage",
+    "import",
+    "export",
+    "inspect",
+    "schema",
+    "tradeoff",
+    "compare",
+    "watch",
+    "prototypes",
+    "tag",
 ];
 
 #[test]
@@ -43,6 +63,12 @@ fn bad_input_ends_with_code_2_and_says_what_to_do() {
         ),
         (
             vec!["export", "README.md", "--to", "raw"],
+            vec!["expected a skinrig session"],
+        ),
+        (vec!["verify", "docs"], vec!["expected a bundle"]),
+        (vec!["watch", "no/such", "--once"], vec!["found none yet"]),
+        (
+            vec!["watch", "README.md"],
             vec!["expected a skinrig session"],
         ),
         (

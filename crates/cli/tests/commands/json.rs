@@ -58,7 +58,11 @@ fn json_keys_are_stable() {
     insta::assert_snapshot!("run", shape(&run));
     insta::assert_snapshot!("check", shape(&json(&["check", SMALL])));
     insta::assert_snapshot!("plan", shape(&json(&["plan", SMALL])));
+    let tag = json(&["tag", &session, "good", "--note", "warm", "--by", "Ann"]);
+    insta::assert_snapshot!("tag", shape(&tag));
     insta::assert_snapshot!("sessions", shape(&json(&["sessions", &s])));
+    insta::assert_snapshot!("prototypes", shape(&json(&["prototypes", &s])));
+    insta::assert_snapshot!("watch", shape(&json(&["watch", &session, "--once"])));
     insta::assert_snapshot!(
         "show",
         shape(&json(&["show", &session, "--presses", "--protocol"]))
@@ -67,6 +71,9 @@ fn json_keys_are_stable() {
     insta::assert_snapshot!("verify", shape(&json(&["verify", &session])));
     let export = json(&["export", &session, "--to", "all", "--out", &lab.text("e")]);
     insta::assert_snapshot!("export", shape(&export));
+    let bundle = lab.text("b");
+    json(&["export", &session, "--to", "bundle", "--out", &bundle]);
+    insta::assert_snapshot!("verify_bundle", shape(&json(&["verify", &bundle])));
     insta::assert_snapshot!("inspect_session", shape(&json(&["inspect", &session])));
     let raw = text(&only(&lab.path("e"), ".camera1.raw"));
     insta::assert_snapshot!("inspect_raw", shape(&json(&["inspect", &raw])));
@@ -123,6 +130,9 @@ fn without_a_terminal_output_is_plain_lines() {
         vec!["verify", &session],
         vec!["inspect", &session],
         vec!["export", &session, "--to", "all", "--out", &lab.text("e")],
+        vec!["tag", &session, "good", "--note", "warm"],
+        vec!["prototypes", &s, "--prototype", "test skin"],
+        vec!["watch", &session],
         vec!["schema"],
         vec!["no-such-command"],
     ] {

@@ -2,6 +2,8 @@
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on must fail")]
 #![expect(clippy::print_stderr, reason = "a test that is skipped says why")]
 
+mod bundle;
+mod catalogue;
 mod compare;
 mod damage;
 mod dataset;
@@ -15,6 +17,7 @@ mod json;
 mod operator;
 mod options;
 mod pipeline;
+mod python;
 mod replay;
 mod resume;
 mod rigs;
@@ -23,3 +26,4 @@ mod strangers;
 mod streams;
 mod support;
 mod tradeoff;
+mod watch;

@@ -195,7 +195,7 @@ fn exports_hold_exactly_what_was_recorded_and_inspect_reads_them() {
     let out = lab.text("e");
     let said = skinrig(&["export", &text(&session), "--to", "all", "--out", &out]).code(0);
     let written: Vec<&str> = said.out.lines().collect();
-    assert_eq!(written.len(), 6, "{written:#?}");
+    assert_eq!(written.len(), 15, "{written:#?}");
     let reader = SessionReader::open(&session).unwrap();
 
     for camera in CameraId::ALL {
@@ -262,29 +262,35 @@ fn exports_hold_exactly_what_was_recorded_and_inspect_reads_them() {
     }
 
     let presses = only(&lab.path("e"), ".presses.csv");
-    let rows: Vec<csv::StringRecord> = csv::Reader::from_path(&presses)
-        .unwrap()
-        .records()
-        .map(Result::unwrap)
-        .collect();
+    let mut table = csv::Reader::from_path(&presses).unwrap();
+    let names: Vec<String> = table.headers().unwrap().iter().map(str::to_owned).collect();
+    let rows: Vec<csv::StringRecord> = table.records().map(Result::unwrap).collect();
+    let cell = |row: usize, name: &str| {
+        let column = names.iter().position(|n| n == name).unwrap();
+        rows[row][column].to_owned()
+    };
     assert_eq!(rows.len(), 10);
-    for ((planned, attempts), row) in reader.presses().unwrap().iter().zip(&rows) {
-        assert_eq!(row[0], planned.id.0.to_string());
-        assert_eq!(row[4].parse::<f64>().unwrap(), planned.at.x_mm);
-        assert_eq!(&row[8], "valid");
+    for (i, (planned, attempts)) in reader.presses().unwrap().iter().enumerate() {
+        assert_eq!(cell(i, "press"), planned.id.0.to_string());
+        let x_mm: f64 = cell(i, "x_mm").parse().unwrap();
+        assert_eq!(x_mm, planned.at.x_mm);
+        assert_eq!(cell(i, "verdict"), "valid");
         let timing = attempts[0].outcome.as_ref().unwrap().timing.unwrap();
-        let contact: f64 = row[12].parse().unwrap();
-        assert!((contact - timing.contact.as_secs_f64()).abs() < 1e-9);
+        let contact_s: f64 = cell(i, "contact_s").parse().unwrap();
+        assert_eq!(contact_s, timing.contact.as_secs_f64());
     }
-    let poses = only(&lab.path("e"), ".poses.csv");
-    let rows = csv::Reader::from_path(&poses).unwrap().records().count();
+    let pose = only(&lab.path("e"), ".pose.csv");
+    let rows = csv::Reader::from_path(&pose).unwrap().records().count();
     assert_eq!(rows as u64, reader.totals().unwrap().pose_samples);
 
     // An export is never overwritten.
     skinrig(&["export", &text(&session), "--to", "raw", "--out", &out])
         .code(1)
         .complains(&[".camera1.raw", "--out"]);
-    skinrig(&["export", &text(&session), "--to", "presses", "--out", &out])
-        .code(1)
-        .complains(&[".presses.csv", "--out"]);
+    let csv = ["export", &text(&session), "--to", "csv", "--out", &out];
+    skinrig(&csv).code(1).complains(&[".presses.csv", "--out"]);
+    // But when asked, and then it is the same.
+    let before = std::fs::read(&presses).unwrap();
+    skinrig(&[&csv[..], &["--only", "presses", "--overwrite"]].concat()).code(0);
+    assert!(before == std::fs::read(&presses).unwrap());
 }

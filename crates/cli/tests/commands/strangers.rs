@@ -68,8 +68,8 @@ fn names_from_a_file_stay_in_the_folders_that_were_asked_for() {
         })
         .collect();
     assert!(strays.is_empty(), "{strays:?}");
-    // Protocol, session, salvaged session, six exports, and no run that was refused.
-    assert!(found.len() >= 9 * names().len(), "{found:?}");
+    // Protocol, session, salvaged session, report, results, fifteen exports, and no run that was refused.
+    assert!(found.len() >= 20 * names().len(), "{found:?}");
 }
 
 #[cfg(unix)]
@@ -85,20 +85,32 @@ fn links_in_a_strangers_folder_are_not_written_through() {
         ".report.html.partial",
         ".results.json.partial",
         ".report.html",
-        ".presses.csv",
-        ".camera1.raw",
-        ".camera2.hdf5",
+        ".tags.jsonl",
         ".salvaged.session.sqlite",
     ] {
         std::os::unix::fs::symlink(&victim, format!("{stem}{ending}")).unwrap();
     }
+    let folder = lab.path("e");
+    std::fs::create_dir(&folder).unwrap();
+    let name = Path::new(stem).file_name().unwrap();
+    let inside = text(&folder.join(name));
+    for ending in [".pose.csv", ".camera1.raw", ".camera2.hdf5", ".npz.partial"] {
+        std::os::unix::fs::symlink(&victim, format!("{inside}{ending}")).unwrap();
+    }
+    std::os::unix::fs::symlink(&folder, format!("{stem}.export")).unwrap();
     let session = text(&session);
     skinrig(&["report", &session]).code(0);
-    for kind in ["raw", "hdf5", "presses"] {
-        skinrig(&["export", &session, "--to", kind])
-            .code(1)
-            .complains(&["next:"]);
+    for kind in ["raw", "hdf5", "csv"] {
+        for more in [&[][..], &["--out", &text(&folder)]] {
+            let export = ["export", &session, "--to", kind, "--only", "pose"];
+            skinrig(&[&export[..], more].concat())
+                .code(1)
+                .complains(&["next:"]);
+        }
     }
+    let npz = ["export", &session, "--to", "npz", "--only", "pose"];
+    skinrig(&[&npz[..], &["--out", &text(&folder)]].concat()).code(0);
+    skinrig(&["tag", &session, "good"]).code(2);
     skinrig(&["salvage", &session]).code(2);
     assert_eq!(std::fs::read_to_string(&victim).unwrap(), "precious");
 }

@@ -5,6 +5,7 @@ use skinrig_model::{HostTime, PoseSample};
 use super::SessionReader;
 use crate::error::RecorderError;
 use crate::from_row::pose_block_from;
+use crate::query::num;
 
 /// Found by the index over the blocks' ends: a session has a block every few seconds of a night, between the chunks.
 const BLOCK_ENDING_AFTER: &str = "SELECT id, first_ns, last_ns, samples, sha256, data FROM pose_block
@@ -52,6 +53,18 @@ impl SessionReader {
                 .fetch_optional(conn)
                 .await?;
             row.map(|row| pose_block_from(&row)).transpose()
+        })
+    }
+
+    /// How many samples there are.
+    ///
+    /// # Errors
+    /// When the file is damaged.
+    pub fn pose_samples(&self) -> Result<u64, RecorderError> {
+        self.ask("counting poses", async |conn| {
+            let sql = "SELECT coalesce(sum(samples), 0) AS n FROM pose_block";
+            let row = sqlx::query(sql).fetch_one(conn).await?;
+            num(&row, "n")
         })
     }
 

@@ -16,6 +16,11 @@ const INDEX: &str = "SELECT camera, seq, host_ns, lost_before, codec, raw_bytes,
        on_events, trigger_edges, length(stored) AS stored_bytes
      FROM chunk WHERE camera = ? ORDER BY seq";
 
+/// The same of the last chunks.
+const TAIL: &str = "SELECT camera, seq, host_ns, lost_before, codec, raw_bytes, raw_crc32, first_us, last_us, cd_events,
+       on_events, trigger_edges, length(stored) AS stored_bytes
+     FROM chunk WHERE camera = ? ORDER BY seq DESC LIMIT ?";
+
 /// The same of one chunk, and what is stored of it.
 const NEXT: &str = "SELECT camera, seq, host_ns, lost_before, codec, raw_bytes, raw_crc32, first_us, last_us, cd_events,
        on_events, trigger_edges, length(stored) AS stored_bytes, stored
@@ -41,6 +46,31 @@ impl SessionReader {
             })
             .await?;
             Ok(index)
+        })
+    }
+
+    /// The last `most` chunks of `camera` without their bytes, in stream order: reads no others, however many there are.
+    ///
+    /// # Errors
+    /// When the file is damaged.
+    pub fn last_chunks(
+        &self,
+        camera: CameraId,
+        most: u32,
+    ) -> Result<Vec<ChunkMeta>, RecorderError> {
+        let restarts = self.restarts(camera)?;
+        self.ask("reading the chunk index", async |conn| {
+            let query = sqlx::query(TAIL).bind(camera.number()).bind(most);
+            let mut last = Vec::new();
+            each_row(query, conn, |row| {
+                let mut meta = chunk_from(row)?;
+                meta.restart_us = restarts.get(&meta.seq).copied();
+                last.push(meta);
+                Ok(())
+            })
+            .await?;
+            last.reverse();
+            Ok(last)
         })
     }
 

@@ -1,0 +1,266 @@
+//! `skinrig prototypes`: which skin got how good, over all sessions of a folder.
+
+use std::collections::BTreeMap;
+use std::io::{Read, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+use skinrig_analysis::result::Estimate;
+use skinrig_recorder::{SessionState, SessionSummary, list};
+use skinrig_report::Summary;
+
+use crate::args::PrototypesArgs;
+use crate::exit::{Exit, Failure, Outcome};
+use crate::paths::beside;
+use crate::sessions::clip;
+
+/// The summary stands so near to the end of a file of results.
+const TAIL_BYTES: u64 = 8192;
+/// Sessions in a sparkline, the last ones.
+const SPARKS: usize = 16;
+
+/// A session of a prototype.
+#[derive(Debug, Serialize)]
+struct Point {
+    session: PathBuf,
+    started_at: String,
+    tags: Vec<String>,
+    /// `None` without usable results.
+    rmse_mm: Option<Estimate>,
+    /// Why there are none.
+    without: Option<String>,
+}
+
+/// Sessions that can be laid beside one another: one prototype, one protocol, one kind of rig.
+#[derive(Debug, Serialize)]
+struct Series {
+    protocol: String,
+    rig_kind: String,
+    /// The least RMSE.
+    best: Option<Estimate>,
+    /// The newest RMSE.
+    last: Option<Estimate>,
+    /// Oldest first.
+    points: Vec<Point>,
+}
+
+/// A prototype.
+#[derive(Debug, Serialize)]
+struct Prototype {
+    prototype: String,
+    sessions: usize,
+    last_started_at: String,
+    series: Vec<Series>,
+}
+
+/// Lists the prototypes of a folder.
+///
+/// # Errors
+/// [`Failure::input`] when the folder cannot be read, or has no session of the prototype that was named.
+pub fn prototypes(args: &PrototypesArgs, json: bool) -> Outcome {
+    let mut sessions = list(&args.folder).map_err(Failure::input)?;
+    if let Some(wanted) = &args.prototype {
+        crate::sessions::of_prototype(&args.folder, wanted)?;
+        sessions.retain(|s| s.prototype() == Some(wanted));
+    }
+    let all = gather(&sessions);
+    if json {
+        crate::print_json(&serde_json::to_value(&all).map_err(Failure::internal)?);
+    } else if all.is_empty() {
+        outln!("no sessions in {}", args.folder.display());
+    } else {
+        print(&all, args.prototype.is_some());
+    }
+    Ok(Exit::Ok)
+}
+
+/// By prototype, then by protocol and kind of rig; the sessions of each in their order.
+fn gather(sessions: &[SessionSummary]) -> Vec<Prototype> {
+    type Groups = BTreeMap<(String, String), Vec<Point>>;
+    let mut all: BTreeMap<String, (usize, String, Groups)> = BTreeMap::new();
+    for session in sessions {
+        let SessionState::Readable {
+            session_id,
+            started_at,
+            prototype,
+            protocol_name,
+            rig_kind,
+            sayings,
+            ..
+        } = &session.state
+        else {
+            continue;
+        };
+        let (count, last, groups) = all.entry(prototype.clone()).or_default();
+        *count += 1;
+        last.clone_from(started_at);
+        let (rmse_mm, without) = match summary(&session.path, session_id) {
+            Ok(found) if !found.valid => (None, Some("INVALID: clocks not known".to_owned())),
+            Ok(found) if found.rmse_mm.value.is_none() => {
+                (None, Some("no scored press located".to_owned()))
+            }
+            Ok(found) => (Some(found.rmse_mm), None),
+            Err(why) => (None, Some(why)),
+        };
+        let key = (protocol_name.clone(), rig_kind.clone());
+        groups.entry(key).or_default().push(Point {
+            session: session.path.clone(),
+            started_at: started_at.clone(),
+            tags: sayings.tags.iter().cloned().collect(),
+            rmse_mm,
+            without,
+        });
+    }
+    let series = |((protocol, rig_kind), points): ((String, String), Vec<Point>)| {
+        let usable = || points.iter().filter_map(|p| p.rmse_mm);
+        let value = |e: &Estimate| e.value.unwrap_or(f64::INFINITY);
+        Series {
+            protocol,
+            rig_kind,
+            best: usable().min_by(|a, b| value(a).total_cmp(&value(b))),
+            last: usable().last(),
+            points,
+        }
+    };
+    all.into_iter()
+        .map(
+            |(prototype, (sessions, last_started_at, groups))| Prototype {
+                prototype,
+                sessions,
+                last_started_at,
+                series: groups.into_iter().map(series).collect(),
+            },
+        )
+        .collect()
+}
+
+/// What the results beside a session say in short, from their last bytes.
+fn summary(session: &Path, session_id: &str) -> Result<Summary, String> {
+    let path = beside(session, ".results.json");
+    let mut file = std::fs::File::open(&path).map_err(|e| match e.kind() {
+        std::io::ErrorKind::NotFound => "not analysed".to_owned(),
+        _ => e.to_string(),
+    })?;
+    let older = || "results of an older skinrig: analyze it again".to_owned();
+    let length = file.metadata().map_err(|e| e.to_string())?.len();
+    let from = SeekFrom::Start(length.saturating_sub(TAIL_BYTES));
+    let mut tail = Vec::new();
+    file.seek(from)
+        .and_then(|_| file.take(TAIL_BYTES).read_to_end(&mut tail))
+        .map_err(|e| e.to_string())?;
+    // A key of the outermost object; within a text of JSON no line ends.
+    let key = b"\n  \"summary\": ";
+    let at = tail.windows(key.len()).position(|w| w == key);
+    let text = &tail[at.ok_or_else(older)? + key.len()..];
+    let mut reader = serde_json::Deserializer::from_slice(text);
+    let found = Summary::deserialize(&mut reader).map_err(|_| older())?;
+    if found.session_id == session_id {
+        Ok(found)
+    } else {
+        Err("results of another session lie beside it".to_owned())
+    }
+}
+
+fn print(all: &[Prototype], each: bool) {
+    outln!(
+        "{:<18}  {:<22}  {:<9}  {:>8}  {:<16}  {:<20}  {:<20}  trend",
+        "prototype",
+        "protocol",
+        "rig",
+        "sessions",
+        "last (UTC)",
+        "best RMSE, mm",
+        "last RMSE, mm"
+    );
+    for prototype in all {
+        for (i, series) in prototype.series.iter().enumerate() {
+            let name = if i == 0 { &prototype.prototype } else { "" };
+            let last = series.points.last().map_or("", |p| p.started_at.as_str());
+            let protocol = series.protocol.rsplit('/').next().unwrap_or_default();
+            let rmse: Vec<f64> = series
+                .points
+                .iter()
+                .filter_map(|p| p.rmse_mm?.value)
+                .collect();
+            outln!(
+                "{:<18}  {:<22}  {:<9}  {:>8}  {:<16}  {:<20}  {:<20}  {}",
+                clip(name, 18),
+                clip(protocol, 22),
+                clip(&series.rig_kind, 9),
+                series.points.len(),
+                minute(last),
+                interval(series.best),
+                interval(series.last),
+                sparkline(&rmse[rmse.len().saturating_sub(SPARKS)..])
+            );
+            if each {
+                series.points.iter().for_each(print_point);
+            }
+        }
+    }
+}
+
+fn print_point(point: &Point) {
+    let name = point.session.file_name().unwrap_or_default();
+    let found = match &point.without {
+        Some(why) => why.clone(),
+        None => interval(point.rmse_mm),
+    };
+    let tags = match point.tags[..] {
+        [] => String::new(),
+        _ => format!("  [{}]", point.tags.join(" ")),
+    };
+    outln!(
+        "  {:<16}  {found:<20}  {}{tags}",
+        minute(&point.started_at),
+        name.to_string_lossy()
+    );
+}
+
+/// `2026-11-21 18:00`.
+fn minute(rfc3339: &str) -> String {
+    rfc3339
+        .chars()
+        .take(16)
+        .collect::<String>()
+        .replace('T', " ")
+}
+
+/// `2.31 (2.05 to 2.60)`.
+fn interval(estimate: Option<Estimate>) -> String {
+    match estimate.map(|e| (e.value, e.low, e.high)) {
+        Some((Some(value), Some(low), Some(high))) => {
+            format!("{value:.2} ({low:.2} to {high:.2})")
+        }
+        Some((Some(value), ..)) => format!("{value:.2}"),
+        _ => "-".to_owned(),
+    }
+}
+
+/// A bar for each value between the least and the greatest of them.
+fn sparkline(values: &[f64]) -> String {
+    const BARS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
+    let least = values.iter().copied().fold(f64::INFINITY, f64::min);
+    let most = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let bar = |value: &f64| {
+        let share = if most > least {
+            (value - least) / (most - least)
+        } else {
+            0.5
+        };
+        BARS[((share * 8.0) as usize).min(7)]
+    };
+    values.iter().map(bar).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sparkline_spans_its_values() {
+        assert_eq!(sparkline(&[1.0, 2.0, 3.0]), "▁▅█");
+        assert_eq!(sparkline(&[2.0, 2.0]), "▅▅");
+        assert_eq!(sparkline(&[]), "");
+    }
+}

@@ -1,0 +1,146 @@
+//! `skinrig tag`: what people say of a session when it is over, in a log beside it.
+
+use std::ffi::OsString;
+
+use chrono::{SecondsFormat, Utc};
+use skinrig_recorder::{Saying, Sayings, SessionReader, is_tag, say, sayings};
+
+use crate::args::TagArgs;
+use crate::exit::{Exit, Failure, Outcome};
+use crate::sessions;
+
+/// Writes it down, and tells what was said so far.
+///
+/// # Errors
+/// [`Failure::input`] for what is no tag, no session, or no log of it.
+pub fn tag(args: &TagArgs, json: bool) -> Outcome {
+    let session = sessions::find(&args.session)?;
+    let session_id = SessionReader::open(&session)
+        .and_then(|reader| reader.session_id())
+        .map_err(Failure::input)?;
+    let (add, remove) = checked(&args.tags, &args.remove)?;
+    let asked = !add.is_empty() || !remove.is_empty() || args.note.is_some();
+    let all = if asked {
+        let saying = Saying {
+            session_id,
+            at: Utc::now().to_rfc3339_opts(SecondsFormat::Secs, true),
+            by: args.by.clone().unwrap_or_else(crate::control::user_name),
+            add,
+            remove,
+            note: args.note.clone(),
+        };
+        say(&session, &saying)
+    } else {
+        sayings(&session, &session_id)
+    };
+    let all = all.map_err(Failure::input)?;
+    if json {
+        crate::print_json(&serde_json::json!({
+            "session": session, "tags": all.tags, "notes": all.notes,
+        }));
+    } else {
+        outln!("{}", session.display());
+        outln!("tags  {}", words(&all));
+        for note in &all.notes {
+            outln!("      {} {}: {}", note.at, note.by, note.text);
+        }
+    }
+    Ok(Exit::Ok)
+}
+
+/// The tags, in order; `-` without any.
+#[must_use]
+pub fn words(all: &Sayings) -> String {
+    let tags: Vec<&str> = all.tags.iter().map(String::as_str).collect();
+    match tags[..] {
+        [] => "-".to_owned(),
+        _ => tags.join(" "),
+    }
+}
+
+/// The command line with every `-TAG` of `skinrig tag` as `--remove=TAG`: a parser of options takes it for letters.
+#[must_use]
+pub fn spelled_out(arguments: Vec<OsString>) -> Vec<OsString> {
+    let command = |a: &OsString| !a.to_string_lossy().starts_with('-');
+    let at = arguments.iter().skip(1).position(command);
+    let Some(at) = at.filter(|at| arguments[at + 1] == "tag") else {
+        return arguments;
+    };
+    let mut is_value = false;
+    let spell = |(i, word): (usize, OsString)| {
+        let text = word.to_string_lossy().into_owned();
+        let own = text
+            .strip_prefix('-')
+            .filter(|tag| i > at + 1 && !is_value && is_tag(tag) && !matches!(*tag, "h" | "V"));
+        is_value = matches!(text.as_str(), "--note" | "--by" | "--remove");
+        own.map_or(word, |tag| format!("--remove={tag}").into())
+    };
+    arguments.into_iter().enumerate().map(spell).collect()
+}
+
+/// Tags to give and to take away, each once.
+fn checked(add: &[String], remove: &[String]) -> Result<(Vec<String>, Vec<String>), Failure> {
+    if let Some(wrong) = add.iter().chain(remove).find(|tag| !is_tag(tag)) {
+        return Err(Failure::input(format!(
+            "expected a tag of 1 to 40 of a-z, 0-9, `.`, `_`, `-`, found `{}`\n  next: \
+             a remark of any words goes after --note",
+            wrong.escape_debug()
+        )));
+    }
+    if let Some(both) = add.iter().find(|tag| remove.contains(tag)) {
+        return Err(Failure::input(format!(
+            "expected `{both}` or `-{both}`, found both"
+        )));
+    }
+    let once = |tags: &[String]| {
+        let mut tags = tags.to_vec();
+        tags.sort();
+        tags.dedup();
+        tags
+    };
+    Ok((once(add), once(remove)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_minus_takes_a_tag_away() {
+        let spelled = |line: &str| -> String {
+            let words = spelled_out(line.split(' ').map(OsString::from).collect());
+            let words: Vec<_> = words.iter().map(|w| w.to_string_lossy()).collect();
+            words.join(" ")
+        };
+        assert_eq!(
+            spelled("skinrig --json tag s good -bad --note -x -v2 --by Ann"),
+            "skinrig --json tag s good --remove=bad --note -x --remove=v2 --by Ann"
+        );
+        for line in [
+            "skinrig tag -h",
+            "skinrig run tag -b",
+            "skinrig",
+            "skinrig tag s -A",
+        ] {
+            assert_eq!(spelled(line), line);
+        }
+    }
+
+    #[test]
+    fn what_is_no_tag_is_refused() {
+        let own = |all: &[&str]| -> Vec<String> { all.iter().map(|t| (*t).to_owned()).collect() };
+        let (add, remove) = checked(&own(&["good-skin", "v2", "v2"]), &own(&["bad"])).unwrap();
+        assert_eq!((add, remove), (own(&["good-skin", "v2"]), own(&["bad"])));
+        for (add, remove) in [
+            (&["a"][..], &["a"][..]),
+            (&[""], &[]),
+            (&["A b"], &[]),
+            (&[], &["-"]),
+        ] {
+            assert!(
+                checked(&own(add), &own(remove)).is_err(),
+                "{add:?} {remove:?}"
+            );
+        }
+    }
+}

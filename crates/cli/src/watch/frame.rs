@@ -1,0 +1,299 @@
+//! What there is to see of a run at one instant.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use serde::Serialize;
+use skinrig_controller::State;
+use skinrig_model::{AttemptId, PlannedPress, PressOutcome, PressRole, PressVerdict, RunEnd};
+use skinrig_recorder::{AttemptRow, PressTally, RecorderError, SessionReader};
+
+use super::signal::{Signal, signals};
+use crate::paths;
+use crate::remote::{Live, Reply, Request, Silence, ask};
+use crate::rig::gates;
+
+/// So many of the latest presses are shown.
+const LATEST: usize = 6;
+/// So many of the latest faults and other interruptions.
+const FAULTS: usize = 4;
+
+/// So long a session is left alone that may be being sealed: three times as long as its writer waits for readers, and some.
+const LEFT_ALONE: Duration = Duration::from_secs(10);
+
+/// A run at one instant.
+#[derive(Debug, Serialize)]
+pub struct Frame {
+    /// The file.
+    pub session: PathBuf,
+    /// In a word or some.
+    pub state: String,
+    /// Who writes the session, if anybody does.
+    pub writer: Option<String>,
+    /// Whether it is sealed.
+    pub sealed: bool,
+    /// What the run tells of itself; `None` when nobody answers.
+    pub live: Option<Box<Live>>,
+    /// Which prototype.
+    pub prototype: String,
+    /// Which protocol.
+    pub protocol: String,
+    /// Name of the rig.
+    pub rig: String,
+    /// Civil time of the start.
+    pub started_at: String,
+    /// Calibrating and scored presses.
+    pub presses: PressTally,
+    /// Places of the path and how far they are.
+    pub places: Vec<Place>,
+    /// The latest attempts, oldest first.
+    pub latest: Vec<Latest>,
+    /// The latest interruptions, oldest first.
+    pub faults: Vec<Fault>,
+    /// Interruptions so far.
+    pub fault_count: usize,
+    /// Bytes free where the session lies.
+    pub disk_free_bytes: Option<u64>,
+}
+
+/// A place of the path.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Place {
+    /// Where, skin frame, mm.
+    pub at_mm: [f64; 2],
+    /// Presses planned there.
+    pub planned: u32,
+    /// How many of them are valid.
+    pub valid: u32,
+    /// How many ended otherwise.
+    pub failed: u32,
+}
+
+/// An attempt that ended.
+#[derive(Debug, Serialize)]
+pub struct Latest {
+    /// Number of the press in the plan, from 1.
+    pub press: u32,
+    /// Number of the attempt, from 1.
+    pub attempt: u32,
+    /// Where, skin frame, mm.
+    pub at_mm: [f64; 2],
+    /// How it ended.
+    pub verdict: String,
+    /// Why, when not well.
+    pub reason: Option<String>,
+    /// What each camera saw of it.
+    pub cameras: [Option<Signal>; 2],
+}
+
+/// Something that broke the normal course.
+#[derive(Debug, Serialize)]
+pub struct Fault {
+    /// When, session time, s.
+    pub t_s: f64,
+    /// What.
+    pub kind: String,
+    /// In words.
+    pub reason: String,
+}
+
+impl Frame {
+    /// Nothing more will happen.
+    pub fn is_over(&self) -> bool {
+        self.sealed || self.writer.is_none()
+    }
+}
+
+/// Follows one session.
+pub struct Follower {
+    session: PathBuf,
+    /// What never changes: read once.
+    head: Option<Head>,
+    /// What was found of attempts before.
+    signals: BTreeMap<AttemptId, [Option<Signal>; 2]>,
+    /// Since when somebody writes the session whose run does not answer, or has ended.
+    silent: Option<Instant>,
+}
+
+struct Head {
+    prototype: String,
+    protocol: String,
+    rig: String,
+    started_at: String,
+    formats: [skinrig_model::StreamFormat; 2],
+}
+
+impl Follower {
+    /// Of the session at this path.
+    pub fn new(session: PathBuf) -> Self {
+        Self {
+            session,
+            head: None,
+            signals: BTreeMap::new(),
+            silent: None,
+        }
+    }
+
+    /// Whether the session is perhaps being sealed, for which its writer needs the file for itself: then it is left alone for a
+    /// while.
+    fn leaves_alone(&mut self, live: Option<&Live>, writer: Option<&str>) -> bool {
+        let goes_on = live.is_some_and(|live| live.state != State::Finished.name());
+        if goes_on || writer.is_none() {
+            self.silent = None;
+            return false;
+        }
+        self.silent.get_or_insert_with(Instant::now).elapsed() < LEFT_ALONE
+    }
+
+    /// The file.
+    pub fn session(&self) -> &Path {
+        &self.session
+    }
+
+    /// A look at the run; `None` when nothing new is known. The file is open for the length of it only, and with `patience` not at
+    /// all while it may be being sealed.
+    pub fn look(
+        &mut self,
+        writer: Option<&str>,
+        patience: bool,
+    ) -> Result<Option<Frame>, RecorderError> {
+        let live = match ask(&self.session, &Request::Status) {
+            Ok(Reply::Live(live)) => Some(live),
+            Ok(_) | Err(Silence::Nobody | Silence::Trouble(_)) => None,
+        };
+        if self.leaves_alone(live.as_deref(), writer) && patience {
+            return Ok(None);
+        }
+        let reader = SessionReader::open(&self.session)?;
+        if self.head.is_none() {
+            self.head = Some(head(&reader)?);
+        }
+        let presses = reader.presses()?;
+        let interruptions = reader.interruptions()?;
+        let end = reader.end()?.map(|(_, end)| end);
+        let sealed = reader.seal()?.is_some();
+        let (tally, _) = reader.tallies()?;
+        let latest = latest(&presses);
+        if let Some(head) = &self.head {
+            let unseen =
+                |o: &&(&PlannedPress, &PressOutcome)| !self.signals.contains_key(&o.1.attempt);
+            let unseen: Vec<&PressOutcome> = latest.iter().filter(unseen).map(|o| o.1).collect();
+            if !unseen.is_empty() {
+                self.signals
+                    .extend(signals(&reader, head.formats, &unseen)?);
+            }
+        }
+        drop(reader);
+        let told = |(planned, outcome): &(&PlannedPress, &PressOutcome)| Latest {
+            press: planned.id.0 + 1,
+            attempt: outcome.attempt.number,
+            at_mm: [planned.at.x_mm, planned.at.y_mm],
+            verdict: outcome.verdict.name().to_owned(),
+            reason: outcome.verdict.reason().map(str::to_owned),
+            cameras: self
+                .signals
+                .get(&outcome.attempt)
+                .copied()
+                .unwrap_or_default(),
+        };
+        let latest: Vec<Latest> = latest.iter().map(told).collect();
+        let fault_count = interruptions.len();
+        let faults = interruptions
+            .into_iter()
+            .skip(fault_count.saturating_sub(FAULTS));
+        let faults = faults.map(|i| Fault {
+            t_s: i.t.as_secs_f64(),
+            kind: i.kind.name().to_owned(),
+            reason: i.reason,
+        });
+        let of =
+            |text: fn(&Head) -> &String| self.head.as_ref().map(text).cloned().unwrap_or_default();
+        Ok(Some(Frame {
+            state: state(live.as_deref(), writer, end.as_ref(), sealed),
+            writer: writer.map(str::to_owned),
+            sealed,
+            live,
+            prototype: of(|h| &h.prototype),
+            protocol: of(|h| &h.protocol),
+            rig: of(|h| &h.rig),
+            started_at: of(|h| &h.started_at),
+            presses: tally,
+            places: places(&presses),
+            latest,
+            faults: faults.collect(),
+            fault_count,
+            disk_free_bytes: gates::free_bytes(paths::folder_of(&self.session))
+                .ok()
+                .map(|b| b as u64),
+            session: self.session.clone(),
+        }))
+    }
+}
+
+fn head(reader: &SessionReader) -> Result<Head, RecorderError> {
+    let header = reader.header()?;
+    Ok(Head {
+        prototype: header.prototype,
+        protocol: header.protocol_name,
+        rig: header.rig_name,
+        started_at: header.started_at,
+        formats: header.stream_formats,
+    })
+}
+
+fn state(live: Option<&Live>, writer: Option<&str>, end: Option<&RunEnd>, sealed: bool) -> String {
+    match (live, writer, end) {
+        _ if sealed => end.map_or("sealed", RunEnd::name).to_owned(),
+        (Some(live), ..) => live.state.clone(),
+        (None, Some(by), None) => format!("written by {by}, which does not answer"),
+        (None, Some(_), Some(end)) => format!("{}, being sealed", end.name()),
+        (None, None, Some(end)) => format!("{}, not sealed", end.name()),
+        (None, None, None) => {
+            "cut off: nobody runs it; `skinrig resume` goes on with it".to_owned()
+        }
+    }
+}
+
+/// The attempts that ended last, oldest first; presses that were given up are none.
+fn latest(presses: &[(PlannedPress, Vec<AttemptRow>)]) -> Vec<(&PlannedPress, &PressOutcome)> {
+    let mut all: Vec<(&PlannedPress, &PressOutcome)> = presses
+        .iter()
+        .flat_map(|(planned, attempts)| attempts.iter().map(move |a| (planned, a)))
+        .filter_map(|(planned, attempt)| Some((planned, attempt.outcome.as_ref()?)))
+        .filter(|(_, outcome)| !matches!(outcome.verdict, PressVerdict::Missed(_)))
+        .collect();
+    // A press that was taken again by a further leg comes before later ones in the plan.
+    all.sort_by_key(|(_, outcome)| outcome.timing.map(|t| t.release));
+    all.split_off(all.len().saturating_sub(LATEST))
+}
+
+/// The places of the path in the order of their first press; sync presses are no part of it.
+fn places(presses: &[(PlannedPress, Vec<AttemptRow>)]) -> Vec<Place> {
+    let mut places: Vec<Place> = Vec::new();
+    let mut known: BTreeMap<[u64; 2], usize> = BTreeMap::new();
+    for (planned, attempts) in presses {
+        if planned.role == PressRole::Sync {
+            continue;
+        }
+        let at_mm = [planned.at.x_mm, planned.at.y_mm];
+        let index = *known.entry(at_mm.map(f64::to_bits)).or_insert_with(|| {
+            places.push(Place {
+                at_mm,
+                planned: 0,
+                valid: 0,
+                failed: 0,
+            });
+            places.len() - 1
+        });
+        let place = &mut places[index];
+        place.planned += 1;
+        let verdict = attempts.last().and_then(|a| a.outcome.as_ref());
+        match verdict.map(|o| &o.verdict) {
+            Some(PressVerdict::Valid) => place.valid += 1,
+            Some(_) => place.failed += 1,
+            None => {}
+        }
+    }
+    places
+}

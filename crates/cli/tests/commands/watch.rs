@@ -1,0 +1,116 @@
+//! A run that is watched from other terminals, from before it begins until it is sealed.
+#![cfg(unix)]
+
+use std::process::Stdio;
+
+use crate::interrupt::Underway;
+use crate::support::{Lab, SMALL, only, program, read_json, skinrig, text};
+
+const WATCHERS: usize = 8;
+
+#[test]
+fn a_run_in_real_time_is_shown_with_its_path_its_rates_and_its_signals() {
+    let lab = Lab::new();
+    let run = Underway::new(&lab.path("s"));
+    let session = text(&only(&lab.path("s"), ".session.sqlite"));
+    let frame = skinrig(&["watch", &lab.text("s"), "--once", "--json"]);
+    let frame = frame.code(0).json();
+    assert_eq!(frame["live"]["state"], "running", "{frame}");
+    assert_eq!(frame["sealed"], false);
+    assert_eq!(frame["presses"]["planned"], 8);
+    // Four places, twice each; two sync presses are none of them.
+    assert_eq!(frame["places"].as_array().unwrap().len(), 4, "{frame}");
+    assert_eq!(frame["places"][0]["planned"], 2);
+    let latest = frame["latest"].as_array().unwrap().last().unwrap();
+    assert_eq!(latest["verdict"], "valid", "{frame}");
+    for camera in 0..2 {
+        let signal = &latest["cameras"][camera];
+        let [press, idle] = ["press_per_s", "idle_per_s"].map(|k| signal[k].as_f64().unwrap());
+        assert!(press > 2.0 * idle, "{frame}");
+    }
+    let words = skinrig(&["watch", &session, "--once"]).code(0).out;
+    for word in [
+        "state    running",
+        "camera 2",
+        "kev/s",
+        "eta 0:00:",
+        "@",
+        "signal to noise",
+        " free",
+    ] {
+        assert!(words.contains(word), "{word} in {words}");
+    }
+    let mut watcher = program(&["watch", &session, "--every", "100 ms"]);
+    let watcher = watcher.stdout(Stdio::piped()).spawn().unwrap();
+    skinrig(&["control", &session, "stop", "--wait", "60 s"]).code(0);
+    let said = watcher.wait_with_output().unwrap();
+    assert_eq!(said.status.code(), Some(0), "{said:?}");
+    let said = String::from_utf8(said.stdout).unwrap();
+    let states: Vec<&str> = said.lines().filter(|l| l.starts_with("state ")).collect();
+    assert_eq!(states.last(), Some(&"state    stopped"), "{states:?}");
+    assert_eq!(run.end().0, Some(5));
+}
+
+#[test]
+fn eight_watchers_of_a_whole_run_meet_no_lock_and_change_nothing() {
+    let lab = Lab::new();
+    let watchers: Vec<_> = (0..WATCHERS)
+        .map(|_| {
+            let folder = lab.text("s");
+            let mut watcher = program(&["watch", &folder, "--every", "200 ms"]);
+            let watcher = watcher.stdout(Stdio::piped()).stderr(Stdio::piped());
+            watcher.spawn().unwrap()
+        })
+        .collect();
+    let hash = |folder: &str| {
+        let sessions = lab.text(folder);
+        skinrig(&["run", SMALL, "--sessions", &sessions]).code(0);
+        let results = read_json(&only(&lab.path(folder), ".results.json"));
+        results["provenance"]["results_hash"].clone()
+    };
+    let watched = hash("s");
+    for watcher in watchers {
+        let said = watcher.wait_with_output().unwrap();
+        let (out, err) = (&said.stdout, &said.stderr);
+        let [out, err] = [out, err].map(|text| String::from_utf8_lossy(text).into_owned());
+        assert_eq!(said.status.code(), Some(0), "{out}{err}");
+        assert!(!err.contains("locked") && !err.contains("error"), "{err}");
+        assert!(out.contains("state    completed"), "{out}");
+    }
+    let session = text(&only(&lab.path("s"), ".session.sqlite"));
+    assert!(
+        skinrig(&["verify", &session])
+            .code(0)
+            .out
+            .contains(", sealed")
+    );
+    assert_eq!(watched, hash("alone"));
+}
+
+#[test]
+fn a_run_that_is_not_there_yet_is_waited_for_and_a_cut_off_one_is_told() {
+    let lab = Lab::new();
+    let folder = lab.text("s");
+    skinrig(&["watch", &folder, "--once"]).code(2).complains(&[
+        &folder,
+        "found none yet",
+        "--once",
+    ]);
+    let run = Underway::new(&lab.path("s"));
+    run.signal("KILL");
+    run.end();
+    let session = text(&only(&lab.path("s"), ".session.sqlite"));
+    let said = skinrig(&["watch", &session]).code(0);
+    assert!(said.out.contains("state    cut off"), "{said:?}");
+    // Nobody can say that it is whole.
+    skinrig(&[
+        "export",
+        &session,
+        "--to",
+        "bundle",
+        "--out",
+        &lab.text("b"),
+    ])
+    .code(2)
+    .complains(&["sealed session", "resume"]);
+}

@@ -1,0 +1,188 @@
+//! A bundle: one folder with a session and everything made from it, which proves itself wherever it is moved to.
+
+use std::collections::BTreeSet;
+use std::fs::File;
+use std::io::{Read, Write as _};
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+use crate::error::ExportError;
+
+/// The file of a bundle that lists the others.
+pub const MANIFEST: &str = "manifest.json";
+/// Value of its `format` field.
+const FORMAT: &str = "skinrig-bundle";
+/// Version of its layout.
+const VERSION: u32 = 1;
+/// More is no manifest.
+const MOST_BYTES: u64 = 1 << 20;
+
+#[derive(Debug, Serialize, Deserialize)]
+struct Manifest {
+    format: String,
+    format_version: u32,
+    session_id: String,
+    prototype: String,
+    software: String,
+    session: String,
+    files: Vec<Entry>,
+}
+
+#[derive(Debug, Serialize, Deserialize)]
+struct Entry {
+    name: String,
+    bytes: u64,
+    sha256: String,
+}
+
+/// What a bundle holds and what is wrong with it.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct BundleReport {
+    /// Names the session.
+    pub session_id: String,
+    /// Its file in the folder.
+    pub session: String,
+    /// Files listed.
+    pub files: usize,
+    /// Files that are not what the manifest says, are missing, or are not listed.
+    pub problems: Vec<String>,
+}
+
+/// Lists the files of `folder` with their hashes in its manifest, which comes last: a folder without one is no bundle.
+///
+/// # Errors
+/// When a file cannot be read or the manifest not be written.
+pub fn seal_bundle(
+    folder: &Path,
+    session_id: &str,
+    prototype: &str,
+    session: &str,
+    names: &[String],
+) -> Result<(), ExportError> {
+    let entries = names.iter().map(|name| entry(folder, name));
+    let manifest = Manifest {
+        format: FORMAT.into(),
+        format_version: VERSION,
+        session_id: session_id.into(),
+        prototype: prototype.into(),
+        software: concat!("skinrig ", env!("CARGO_PKG_VERSION")).into(),
+        session: session.into(),
+        files: entries.collect::<Result<_, _>>()?,
+    };
+    let path = folder.join(MANIFEST);
+    let partial = folder.join(format!("{MANIFEST}.partial"));
+    let text = serde_json::to_string_pretty(&manifest).map_err(ExportError::file(&path))?;
+    let _ = std::fs::remove_file(&partial);
+    File::create_new(&partial)
+        .and_then(|mut file| {
+            file.write_all(text.as_bytes())?;
+            file.sync_all()
+        })
+        .and_then(|()| std::fs::rename(&partial, &path))
+        .map_err(ExportError::file(&path))
+}
+
+/// A file as it is now.
+fn entry(folder: &Path, name: &str) -> Result<Entry, ExportError> {
+    let path = folder.join(name);
+    let said = ExportError::file(&path);
+    let mut file = File::open(&path).map_err(&said)?;
+    let mut hasher = Sha256::new();
+    let mut buffer = vec![0; 1 << 20];
+    let mut bytes = 0;
+    loop {
+        let read = file.read(&mut buffer).map_err(&said)?;
+        if read == 0 {
+            break;
+        }
+        bytes += read as u64;
+        hasher.update(&buffer[..read]);
+    }
+    let digest = hasher.finalize();
+    Ok(Entry {
+        name: name.into(),
+        bytes,
+        sha256: digest.iter().map(|b| format!("{b:02x}")).collect(),
+    })
+}
+
+/// Holds every file of the bundle in `folder` against its manifest. The session in it is a file like the others here; whether it
+/// is sound in itself is for `skinrig_recorder::verify`.
+///
+/// # Errors
+/// [`ExportError::NotABundle`] for a folder without a manifest of this version; [`ExportError::File`] when it cannot be read.
+pub fn verify_bundle(folder: &Path) -> Result<BundleReport, ExportError> {
+    let path = folder.join(MANIFEST);
+    let not = |found: String| ExportError::NotABundle {
+        path: path.clone(),
+        found,
+    };
+    let is_plain = |name: &str| {
+        folder
+            .join(name)
+            .symlink_metadata()
+            .is_ok_and(|m| m.is_file())
+    };
+    if !is_plain(MANIFEST) {
+        return Err(not("no such file".into()));
+    }
+    let mut text = String::new();
+    let file = File::open(&path).map_err(ExportError::file(&path))?;
+    file.take(MOST_BYTES)
+        .read_to_string(&mut text)
+        .map_err(ExportError::file(&path))?;
+    let manifest: Manifest = serde_json::from_str(&text).map_err(|e| not(e.to_string()))?;
+    if (manifest.format.as_str(), manifest.format_version) != (FORMAT, VERSION) {
+        let found = format!("{} of version {}", manifest.format, manifest.format_version);
+        return Err(not(found));
+    }
+    // From a stranger a name may lead anywhere.
+    let leads_out = |name: &str| {
+        let mut parts = Path::new(name).components();
+        let first = parts.next();
+        !matches!(first, Some(std::path::Component::Normal(_))) || parts.next().is_some()
+    };
+    if let Some(out) = manifest.files.iter().find(|f| leads_out(&f.name)) {
+        return Err(not(format!("a file that is not in it: {:?}", out.name)));
+    }
+    let listed: BTreeSet<&str> = manifest.files.iter().map(|f| f.name.as_str()).collect();
+    if !listed.contains(manifest.session.as_str()) {
+        return Err(not("no session among its files".into()));
+    }
+    let mut problems = Vec::new();
+    for wanted in &manifest.files {
+        let name = &wanted.name;
+        if !is_plain(name) {
+            problems.push(format!("{name}: expected a file, found none"));
+            continue;
+        }
+        let found = entry(folder, name)?;
+        if found.bytes != wanted.bytes {
+            problems.push(format!(
+                "{name}: expected {} bytes, found {}",
+                wanted.bytes, found.bytes
+            ));
+        } else if found.sha256 != wanted.sha256 {
+            problems.push(format!(
+                "{name}: expected SHA-256 {}, found {}",
+                wanted.sha256, found.sha256
+            ));
+        }
+    }
+    for other in std::fs::read_dir(folder).map_err(ExportError::file(folder))? {
+        let name = other.map_err(ExportError::file(folder))?.file_name();
+        let name = name.to_string_lossy();
+        if name != MANIFEST && !listed.contains(&*name) {
+            problems.push(format!("{name}: expected no such file"));
+        }
+    }
+    problems.sort();
+    Ok(BundleReport {
+        session_id: manifest.session_id,
+        session: manifest.session,
+        files: manifest.files.len(),
+        problems,
+    })
+}

@@ -1,0 +1,109 @@
+//! Tables as CSV (RFC 4180): a line of names, an empty cell for none, numbers that read back exactly.
+
+use std::fs::File;
+use std::path::PathBuf;
+
+use csv::{Writer, WriterBuilder};
+
+use crate::error::ExportError;
+use crate::folder::Folder;
+use crate::table::{Layout, TableWriter, Values};
+
+/// One file per table.
+#[derive(Debug)]
+pub struct CsvFiles {
+    folder: Folder,
+    open: Option<(Writer<File>, String)>,
+    written: Vec<PathBuf>,
+}
+
+/// A table's name after the stem.
+pub(crate) const ENDING: &str = "csv";
+
+impl CsvFiles {
+    /// Into `folder`.
+    #[must_use]
+    pub const fn new(folder: Folder) -> Self {
+        Self {
+            folder,
+            open: None,
+            written: Vec::new(),
+        }
+    }
+
+    /// The files, in order.
+    #[must_use]
+    pub fn written(mut self) -> Vec<PathBuf> {
+        std::mem::take(&mut self.written)
+    }
+}
+
+impl TableWriter for CsvFiles {
+    fn begin(&mut self, layout: &Layout, _rows: u64) -> Result<(), ExportError> {
+        let ending = format!(".{}.{ENDING}", layout.name);
+        let path = self.folder.begin(&ending)?;
+        let file = File::create_new(&path).map_err(ExportError::file(&path))?;
+        let mut writer = WriterBuilder::new()
+            .buffer_capacity(1 << 16)
+            .from_writer(file);
+        let names = layout.columns.iter().map(|column| &column.name);
+        let headed = writer.write_record(names);
+        self.open = Some((writer, ending));
+        headed.map_err(ExportError::file(&path))
+    }
+
+    fn append(&mut self, batch: &[Values]) -> Result<(), ExportError> {
+        let Some((writer, ending)) = &mut self.open else {
+            return Ok(());
+        };
+        let path = self.folder.file(ending);
+        let rows = batch.first().map_or(0, Values::rows);
+        let mut cell = String::new();
+        for row in 0..rows {
+            for values in batch {
+                cell.clear();
+                write_cell(values, row, &mut cell);
+                writer
+                    .write_field(&cell)
+                    .map_err(ExportError::file(&path))?;
+            }
+            // Ends the line.
+            writer
+                .write_record(None::<&[u8]>)
+                .map_err(ExportError::file(&path))?;
+        }
+        Ok(())
+    }
+
+    fn end(&mut self) -> Result<(), ExportError> {
+        if let Some((mut writer, ending)) = self.open.take() {
+            let path = self.folder.file(&ending);
+            writer.flush().map_err(ExportError::file(&path))?;
+            drop(writer);
+            self.written.push(self.folder.complete(&ending)?);
+        }
+        Ok(())
+    }
+}
+
+impl Drop for CsvFiles {
+    fn drop(&mut self) {
+        if let Some((_, ending)) = self.open.take() {
+            self.folder.abandon(&ending);
+        }
+    }
+}
+
+fn write_cell(values: &Values, row: usize, cell: &mut String) {
+    use std::fmt::Write as _;
+    // Writing to a string cannot fail.
+    let _ = match values {
+        Values::Int(v) => write!(cell, "{}", v[row]),
+        Values::Pixel(v) => write!(cell, "{}", v[row]),
+        Values::Flag(v) => write!(cell, "{}", u8::from(v[row])),
+        Values::Count(v) => v[row].map_or(Ok(()), |n| write!(cell, "{n}")),
+        Values::Real(v) if v[row].is_nan() => Ok(()),
+        Values::Real(v) => write!(cell, "{}", v[row]),
+        Values::Text(v) => v[row].as_ref().map_or(Ok(()), |t| cell.write_str(t)),
+    };
+}

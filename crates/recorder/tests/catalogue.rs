@@ -1,0 +1,64 @@
+//! Listing a folder reads the head of each session and not its plan, its journal or its camera bytes.
+//!
+//! A program of its own: the bytes that a process reads are counted for all of its threads together.
+#![cfg(target_os = "linux")]
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on must fail")]
+
+#[path = "session/common.rs"]
+#[expect(dead_code, reason = "only the session of it is used here")]
+mod common;
+
+use std::io::Read;
+
+use skinrig_model::{Record, RunHeader};
+use skinrig_recorder::{SessionState, SessionWriter, list};
+
+const SESSIONS: usize = 300;
+/// As a campaign of thousands of presses has it.
+const PLAN_BYTES: usize = 4 << 20;
+/// Pages of 64 KiB: the first, the schema's, and one or two of each small table that a list shows.
+const MOST_PAGES: u64 = 16;
+const PAGE_BYTES: u64 = 65_536;
+
+/// Bytes that this process has read by system calls so far.
+fn read_so_far() -> u64 {
+    let mut text = String::new();
+    let mut counters = std::fs::File::open("/proc/self/io").unwrap();
+    counters.read_to_string(&mut text).unwrap();
+    let count = text.lines().find_map(|l| l.strip_prefix("rchar: "));
+    count.unwrap().parse().unwrap()
+}
+
+#[test]
+fn three_hundred_sessions_are_listed_by_a_few_pages_of_each() {
+    let folder = tempfile::tempdir().unwrap();
+    let first = folder.path().join("0.session.sqlite");
+    let mut writer = SessionWriter::create(&first).unwrap();
+    for record in common::records(4) {
+        let record = match record {
+            Record::Started(header) => Record::Started(Box::new(RunHeader {
+                plan_json: format!("[\"{}\"]", "x".repeat(PLAN_BYTES)),
+                ..*header
+            })),
+            other => other,
+        };
+        writer.accept(record).unwrap();
+    }
+    writer.finish().unwrap();
+    for n in 1..SESSIONS {
+        let name = format!("{n}.session.sqlite");
+        std::fs::hard_link(&first, folder.path().join(name)).unwrap();
+    }
+    let before = read_so_far();
+    let sessions = list(folder.path()).unwrap();
+    let pages = (read_so_far() - before).div_ceil(PAGE_BYTES * SESSIONS as u64);
+    assert_eq!(sessions.len(), SESSIONS);
+    for session in &sessions {
+        assert!(matches!(
+            &session.state,
+            SessionState::Readable { sealed: true, .. }
+        ));
+        assert!(session.size_bytes > PLAN_BYTES as u64);
+    }
+    assert!((1..=MOST_PAGES).contains(&pages), "{pages} pages of each");
+}
