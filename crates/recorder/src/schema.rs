@@ -215,7 +215,7 @@ pub fn beside(path: &Path, ending: &str) -> PathBuf {
 
 /// What is written beside a session is written there: a link in its place, in a folder from a stranger, would lead the writing to any
 /// other file.
-fn refuse_links(path: &Path) -> Result<(), RecorderError> {
+pub fn refuse_links(path: &Path) -> Result<(), RecorderError> {
     for ending in ["-wal", "-shm", "-journal", "-lock"] {
         let file = beside(path, ending);
         if std::fs::symlink_metadata(&file).is_ok_and(|m| m.is_symlink()) {

@@ -71,9 +71,19 @@ impl SessionWriter {
     pub fn create(path: impl AsRef<Path>) -> Result<Self, RecorderError> {
         let path = path.as_ref().to_owned();
         let runtime = runtime(&path)?;
+        schema::refuse_links(&path)?;
+        // The lock before the file: whoever sees the file sees that somebody writes it.
+        let exists = || RecorderError::Exists { path: path.clone() };
+        if path.exists() {
+            return Err(exists());
+        }
+        let lock = WriterLock::take(&path).map_err(|e| match e {
+            RecorderError::InUse { .. } => exists(),
+            other => other,
+        })?;
         let conn = runtime.block_on(schema::create(&path))?;
         let mut writer = Self {
-            lock: WriterLock::take(&path)?,
+            lock,
             path,
             shared: Arc::new(Shared::default()),
             threads: None,

@@ -10,6 +10,7 @@ mod common;
 
 use std::io::Read;
 
+use sha2::{Digest, Sha256};
 use skinrig_model::{Record, RunHeader};
 use skinrig_recorder::{SessionState, SessionWriter, list};
 
@@ -36,10 +37,15 @@ fn three_hundred_sessions_are_listed_by_a_few_pages_of_each() {
     let mut writer = SessionWriter::create(&first).unwrap();
     for record in common::records(4) {
         let record = match record {
-            Record::Started(header) => Record::Started(Box::new(RunHeader {
-                plan_json: format!("[\"{}\"]", "x".repeat(PLAN_BYTES)),
-                ..*header
-            })),
+            Record::Started(header) => {
+                let plan_json = format!("[\"{}\"]", "x".repeat(PLAN_BYTES));
+                let digest = Sha256::digest(&plan_json);
+                Record::Started(Box::new(RunHeader {
+                    plan_sha256: digest.iter().map(|b| format!("{b:02x}")).collect(),
+                    plan_json,
+                    ..*header
+                }))
+            }
             other => other,
         };
         writer.accept(record).unwrap();

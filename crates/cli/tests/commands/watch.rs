@@ -11,7 +11,9 @@ const WATCHERS: usize = 8;
 #[test]
 fn a_run_in_real_time_is_shown_with_its_path_its_rates_and_its_signals() {
     let lab = Lab::new();
-    let run = Underway::new(&lab.path("s"));
+    let mut run = Underway::new(&lab.path("s"));
+    // Before the first press there was nothing to compare it with.
+    run.wait_for("press 3/10");
     let session = text(&only(&lab.path("s"), ".session.sqlite"));
     let frame = skinrig(&["watch", &lab.text("s"), "--once", "--json"]);
     let frame = frame.code(0).json();
