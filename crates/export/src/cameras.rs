@@ -26,6 +26,7 @@ pub(crate) fn for_each_events(
         if let Some(origin_us) = meta.restart_us {
             decoder.restart(origin_us);
         }
+        decoder.lost(meta.lost_before);
         decoder.for_each_slice(bytes, |events| {
             if fault.is_none() {
                 fault = each(events).err();

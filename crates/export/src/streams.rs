@@ -1,6 +1,7 @@
 //! The long tables: events and the robot's path, a batch at a time.
 
-use skinrig_model::{CameraId, CdEvent, HostTime, Polarity, PoseSample};
+use skinrig_model::{CameraId, CdEvent, HostTime, Polarity, PoseSample, StreamFormat};
+use skinrig_recorder::SessionReader;
 
 use crate::cameras::for_each_events;
 use crate::error::ExportError;
@@ -53,6 +54,25 @@ impl EventBatch {
     }
 }
 
+/// How many events there are. The facts of the chunks say so, but for those of an older session with losses, whose decoder knew of
+/// none: these are decoded for it.
+fn count(
+    reader: &SessionReader,
+    format: StreamFormat,
+    camera: CameraId,
+) -> Result<u64, ExportError> {
+    let index = reader.chunk_index(camera)?;
+    if index.iter().all(|chunk| chunk.lost_before == 0) {
+        return Ok(index.iter().map(|chunk| chunk.facts.cd_events).sum());
+    }
+    let mut events = 0;
+    for_each_events(reader, format, camera, |slice| {
+        events += slice.len() as u64;
+        Ok(())
+    })?;
+    Ok(events)
+}
+
 /// The CD events of a camera, in stream order, on its own clock.
 pub(crate) fn events(
     source: &Source<'_>,
@@ -60,8 +80,8 @@ pub(crate) fn events(
     name: &'static str,
     to: &mut dyn TableWriter,
 ) -> Result<(), ExportError> {
-    let index = source.reader.chunk_index(camera)?;
-    let expected: u64 = index.iter().map(|chunk| chunk.facts.cd_events).sum();
+    let format = source.header.stream_formats[camera.index()];
+    let expected = count(source.reader, format, camera)?;
     let columns = [
         ("t_us", Kind::Int),
         ("x_px", Kind::Pixel),
@@ -71,7 +91,6 @@ pub(crate) fn events(
     to.begin(&layout(name, &columns), expected)?;
     let mut found = 0;
     let mut batch = EventBatch::default();
-    let format = source.header.stream_formats[camera.index()];
     for_each_events(source.reader, format, camera, |events| {
         found += events.len() as u64;
         for part in events.chunks(BATCH) {
