@@ -118,7 +118,7 @@ fn gather(sessions: &[SessionSummary]) -> Vec<Prototype> {
             protocol,
             rig_kind,
             best: usable().min_by(|a, b| value(a).total_cmp(&value(b))),
-            last: usable().last(),
+            last: usable().next_back(),
             points,
         }
     };

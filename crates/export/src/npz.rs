@@ -101,7 +101,7 @@ fn header(layout: &Layout, rows: u64) -> Vec<u8> {
         "{{'descr': [{}], 'fortran_order': False, 'shape': ({rows},), }}",
         fields.collect::<String>()
     );
-    while (PREAMBLE + text.len() + 1) % ALIGN != 0 {
+    while !(PREAMBLE + text.len() + 1).is_multiple_of(ALIGN) {
         text.push(' ');
     }
     text.push('\n');

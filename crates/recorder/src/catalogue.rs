@@ -26,6 +26,10 @@ pub struct SessionSummary {
 /// What is in a session file.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 #[serde(tag = "state", rename_all = "snake_case")]
+#[expect(
+    clippy::large_enum_variant,
+    reason = "nearly all are readable, and a folder holds hundreds"
+)]
 pub enum SessionState {
     /// It can be read.
     #[serde(rename_all = "snake_case")]

@@ -12,9 +12,10 @@ fn sessions_are_found_by_prototype_and_by_tag_and_their_trend_is_shown() {
     for seed in ["1", "2"] {
         skinrig(&["run", SMALL, "--sessions", &s, "--seed", seed]).code(0);
     }
-    let other = lab.record("s", &["--set", "prototype.id=skin B"]);
-    let all = files(&lab.path("s"), ".session.sqlite");
-    let first = all.iter().find(|p| **p != other).unwrap();
+    let [a, b] = ["--no-analysis", "prototype.id=skin B"];
+    skinrig(&["run", SMALL, "--sessions", &s, a, "--set", b]).code(0);
+    let other = only(&lab.path("s"), "-skin-b.session.sqlite");
+    let first = &files(&lab.path("s"), "-test-skin.session.sqlite")[0];
 
     let before = std::fs::read(first).unwrap();
     let tags = ["tag", &text(first), "good-skin", "wet", "--by", "Ann"];
