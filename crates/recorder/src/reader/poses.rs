@@ -8,9 +8,12 @@ use crate::from_row::pose_block_from;
 use crate::query::num;
 
 /// Found by the index over the blocks' ends: a session has a block every few seconds of a night, between the chunks.
-const BLOCK_ENDING_AFTER: &str = "SELECT id, first_ns, last_ns, samples, sha256, data FROM pose_block
+const BLOCK_ENDING_AFTER: &str = EXPLAINED.split_at(EXPLAIN.len()).1;
+/// The same, for the test that it is found so: a statement is a literal.
+const EXPLAINED: &str = "EXPLAIN QUERY PLAN SELECT id, first_ns, last_ns, samples, sha256, data FROM pose_block
      WHERE id = (SELECT id FROM pose_block WHERE last_ns >= ?1 AND (last_ns > ?1 OR id > ?2) ORDER BY last_ns, id LIMIT 1)
      AND first_ns <= ?3";
+const EXPLAIN: &str = "EXPLAIN QUERY PLAN ";
 
 impl SessionReader {
     /// Calls `each` with the pose samples of `from <= t <= to` in time order, a block at a time.
@@ -101,7 +104,7 @@ impl SessionReader {
 mod tests {
     use sqlx::{Connection as _, Row as _, SqliteConnection};
 
-    use super::BLOCK_ENDING_AFTER;
+    use super::EXPLAINED;
     use crate::schema::MIGRATOR;
 
     #[test]
@@ -113,11 +116,7 @@ mod tests {
             .block_on(async {
                 let mut conn = SqliteConnection::connect("sqlite::memory:").await?;
                 MIGRATOR.run(&mut conn).await?;
-                sqlx::query(sqlx::AssertSqlSafe(format!(
-                    "EXPLAIN QUERY PLAN {BLOCK_ENDING_AFTER}"
-                )))
-                .fetch_all(&mut conn)
-                .await
+                sqlx::query(EXPLAINED).fetch_all(&mut conn).await
             })
             .unwrap();
         let steps: Vec<String> = plan.iter().map(|row| row.get("detail")).collect();
