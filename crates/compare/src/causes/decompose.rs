@@ -166,11 +166,11 @@ fn change(pair: &[Taken; 2]) -> [f64; FACTORS.len()] {
     let more = carried(over, &reach, 1.0);
     let of_scatter = parts(a.scatter, b.scatter, [0, 1, 2].map(|i| direct[i] + more[i]));
     let bias = [a, b].map(|t| t.bias.max(LEAST_BIAS * (t.scatter + t.bias)));
-    let of_bias = parts(
-        bias[0],
-        bias[1],
-        carried((bias[1] / bias[0]).ln(), &reach, 2.0),
-    );
+    let log = (bias[1] / bias[0]).ln();
+    let of_bias = carried(log, &reach, 2.0).map(|part| {
+        let share = if log.abs() > 1e-9 { part / log } else { 0.0 };
+        share * (b.bias - a.bias)
+    });
     let [signal, noise, spread] = [0, 1, 2].map(|i| of_scatter[i] + of_bias[i]);
     let rest = b.scatter + b.bias - a.scatter - a.bias;
     [
