@@ -30,10 +30,12 @@ fn parts_add_up_and_one_changed_factor_carries_all() {
     // Five times the noise.
     let parts = change(&[a, taken(3.0, 1e-3, 100.0, 4.5, 10_000.0)]);
     assert!((parts[4] - 2.0).abs() < 1e-12, "{parts:?}");
-    // Twice as wide, and something else that is not known.
+    // Twice as wide: up to the square of its own effect is the width's, what lies beyond is not.
     let parts = change(&[a, taken(5.0, 1e-3, 400.0, 1.5, 2_000.0)]);
-    assert!(parts[5] > 3.0 && parts[6] > 0.0, "{parts:?}");
-    assert!((parts.iter().sum::<f64>() - 4.0).abs() < 1e-12);
+    assert!((parts[5] - 4.0).abs() < 1e-12, "{parts:?}");
+    let parts = change(&[a, taken(40.0, 1e-3, 400.0, 1.5, 2_000.0)]);
+    assert!(parts[5] > 25.0 && parts[6] > 5.0, "{parts:?}");
+    assert!((parts.iter().sum::<f64>() - 39.0).abs() < 1e-12);
 }
 
 #[test]
