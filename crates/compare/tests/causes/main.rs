@@ -1,5 +1,6 @@
 //! One planted cause in a simulated pair: it is named, and nothing is where nothing was planted.
 #![expect(clippy::unwrap_used, reason = "tests")]
+#![expect(clippy::print_stdout, reason = "a pair that is named wrongly is shown")]
 
 mod planted;
 
