@@ -1,4 +1,5 @@
 //! Bytes that are missing, and marked as missing: what comes out beside them is what the whole stream says, or nothing.
+#![expect(clippy::unwrap_used, reason = "tests")]
 
 use proptest::prelude::*;
 use skinrig_formats::evt2::Encoder;

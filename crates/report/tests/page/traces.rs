@@ -1,4 +1,5 @@
 //! Clocks, robot and tradeoff in the page, and how columns of data stand in it.
+#![expect(clippy::unwrap_used, reason = "tests")]
 
 use skinrig_report::html;
 

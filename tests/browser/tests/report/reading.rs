@@ -14,8 +14,8 @@ fn complaints(page: &mut Page<'_>) -> Vec<String> {
         "Log.entryAdded" => true,
         "Network.requestWillBeSent" => {
             let url = e.params["request"]["url"].as_str().unwrap_or_default();
-            !(url.starts_with("file:") && url.ends_with(".report.html"))
-                && !url.starts_with("data:")
+            let own = url.starts_with("file:") && url.ends_with(".report.html");
+            !own && !url.starts_with("data:")
         }
         _ => false,
     });
