@@ -85,6 +85,9 @@ fn provenance_faults_and_exclusions_stand_on_the_first_screen() {
                 "{key}: {block}"
             );
         }
+        // Nothing sticks out of its card.
+        let wide = "[...document.querySelectorAll('.first .card')].filter(c => c.scrollWidth > c.clientWidth).length";
+        assert_eq!(page.ask(wide).unwrap(), json!(0));
         keep(page, "first-screen", false);
         keep(page, "light", true);
     });
