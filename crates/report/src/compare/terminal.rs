@@ -112,7 +112,7 @@ fn against(result: &Comparison, k: usize, letter: char, paint: &Paint) -> String
             let name = words::heading(row);
             let _ = writeln!(
                 out,
-                "{name:<26}{:>7}{:>8}{NONE:>9}{NONE:>18}  not compared",
+                "{name:<26}{:>7}{:>8}{NONE:>9}{NONE:>18}  no verdict",
                 own(0),
                 own(k)
             );
