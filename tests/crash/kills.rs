@@ -95,7 +95,10 @@ fn killed_at_random_instants() {
         }
         under_way += u64::from(outcomes > 0);
         if !before.is_empty() && sealed(&session) {
-            expect(resume(&session), 2); // complete in time
+            // Complete in time; or only the last bytes of its seal were missing, and are put there.
+            let code = resume(&session).output().unwrap().status.code();
+            assert!(matches!(code, Some(0 | 2)), "{case}: {code:?}");
+            Uninterrupted::get().assert_equalled_by(&session, 0, &case);
         } else {
             goes_on(&session, 1, &case);
         }
