@@ -5,7 +5,7 @@ use skinrig_browser::Page;
 
 use crate::{counted, with_report};
 
-fn rows(bytes: &[u8]) -> (Vec<String>, usize) {
+pub(crate) fn rows(bytes: &[u8]) -> (Vec<String>, usize) {
     // The reader refuses rows of another length than the head's.
     let mut reader = csv::Reader::from_reader(bytes);
     let head = reader
@@ -19,9 +19,9 @@ fn rows(bytes: &[u8]) -> (Vec<String>, usize) {
 }
 
 /// So many files at a time: after ten from one page a browser asks its reader first.
-const AT_A_TIME: usize = 8;
+pub(crate) const AT_A_TIME: usize = 8;
 
-fn buttons(page: &mut Page<'_>, kind: &str) -> Vec<String> {
+pub(crate) fn buttons(page: &mut Page<'_>, kind: &str) -> Vec<String> {
     let found = page
         .ask(&format!("[...document.querySelectorAll('[data-save={kind}]')].map(b => b.closest('[data-figure]').dataset.figure)"))
         .unwrap();

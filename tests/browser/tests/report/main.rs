@@ -7,6 +7,7 @@
 )]
 
 mod acting;
+mod comparison;
 mod downloads;
 mod reading;
 

@@ -6,7 +6,7 @@ use skinrig_browser::{Page, Size};
 use crate::{keep, kept_folder, with_report};
 
 /// Everything that a page can complain of, and every request but its own.
-fn complaints(page: &mut Page<'_>) -> Vec<String> {
+pub(crate) fn complaints(page: &mut Page<'_>, own_ending: &str) -> Vec<String> {
     let events = page.events().into_iter();
     let bad = events.filter(|e| match e.method.as_str() {
         "Runtime.exceptionThrown" => true,
@@ -14,7 +14,7 @@ fn complaints(page: &mut Page<'_>) -> Vec<String> {
         "Log.entryAdded" => true,
         "Network.requestWillBeSent" => {
             let url = e.params["request"]["url"].as_str().unwrap_or_default();
-            let own = url.starts_with("file:") && url.ends_with(".report.html");
+            let own = url.starts_with("file:") && url.ends_with(own_ending);
             !own && !url.starts_with("data:")
         }
         _ => false,
@@ -37,14 +37,17 @@ fn it_loads_without_a_word_and_asks_nobody() {
                 .unwrap()
                 .contains("presses")
         );
-        let found = complaints(page);
+        let found = complaints(page, ".report.html");
         assert!(found.is_empty(), "{found:#?}");
         // The policy of the page holds against what is not its own script.
         page.ask("document.body.insertAdjacentHTML('beforeend', '<img src=x onerror=\"window.ran = 1\">')")
             .unwrap();
         page.ask("new Promise(done => setTimeout(done, 50))")
             .unwrap();
-        assert!(!complaints(page).is_empty(), "the complaints are not seen");
+        assert!(
+            !complaints(page, ".report.html").is_empty(),
+            "the complaints are not seen"
+        );
         assert_eq!(page.ask("window.ran === undefined").unwrap(), json!(true));
         let eval = json!({ "expression": "eval('1')", "allowUnsafeEvalBlockedByCSP": false });
         let answer = page.call("Runtime.evaluate", eval).unwrap();
@@ -202,7 +205,7 @@ fn everything_that_can_be_used_has_a_name() {
 }
 
 /// How light a colour is, 0 to 255.
-const LIGHTNESS: &str = "(c => Math.max(...c.match(/\\d+/g).slice(0, 3).map(Number)))";
+pub(crate) const LIGHTNESS: &str = "(c => Math.max(...c.match(/\\d+/g).slice(0, 3).map(Number)))";
 
 #[test]
 fn dark_follows_the_system_and_the_button() {

@@ -1,0 +1,128 @@
+//! The page of a comparison of two runs: loading, downloads, dark, print, phone.
+
+use std::path::PathBuf;
+use std::sync::OnceLock;
+
+use serde_json::json;
+use skinrig_browser::{Browser, BrowserError, Page, Size};
+
+use crate::downloads::{AT_A_TIME, buttons, rows};
+use crate::reading::{LIGHTNESS, complaints};
+use crate::{keep, kept_folder, skinrig};
+
+/// The page that sets one simulated skin beside another.
+fn comparison() -> &'static PathBuf {
+    static PAGE: OnceLock<PathBuf> = OnceLock::new();
+    PAGE.get_or_init(|| {
+        let folder = kept_folder().join("comparison");
+        let _ = std::fs::remove_dir_all(&folder);
+        let skins = ["one", "two"].map(|skin| {
+            let to = folder.join(skin).to_str().unwrap().to_owned();
+            let seed = if skin == "one" { "1" } else { "2" };
+            let prototype = format!("prototype.id={skin}");
+            let protocol = concat!(
+                env!("CARGO_MANIFEST_DIR"),
+                "/../../protocols/depth-sweep.yaml"
+            );
+            let run = ["run", protocol, "--sessions", &to, "--seed", seed];
+            let set = ["--set", "path.random.count=12", "--set", "depths=[2 mm]"];
+            skinrig(&[&run[..], &set, &["--set", &prototype]].concat());
+            to
+        });
+        let out = folder.join("comparison.html");
+        let limits = concat!(
+            env!("CARGO_MANIFEST_DIR"),
+            "/../../protocols/comparison.limits.yaml"
+        );
+        let [one, two] = &skins;
+        let to = out.to_str().unwrap();
+        skinrig(&["compare", one, two, "--limits", limits, "--out", to]);
+        out
+    })
+}
+
+fn with_comparison(test: impl FnOnce(&mut Page<'_>)) {
+    let mut browser = match Browser::start() {
+        Ok(browser) => browser,
+        Err(BrowserError::Absent(reason)) => {
+            println!("skipped: no browser: {reason}");
+            return;
+        }
+        Err(e) => panic!("{e}"),
+    };
+    let file = comparison();
+    let mut page = browser.page().unwrap();
+    page.open(file).unwrap();
+    test(&mut page);
+}
+
+#[test]
+fn it_loads_without_a_word_and_says_whether_the_skins_may_be_compared() {
+    with_comparison(|page| {
+        let found = complaints(page, ".html");
+        assert!(found.is_empty(), "{found:#?}");
+        for card in ["heading", "verdict-B", "comparability"] {
+            let bottom = format!(
+                "document.querySelector('[data-testid={card}]').getBoundingClientRect().bottom"
+            );
+            let bottom = page.ask(&bottom).unwrap().as_f64().unwrap();
+            assert!(bottom <= f64::from(Size::LAPTOP.height), "{card}: {bottom}");
+        }
+        keep(page, "comparison-light", true);
+    });
+}
+
+#[test]
+fn every_figure_and_table_can_be_taken_out() {
+    with_comparison(|page| {
+        let figures = page
+            .ask("document.querySelectorAll('svg.fig').length")
+            .unwrap();
+        let drawings = buttons(page, "svg");
+        assert_eq!(json!(drawings.len()), figures);
+        let tables = buttons(page, "csv");
+        assert!(tables.len() >= drawings.len(), "{tables:?}");
+        let saves = drawings.iter().map(|f| (f, "svg"));
+        let saves = saves.chain(tables.iter().map(|f| (f, "csv")));
+        for (k, (figure, kind)) in saves.enumerate() {
+            if k % AT_A_TIME == AT_A_TIME - 1 {
+                page.open(comparison()).unwrap();
+            }
+            let button = format!("[data-figure={figure}] [data-save={kind}]");
+            let (name, bytes) = page.download(&button).unwrap();
+            assert!(name.ends_with(&format!("{figure}.{kind}")), "{name}");
+            if kind == "csv" {
+                let (head, n) = rows(&bytes);
+                assert!(n > 0 && head.iter().all(|h| !h.is_empty()), "{figure}");
+            } else {
+                let text = String::from_utf8(bytes).unwrap();
+                assert!(
+                    text.contains("<svg") && text.contains("simulated"),
+                    "{figure}"
+                );
+            }
+        }
+    });
+}
+
+#[test]
+fn it_is_dark_prints_and_fits_a_phone() {
+    with_comparison(|page| {
+        page.media("", "dark").unwrap();
+        let body = format!("{LIGHTNESS}(getComputedStyle(document.body).backgroundColor)");
+        assert!(page.ask(&body).unwrap().as_f64().unwrap() < 60.0);
+        keep(page, "comparison-dark", true);
+        page.click("#theme").unwrap();
+        assert!(page.ask(&body).unwrap().as_f64().unwrap() > 200.0);
+        let pdf = page.pdf().unwrap();
+        assert!(pdf.starts_with(b"%PDF-"));
+        std::fs::write(kept_folder().join("comparison.pdf"), &pdf).unwrap();
+        page.resize(Size::PHONE).unwrap();
+        let width = page.ask("document.documentElement.scrollWidth").unwrap();
+        assert!(
+            width.as_u64().unwrap() <= u64::from(Size::PHONE.width),
+            "{width}"
+        );
+        keep(page, "comparison-phone", true);
+    });
+}
