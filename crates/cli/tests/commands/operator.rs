@@ -3,6 +3,7 @@
 
 use std::path::{Path, PathBuf};
 use std::process::Stdio;
+use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
@@ -29,6 +30,11 @@ fn a_run_is_watched_paused_resumed_and_stopped_from_another_terminal() {
     let run = Underway::new(&lab.path("s"));
     let session = only(&lab.path("s"), ".session.sqlite");
     assert!(socket_of(&session).exists());
+    // The first press that is told of may be a sync press, which is not counted as done.
+    let patience = Instant::now() + Duration::from_secs(60);
+    while status(&session)["live"]["done"].as_u64() == Some(0) {
+        assert!(Instant::now() < patience, "no press was made");
+    }
 
     // Two readers at once, one by the folder.
     let ask = |place: &str| {
