@@ -43,7 +43,25 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("skinrig-compare", &["skinrig-analysis", "skinrig-model"]),
     (
         "skinrig-report",
-        &["skinrig-compare", "skinrig-analysis", "skinrig-model"],
+        &[
+            "skinrig-compare",
+            "skinrig-analysis",
+            "skinrig-model",
+            "skinrig-nightly",
+        ],
+    ),
+    ("skinrig-nightly", &["skinrig-model"]),
+    (
+        "skinrig-hil",
+        &[
+            "skinrig-analysis",
+            "skinrig-controller",
+            "skinrig-device",
+            "skinrig-formats",
+            "skinrig-model",
+            "skinrig-nightly",
+            "skinrig-protocol",
+        ],
     ),
     (
         "skinrig-export",
@@ -72,14 +90,16 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "skinrig-compare",
             "skinrig-report",
             "skinrig-export",
+            "skinrig-nightly",
+            "skinrig-hil",
         ],
     ),
 ];
 
 /// Crates of other people that only some of our crates may know.
 const RESTRICTED: &[(&str, &[&str])] = &[
-    ("sqlx", &["skinrig-recorder"]),
-    ("tokio", &["skinrig-recorder", "skinrig"]),
+    ("sqlx", &["skinrig-recorder", "skinrig-hil"]),
+    ("tokio", &["skinrig-recorder", "skinrig-hil", "skinrig"]),
     ("serde_yaml", &["skinrig-protocol"]),
     ("serde-saphyr", &["skinrig-protocol"]),
     ("rust-hdf5", &["skinrig-formats"]),
@@ -87,7 +107,7 @@ const RESTRICTED: &[(&str, &[&str])] = &[
     ("zip", &["skinrig-export"]),
     ("clap", &["skinrig"]),
     ("indicatif", &["skinrig"]),
-    ("chrono", &["skinrig", "skinrig-recorder"]),
+    ("chrono", &["skinrig", "skinrig-recorder", "skinrig-hil"]),
     ("rusb", &["skinrig-evk1"]),
     ("neuromorphic-drivers", &["skinrig-evk4"]),
     ("libloading", &["skinrig-omega3"]),

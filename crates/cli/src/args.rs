@@ -772,6 +772,8 @@ pub enum SchemaKind {
     Rig,
     /// Limits (`compare`).
     Limits,
+    /// Suites (`hil run`).
+    Suite,
 }
 
 /// Arguments of `schema`.

@@ -1,6 +1,8 @@
 //! Writes the JSON Schemas that ship beside the files: `cargo run -p skinrig-protocol --example write_schema`.
 
-use skinrig_protocol::{limits_schema_json, rig_schema_json, schedule_schema_json, schema_json};
+use skinrig_protocol::{
+    limits_schema_json, rig_schema_json, schedule_schema_json, schema_json, suite_schema_json,
+};
 
 fn main() -> std::io::Result<()> {
     let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
@@ -12,6 +14,7 @@ fn main() -> std::io::Result<()> {
         ),
         ("protocols/skinrig-limits.schema.json", limits_schema_json()),
         ("hil/rigs/skinrig-rig.schema.json", rig_schema_json()),
+        ("hil/skinrig-suite.schema.json", suite_schema_json()),
     ] {
         std::fs::write(root.join(path), schema)?;
     }

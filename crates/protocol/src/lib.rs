@@ -7,8 +7,9 @@
 //! 4. [`Plan::summary`] and [`path_svg`] show it to people.
 //!
 //! [`Schedule`] describes a recording that was made without skinrig, for imports; [`RigFile`] a bench; [`Limits`] how much
-//! is a difference in a comparison. The keys of each language stand in a table, which also yields its JSON Schema
-//! ([`schema_json`], [`schedule_schema_json`], [`rig_schema_json`], [`limits_schema_json`]).
+//! is a difference in a comparison; [`Suite`] what a bench is checked for. The keys of each language stand in a table, which
+//! also yields its JSON Schema ([`schema_json`], [`schedule_schema_json`], [`rig_schema_json`], [`limits_schema_json`],
+//! [`suite_schema_json`]).
 
 pub mod area;
 mod build;
@@ -32,6 +33,7 @@ pub mod schedule;
 mod schema;
 mod shape;
 mod source;
+pub mod suite;
 pub mod summary;
 pub mod surface;
 mod surface_check;
@@ -52,8 +54,11 @@ pub use remaining::Route;
 pub use retakes::Retakes;
 pub use rig::{RigFile, RigKind};
 pub use schedule::{PressPhases, Schedule};
-pub use schema::{limits_schema_json, rig_schema_json, schedule_schema_json, schema_json};
+pub use schema::{
+    limits_schema_json, rig_schema_json, schedule_schema_json, schema_json, suite_schema_json,
+};
 pub use source::Location;
+pub use suite::Suite;
 pub use summary::PlanSummary;
 pub use surface::{Surface, TouchSearch};
 pub use surface_check::SurfaceCheck;

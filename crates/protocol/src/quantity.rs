@@ -39,6 +39,8 @@ pub enum Dimension {
     Share,
     /// Degrees Celsius.
     Temperature,
+    /// Parts per million.
+    Drift,
 }
 
 impl Dimension {
@@ -84,11 +86,12 @@ impl Dimension {
             Self::DataRate => &[("B/s", 1.0), ("kB/s", 1e3), ("MB/s", 1e6), ("GB/s", 1e9)],
             Self::Share => &[("%", 1.0)],
             Self::Temperature => &[("degC", 1.0), ("°C", 1.0)],
+            Self::Drift => &[("ppm", 1.0)],
         }
     }
 
     /// All dimensions.
-    const ALL: [Self; 15] = [
+    const ALL: [Self; 16] = [
         Self::Length,
         Self::Time,
         Self::Speed,
@@ -104,6 +107,7 @@ impl Dimension {
         Self::DataRate,
         Self::Share,
         Self::Temperature,
+        Self::Drift,
     ];
 
     /// `a length`, `a time`, ...
@@ -125,6 +129,7 @@ impl Dimension {
             Self::DataRate => "a data rate",
             Self::Share => "a share",
             Self::Temperature => "a temperature",
+            Self::Drift => "a drift",
         }
     }
 
@@ -153,6 +158,7 @@ impl Dimension {
             Self::DataRate => "20 MB/s",
             Self::Share => "2 %",
             Self::Temperature => "60 degC",
+            Self::Drift => "50 ppm",
         }
     }
 }

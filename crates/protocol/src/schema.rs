@@ -1,4 +1,4 @@
-//! JSON Schema (draft 2020-12) of protocols, schedules and rig files, from the same tables that read them.
+//! JSON Schema (draft 2020-12) of protocols, schedules, rig files, limits and suites, from the same tables that read them.
 
 use std::collections::BTreeMap;
 
@@ -30,6 +30,12 @@ pub fn rig_schema_json() -> String {
 #[must_use]
 pub fn limits_schema_json() -> String {
     render(&crate::limits::LIMITS, "skinrig limits")
+}
+
+/// The JSON Schema of a suite for `skinrig hil run`.
+#[must_use]
+pub fn suite_schema_json() -> String {
+    render(&crate::suite::keys::SUITE, "skinrig suite")
 }
 
 fn render(table: &'static Table, title: &str) -> String {

@@ -87,7 +87,7 @@ pub(crate) fn open(
 }
 
 /// Our languages: name of the table, key of the version, and what a file of it is in another one's place.
-const LANGUAGES: [(&str, &str, &str); 4] = [
+const LANGUAGES: [(&str, &str, &str); 5] = [
     ("protocol", "skinrig", "a protocol"),
     (
         "schedule",
@@ -99,6 +99,11 @@ const LANGUAGES: [(&str, &str, &str); 4] = [
         "limits",
         "skinrig_limits",
         "a file of limits, which only `skinrig compare` reads",
+    ),
+    (
+        "suite",
+        "skinrig_suite",
+        "a suite, which only `skinrig hil run` reads",
     ),
 ];
 

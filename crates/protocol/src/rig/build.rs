@@ -6,7 +6,7 @@ use sha2::{Digest, Sha256};
 use skinrig_model::HostDuration;
 
 use super::keys::RIG;
-use super::{Environment, PreflightLimits, RigFile, RigKind, camera, frame, robot};
+use super::{Environment, PreflightLimits, RigFile, RigKind, camera, frame, hil, robot};
 use crate::build::{hex, open};
 use crate::diagnostic::{Collector, Diagnostics};
 use crate::shape::{Field, Value};
@@ -103,6 +103,7 @@ fn assemble(root: &Field, places: &Places<'_>, out: &mut Collector) -> Option<Ri
         camera::wired(cameras, device, out);
     }
     let press = root.get("press").map(surface);
+    let hil = root.get("hil").and_then(|f| hil::hil(f, places, out));
     if let (Some(frame), Some(limits)) = (&frame, &limits) {
         inside(frame, limits, root, out);
     }
@@ -124,6 +125,7 @@ fn assemble(root: &Field, places: &Places<'_>, out: &mut Collector) -> Option<Ri
         trigger_box: trigger_box.map_or(Some(None), |b| b.map(Some))?,
         preflight: preflight?,
         surface: press.map_or(Some(None), |p| p.map(Some))?,
+        hil: hil?,
     })
 }
 

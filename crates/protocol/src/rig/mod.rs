@@ -5,6 +5,7 @@ mod camera;
 mod date;
 mod fit;
 mod frame;
+mod hil;
 pub(crate) mod keys;
 mod robot;
 
@@ -15,6 +16,7 @@ use serde::Serialize;
 use skinrig_model::{CameraModel, HostDuration, Point3, RigidTransform, Robot, Skin};
 
 pub use date::Date;
+pub use hil::{Drill, HilSetup, Lamps};
 
 use crate::diagnostic::Diagnostics;
 use crate::surface::Surface;
@@ -53,6 +55,8 @@ pub struct RigFile {
     pub preflight: PreflightLimits,
     /// How presses find the surface, when the protocol does not say.
     pub surface: Option<Surface>,
+    /// What a suite of checks may do.
+    pub hil: HilSetup,
 }
 
 /// Whether hardware stands behind the drivers.

@@ -78,6 +78,12 @@ pub(crate) static RIG: Table = Table {
             Shape::Map(&crate::surface::PRESS),
             "How the surface is found, when the protocol does not say; absent: the frame is trusted.",
         ),
+        default(
+            "hil",
+            Shape::Map(&HIL),
+            "{}",
+            "What a suite of checks may do on this bench.",
+        ),
     ],
     exactly_one: &[],
 };
@@ -89,6 +95,60 @@ const KINDS: &[Word] = &[
         "production drivers over stand-ins for the hardware; everything recorded says so",
     ),
 ];
+
+static HIL: Table = Table {
+    name: "hil",
+    doc: "What a suite of checks (`skinrig hil run`) may do on this bench.",
+    keys: &[
+        default(
+            "drills",
+            Shape::List {
+                of: &Shape::Choice(DRILLS),
+                min: 0,
+                max: 2,
+            },
+            "[]",
+            "Drills that this bench permits. Emulated benches permit all.",
+        ),
+        optional(
+            "light",
+            Shape::Map(&LIGHT),
+            "Programs that switch the bench's lamps; absent: noise in the dark is not measured.",
+        ),
+    ],
+    exactly_one: &[],
+};
+
+const DRILLS: &[Word] = &[
+    (
+        "watchdog",
+        "the program that holds the arm in free air is killed",
+    ),
+    (
+        "stop",
+        "the arm is stopped in the middle of a move in free air",
+    ),
+];
+
+const PROGRAM: Shape = Shape::List {
+    of: &Shape::Text,
+    min: 1,
+    max: 20,
+};
+
+static LIGHT: Table = Table {
+    name: "light",
+    doc: "Programs that switch the lamps. Each is run without a shell, must end with 0 within 10 s, and leaves the lamps as its name says.",
+    keys: &[
+        required(
+            "dark",
+            PROGRAM,
+            "Switches the lamps off: a program and its arguments; `${NAME}` is looked up in the environment.",
+        ),
+        required("lit", PROGRAM, "Switches them on."),
+    ],
+    exactly_one: &[],
+};
 
 static FRAME: Table = Table {
     name: "rig_frame",

@@ -1,0 +1,166 @@
+//! Verdicts, from a single measurement up to a night, and the code that a night ends with.
+
+use serde::{Deserialize, Serialize};
+use skinrig_model::{Limit, Side};
+
+use crate::rules::Cause;
+
+/// What is said of a measurement, of everything above it, and of the night. In the order of their weight: of several, the last
+/// one holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "SCREAMING_SNAKE_CASE")]
+pub enum Verdict {
+    /// Not made, for a stated reason. Weighs nothing: what was made decides.
+    Skipped,
+    /// Within its limit.
+    Pass,
+    /// Within its limit and nearer to it than the margin, or passed only when repeated.
+    Marginal,
+    /// Too little data to say.
+    Inconclusive,
+    /// Beyond its limit, or not measured.
+    Fail,
+    /// The rig was at fault: what was measured says nothing about what it was meant to measure.
+    Invalid,
+}
+
+impl Verdict {
+    /// As people read it: `PASS`.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Skipped => "SKIPPED",
+            Self::Pass => "PASS",
+            Self::Marginal => "MARGINAL",
+            Self::Inconclusive => "INCONCLUSIVE",
+            Self::Fail => "FAIL",
+            Self::Invalid => "INVALID",
+        }
+    }
+
+    /// All of them, in the order of their weight.
+    pub const ALL: [Self; 6] = [
+        Self::Skipped,
+        Self::Pass,
+        Self::Marginal,
+        Self::Inconclusive,
+        Self::Fail,
+        Self::Invalid,
+    ];
+
+    /// Whether nothing needs to be done: passed, marginal or skipped.
+    #[must_use]
+    pub const fn is_good(self) -> bool {
+        matches!(self, Self::Skipped | Self::Pass | Self::Marginal)
+    }
+
+    /// The worst of `children`. A parent without children was not measured: FAIL.
+    #[must_use]
+    pub fn worst(children: impl IntoIterator<Item = Self>) -> Self {
+        children.into_iter().max().unwrap_or(Self::Fail)
+    }
+
+    /// The verdict on a measured `value` (`None`: not measured) from `n` samples of which `needed` are too few, under `limit`
+    /// (`None`: for the record, and always PASS).
+    #[must_use]
+    pub fn on(value: Option<f64>, n: Option<u64>, needed: u64, limit: Option<&Limit>) -> Self {
+        let Some(limit) = limit else {
+            return Self::Pass;
+        };
+        match value {
+            _ if n.is_some_and(|n| n < needed) => Self::Inconclusive,
+            Some(value) if value.is_finite() => match limit.side(value) {
+                Side::Within => Self::Pass,
+                Side::Near => Self::Marginal,
+                Side::Beyond => Self::Fail,
+            },
+            // Unmeasured, or no number: what was asked for is not known to hold.
+            _ => Self::Fail,
+        }
+    }
+}
+
+/// How a night ends. The numbers are part of the interface and do not change; 2 is bad input, before a night begins.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[repr(u8)]
+pub enum NightExit {
+    /// Every check passed, was marginal, or was skipped for a stated reason.
+    Pass = 0,
+    /// A limit was broken, or too little was measured.
+    Fail = 1,
+    /// Nothing but the computer, its disk, its cables or its permissions is at fault.
+    Infrastructure = 3,
+    /// A device of the rig was at fault: the night says nothing about the skin.
+    Invalid = 4,
+}
+
+impl NightExit {
+    /// The code for a night of which each check ended with this verdict and cause.
+    #[must_use]
+    pub fn of(checks: impl IntoIterator<Item = (Verdict, Option<Cause>)>) -> Self {
+        let bad: Vec<_> = checks.into_iter().filter(|(v, _)| !v.is_good()).collect();
+        if bad.is_empty() {
+            Self::Pass
+        } else if bad.iter().any(|(v, _)| *v == Verdict::Invalid) {
+            Self::Invalid
+        } else if bad.iter().all(|(_, c)| *c == Some(Cause::Infrastructure)) {
+            Self::Infrastructure
+        } else {
+            Self::Fail
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_worst_child_wins_and_nothing_measured_is_a_failure() {
+        use Verdict::*;
+        assert_eq!(Verdict::worst([]), Fail);
+        assert_eq!(Verdict::worst([Skipped]), Skipped);
+        assert_eq!(Verdict::worst([Pass, Skipped]), Pass);
+        assert_eq!(Verdict::worst([Marginal, Pass, Inconclusive]), Inconclusive);
+        assert_eq!(Verdict::worst([Fail, Invalid, Pass]), Invalid);
+        let limit = Limit::at_most(1.0).with_margin(0.25);
+        for (value, n, verdict) in [
+            (Some(0.5), None, Pass),
+            (Some(0.8), None, Marginal),
+            (Some(1.1), None, Fail),
+            (Some(f64::NAN), None, Fail),
+            (Some(f64::NEG_INFINITY), None, Fail),
+            (None, None, Fail),
+            (Some(0.5), Some(2), Inconclusive),
+            (Some(0.5), Some(3), Pass),
+        ] {
+            assert_eq!(Verdict::on(value, n, 3, Some(&limit)), verdict, "{value:?}");
+        }
+        assert_eq!(Verdict::on(None, None, 3, None), Pass);
+    }
+
+    #[test]
+    fn a_broken_limit_is_not_hidden_behind_the_infrastructure_nor_behind_a_pass() {
+        use Verdict::*;
+        let infra = Some(Cause::Infrastructure);
+        let skin = Some(Cause::Skin);
+        assert_eq!(
+            NightExit::of([(Pass, None), (Skipped, None)]),
+            NightExit::Pass
+        );
+        assert_eq!(NightExit::of([(Pass, None), (Fail, skin)]), NightExit::Fail);
+        assert_eq!(
+            NightExit::of([(Fail, infra), (Fail, skin)]),
+            NightExit::Fail
+        );
+        assert_eq!(
+            NightExit::of([(Fail, infra), (Pass, None)]),
+            NightExit::Infrastructure
+        );
+        assert_eq!(NightExit::of([(Inconclusive, None)]), NightExit::Fail);
+        assert_eq!(
+            NightExit::of([(Fail, skin), (Invalid, Some(Cause::Rig))]),
+            NightExit::Invalid
+        );
+    }
+}

@@ -1,0 +1,54 @@
+//! The checks, each over device traits alone.
+
+mod clocks;
+mod contact;
+mod disk;
+mod drills;
+mod golden;
+mod identity;
+mod noise;
+mod robot;
+mod settings;
+mod stream;
+mod trigger;
+
+use skinrig_nightly::Cause;
+use skinrig_protocol::suite::{Check, Measure};
+
+use crate::bench::Bench;
+use crate::findings::Findings;
+
+/// Makes `check` once. Devices may stay open; the robot is braked and the cameras are stopped in the end.
+pub fn make(check: &Check, bench: &mut dyn Bench) -> Findings {
+    let mut found = Findings::default();
+    let make: fn(&Check, &mut dyn Bench, &mut Findings) = match &check.measure {
+        Measure::Identity => identity::identity,
+        Measure::Settings => settings::settings,
+        Measure::Disk { .. } => disk::disk,
+        Measure::TriggerLoopback { .. } => trigger::trigger_loopback,
+        Measure::Clocks { .. } => clocks::clocks,
+        Measure::Idle { .. } => stream::idle,
+        Measure::TestPattern { .. } => stream::test_pattern,
+        Measure::Noise { .. } => noise::noise,
+        Measure::RobotState => robot::robot_state,
+        Measure::Repeatability { .. } => robot::repeatability,
+        Measure::StepResponse { .. } => robot::step_response,
+        Measure::Depth { .. } => contact::depth,
+        Measure::ForceCeiling { .. } => contact::force_ceiling,
+        Measure::Golden { .. } => golden::golden,
+        Measure::WatchdogDrill => drills::watchdog,
+        Measure::StopDrill => drills::stop,
+    };
+    make(check, bench, &mut found);
+    found
+}
+
+/// What a limit that is broken without any other evidence speaks of.
+#[must_use]
+pub const fn about(measure: &Measure) -> Cause {
+    match measure {
+        Measure::Golden { .. } => Cause::Skin,
+        Measure::Disk { .. } => Cause::Infrastructure,
+        _ => Cause::Rig,
+    }
+}

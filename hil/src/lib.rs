@@ -1,0 +1,11 @@
+//! The nightly suite on a bench: what is measured on each device, in which order, and for how long.
+//!
+//! A check ([`checks::make`]) asks a [`Bench`] for devices, which it knows by their traits alone, and fills a [`Findings`]: values, and
+//! evidence of whatever kept it from measuring. It never judges: limits, verdicts and causes are `skinrig-nightly`'s.
+
+pub mod bench;
+pub mod checks;
+pub mod findings;
+
+pub use bench::{Bench, Devices, Drilled, GoldenRun, Slot, Trouble};
+pub use findings::Findings;
