@@ -123,6 +123,17 @@ impl PixelGrid {
         self.counts[index as usize]
     }
 
+    /// Events per column.
+    #[must_use]
+    pub fn columns(&self) -> [u32; Self::WIDTH] {
+        let mut sums = [0; Self::WIDTH];
+        // Row by row, side by side: no sum is above that of all events.
+        for row in self.counts.chunks_exact(Self::WIDTH) {
+            sums.iter_mut().zip(row).for_each(|(sum, n)| *sum += n);
+        }
+        sums
+    }
+
     /// The pixels with events of one row, counted from the crop's first: the first 64 in the first word.
     pub(crate) fn occupied(&self, row: usize) -> &[u64] {
         self.occupied.row(row)

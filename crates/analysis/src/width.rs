@@ -11,15 +11,6 @@ const LEAST_SIGMAS: f64 = 10.0;
 /// The idle rate is taken to be spread evenly over the columns. `None` when the press added fewer events than ten standard
 /// errors of the count.
 pub(crate) fn width_u(grid: &PixelGrid, idle_events: u64, window: &Window) -> Option<f64> {
-    let mut columns = vec![0.0; PixelGrid::WIDTH];
-    for row in 0..grid.height() {
-        let occupied = grid.occupied(row);
-        for (column, count) in grid.row(row).iter().enumerate() {
-            if occupied[column / 64] >> (column % 64) & 1 == 1 {
-                columns[column] += f64::from(*count);
-            }
-        }
-    }
     let idle = if window.idle_s() > 0.0 {
         idle_events as f64 * window.length_s() / window.idle_s()
     } else {
@@ -31,7 +22,7 @@ pub(crate) fn width_u(grid: &PixelGrid, idle_events: u64, window: &Window) -> Op
         return None;
     }
     let each = idle / PixelGrid::WIDTH as f64;
-    columns.iter_mut().for_each(|count| *count -= each);
+    let columns = grid.columns().map(|count| f64::from(count) - each);
     shortest(&columns, added / 2.0).map(|columns| columns as f64)
 }
 
