@@ -92,6 +92,12 @@ pub trait Bench {
     /// Where sessions go: the folder whose disk is checked.
     fn folder(&self) -> &Path;
 
+    /// Whether everything is to end soon: ctrl-C, or the system's polite end. Checks look at it while they wait or move, and
+    /// come back with what they have; the runner says why.
+    fn stop_asked(&self) -> bool {
+        false
+    }
+
     /// How late stand-ins that share this computer's processors may be; zero on a bench of hardware.
     fn patience(&self) -> HostDuration;
 }

@@ -48,6 +48,8 @@ pub enum EvidenceKind {
     HostLate,
     /// Time ran out: that of the check or that of the suite.
     TimeOut,
+    /// Somebody ended the suite: ctrl-C, or the system's polite end.
+    Stopped,
     /// The bench belongs to somebody else, or was taken away.
     Lease,
     /// A session could not be analysed, or the audit of its plausibility found something.
@@ -56,6 +58,57 @@ pub enum EvidenceKind {
     TooLittle,
     /// A fault of this program.
     Software,
+}
+
+impl EvidenceKind {
+    /// All of them.
+    pub const ALL: [Self; 19] = [
+        Self::Absent,
+        Self::NotPermitted,
+        Self::Busy,
+        Self::DeviceLost,
+        Self::OtherDevice,
+        Self::ReadBack,
+        Self::State,
+        Self::Refused,
+        Self::DataLost,
+        Self::TriggerFault,
+        Self::Trip,
+        Self::Disk,
+        Self::HostLate,
+        Self::TimeOut,
+        Self::Stopped,
+        Self::Lease,
+        Self::Audit,
+        Self::TooLittle,
+        Self::Software,
+    ];
+
+    /// As people read it.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Absent => "absent",
+            Self::NotPermitted => "not permitted",
+            Self::Busy => "busy",
+            Self::DeviceLost => "device lost",
+            Self::OtherDevice => "other device",
+            Self::ReadBack => "read back",
+            Self::State => "state",
+            Self::Refused => "refused",
+            Self::DataLost => "data lost",
+            Self::TriggerFault => "trigger fault",
+            Self::Trip => "trip",
+            Self::Disk => "disk",
+            Self::HostLate => "computer late",
+            Self::TimeOut => "time ran out",
+            Self::Stopped => "stopped",
+            Self::Lease => "lease",
+            Self::Audit => "audit",
+            Self::TooLittle => "too little",
+            Self::Software => "software",
+        }
+    }
 }
 
 impl Evidence {

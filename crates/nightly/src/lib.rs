@@ -6,11 +6,12 @@
 //! it whether the skin, the rig, the computer or the software is to be looked at.
 
 pub mod evidence;
+pub mod judge;
 pub mod night;
 pub mod rules;
 pub mod verdict;
 
 pub use evidence::{Evidence, EvidenceKind};
 pub use night::{Attempt, CheckResult, Golden, Measurement, Night, Part, Versions};
-pub use rules::{Cause, Ruling};
+pub use rules::{Cause, Rule, Ruling};
 pub use verdict::{NightExit, Verdict};

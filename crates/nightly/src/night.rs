@@ -33,8 +33,14 @@ pub struct Night {
     pub started: String,
     /// How long it took, s.
     pub took_s: f64,
+    /// How long it was planned to take without repeats, s.
+    pub planned_s: f64,
     /// How long it might take, s.
     pub budget_s: f64,
+    /// Whether it came to its end. A night that is under way, or whose program died, is not: what stands in it holds.
+    pub finished: bool,
+    /// Why it ended before its last check, when it did.
+    pub ended_early: Option<String>,
     /// How the lease of the bench was got, when there is something to say: a takeover.
     pub lease_note: Option<String>,
     /// The checks in the order in which they were made.
@@ -78,6 +84,8 @@ pub struct CheckResult {
     pub name: String,
     /// For people.
     pub title: String,
+    /// How long one attempt was planned to take, s.
+    pub planned_s: f64,
     /// Every attempt, in order; none when it was skipped.
     pub attempts: Vec<Attempt>,
     /// Why it was not made.
@@ -90,6 +98,8 @@ pub struct CheckResult {
     pub cause: Option<Cause>,
     /// The rule that told the cause.
     pub rule: Option<String>,
+    /// Other checks of the night that the rule relies on.
+    pub witnesses: Vec<String>,
 }
 
 /// One attempt at a check.
@@ -105,6 +115,10 @@ pub struct Attempt {
     pub evidence: Vec<Evidence>,
     /// The worst of the parts', after the rules over the evidence.
     pub verdict: Verdict,
+    /// Where to look, when it is not good.
+    pub cause: Option<Cause>,
+    /// The rule that told the cause; `None`: a limit was broken, and nothing was seen that explains it.
+    pub rule: Option<String>,
 }
 
 /// What an attempt says of one device.
@@ -114,7 +128,7 @@ pub struct Part {
     pub subject: String,
     /// In the order of the suite's metrics.
     pub measurements: Vec<Measurement>,
-    /// The worst of the measurements'.
+    /// The worst of the measurements', before the rules over the evidence.
     pub verdict: Verdict,
 }
 
@@ -141,7 +155,22 @@ pub struct Measurement {
     pub note: Option<String>,
 }
 
+impl Part {
+    /// Whether something was measured beyond its limit, other than not measured at all.
+    #[must_use]
+    pub fn is_broken(&self) -> bool {
+        let measured = |m: &Measurement| m.verdict == Verdict::Fail && m.value.is_some();
+        self.measurements.iter().any(measured)
+    }
+}
+
 impl Night {
+    /// Tells verdict and exit from the checks.
+    pub fn conclude(&mut self) {
+        self.verdict = Verdict::worst(self.checks.iter().map(|c| c.verdict));
+        self.exit = NightExit::of(self.checks.iter().map(|c| (c.verdict, c.cause)));
+    }
+
     /// The last attempt's measurements, each with the name of its series: `check/subject/metric`.
     pub fn series(&self) -> impl Iterator<Item = (String, &Measurement)> {
         self.checks.iter().flat_map(|check| {

@@ -1,8 +1,9 @@
-//! Where to look when a check is not good: rules over the evidence, each with its name and its reason.
+//! Where to look when something is not good: rules over the evidence, each with its name and its reason.
 
 use serde::{Deserialize, Serialize};
 
 use crate::evidence::{Evidence, EvidenceKind};
+use crate::night::CheckResult;
 use crate::verdict::Verdict;
 
 /// What is at fault.
@@ -19,14 +20,27 @@ pub enum Cause {
     Software,
 }
 
+impl Cause {
+    /// As people read it.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Infrastructure => "infrastructure",
+            Self::Rig => "rig",
+            Self::Skin => "skin",
+            Self::Software => "software",
+        }
+    }
+}
+
 /// What the rules make of a verdict.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Ruling {
     /// The verdict with the evidence in mind.
     pub verdict: Verdict,
-    /// Where to look.
+    /// Where to look; `None` when it is good.
     pub cause: Option<Cause>,
-    /// The rule that said so.
+    /// The rule that said so; `None`: a limit was broken, and nothing was seen that explains it.
     pub rule: Option<&'static str>,
 }
 
@@ -37,9 +51,9 @@ pub struct Rule {
     pub name: &'static str,
     /// Evidence of these kinds speaks for it.
     pub seen: &'static [EvidenceKind],
-    /// Where to look then.
-    pub cause: Cause,
-    /// What becomes of a verdict that is not good.
+    /// Where to look then; `None`: at what the check is about.
+    pub cause: Option<Cause>,
+    /// What becomes of a verdict that is not good. INCONCLUSIVE explains what was not measured, and no broken limit.
     pub verdict: Verdict,
     /// Why, for people.
     pub reason: &'static str,
@@ -50,7 +64,7 @@ pub const RULES: &[Rule] = &[
     Rule {
         name: "software-fault",
         seen: &[EvidenceKind::Software],
-        cause: Cause::Software,
+        cause: Some(Cause::Software),
         verdict: Verdict::Fail,
         reason: "this program failed; nothing is known about the bench",
     },
@@ -62,14 +76,14 @@ pub const RULES: &[Rule] = &[
             EvidenceKind::Busy,
             EvidenceKind::Lease,
         ],
-        cause: Cause::Infrastructure,
+        cause: Some(Cause::Infrastructure),
         verdict: Verdict::Fail,
         reason: "a device could not be reached from this computer: cable, power, permission, or another program",
     },
     Rule {
         name: "computer-held-up",
         seen: &[EvidenceKind::Disk, EvidenceKind::HostLate],
-        cause: Cause::Infrastructure,
+        cause: Some(Cause::Infrastructure),
         verdict: Verdict::Fail,
         reason: "the computer did not keep up",
     },
@@ -81,27 +95,68 @@ pub const RULES: &[Rule] = &[
             EvidenceKind::ReadBack,
             EvidenceKind::State,
             EvidenceKind::Refused,
-            EvidenceKind::TriggerFault,
             EvidenceKind::DataLost,
+            EvidenceKind::TriggerFault,
             EvidenceKind::Trip,
         ],
-        cause: Cause::Rig,
+        cause: Some(Cause::Rig),
         verdict: Verdict::Invalid,
         reason: "a device of the rig was at fault; what was measured with it says nothing about the skin",
     },
     Rule {
-        name: "too-little",
-        seen: &[EvidenceKind::TooLittle, EvidenceKind::TimeOut],
-        cause: Cause::Infrastructure,
+        name: "not-plausible",
+        seen: &[EvidenceKind::Audit],
+        cause: None,
+        verdict: Verdict::Fail,
+        reason: "the session of the golden skin could not be analysed, or its numbers contradict one another",
+    },
+    Rule {
+        name: "ended-early",
+        seen: &[EvidenceKind::Stopped, EvidenceKind::TimeOut],
+        cause: Some(Cause::Infrastructure),
         verdict: Verdict::Inconclusive,
-        reason: "too little was measured to say",
+        reason: "somebody ended the suite, or its time ran out, before this was measured",
+    },
+    Rule {
+        name: "too-little",
+        seen: &[EvidenceKind::TooLittle],
+        cause: None,
+        verdict: Verdict::Inconclusive,
+        reason: "too few samples to say",
     },
 ];
 
-/// What `evidence` makes of `verdict` on a check that is about `about`. A good verdict stays: evidence explains a failure, it
-/// does not make one. Without evidence a broken limit speaks of what the check is about.
+/// The rule across the checks of one night. Its evidence is other checks, not a kind of [`Evidence`].
+pub const GOLDEN_ON_A_BAD_RIG: Rule = Rule {
+    name: "golden-on-a-bad-rig",
+    seen: &[],
+    cause: Some(Cause::Rig),
+    verdict: Verdict::Invalid,
+    reason: "a device that the golden campaign relies on was found at fault in the same night",
+};
+
+/// What a verdict is about.
+#[derive(Debug, Clone, Copy)]
+pub struct Case<'a> {
+    /// Before the rules.
+    pub verdict: Verdict,
+    /// Something was measured beyond its limit, other than not measured at all.
+    pub broken: bool,
+    /// What a broken limit speaks of when nothing else was seen.
+    pub about: Cause,
+    /// What was seen.
+    pub evidence: &'a [&'a Evidence],
+}
+
+/// What the evidence makes of a verdict. A good one stays: evidence explains a failure, it does not make one.
 #[must_use]
-pub fn rule(verdict: Verdict, about: Cause, evidence: &[Evidence]) -> Ruling {
+pub fn rule(case: &Case<'_>) -> Ruling {
+    let Case {
+        verdict,
+        broken,
+        about,
+        evidence,
+    } = *case;
     if verdict.is_good() {
         return Ruling {
             verdict,
@@ -109,7 +164,10 @@ pub fn rule(verdict: Verdict, about: Cause, evidence: &[Evidence]) -> Ruling {
             rule: None,
         };
     }
-    let speaks = |rule: &&Rule| evidence.iter().any(|e| rule.seen.contains(&e.kind));
+    let speaks = |rule: &&Rule| {
+        let explains = rule.verdict != Verdict::Inconclusive || !broken;
+        explains && evidence.iter().any(|e| rule.seen.contains(&e.kind))
+    };
     RULES.iter().find(speaks).map_or(
         Ruling {
             verdict,
@@ -118,8 +176,53 @@ pub fn rule(verdict: Verdict, about: Cause, evidence: &[Evidence]) -> Ruling {
         },
         |rule| Ruling {
             verdict: rule.verdict,
-            cause: Some(rule.cause),
+            cause: Some(rule.cause.unwrap_or(about)),
             rule: Some(rule.name),
         },
     )
+}
+
+/// Checks of whose devices the golden campaign makes use, by name: when one of them is the rig's fault, a golden skin beyond its
+/// limits says nothing about the skin. The drills come after it and ask about the arm's brakes alone; the disk is the computer's.
+pub const WITNESSES: &[&str] = &[
+    "identity",
+    "settings",
+    "trigger_loopback",
+    "clocks",
+    "idle",
+    "noise_dark",
+    "noise_lit",
+    "test_pattern",
+    "robot_state",
+    "repeatability",
+    "step_response",
+    "depth",
+    "force_ceiling",
+];
+
+/// The rules across the checks of one night: what other checks found changes what the golden skin's mean.
+pub fn across(checks: &mut [CheckResult]) {
+    let at_fault = |c: &&CheckResult| {
+        WITNESSES.contains(&c.name.as_str())
+            && !c.verdict.is_good()
+            && c.cause == Some(Cause::Rig)
+            && c.attempts.iter().any(|a| !a.parts.is_empty())
+    };
+    let witnesses: Vec<String> = checks
+        .iter()
+        .filter(at_fault)
+        .map(|c| c.name.clone())
+        .collect();
+    if witnesses.is_empty() {
+        return;
+    }
+    for golden in checks.iter_mut().filter(|c| c.name == "golden") {
+        if golden.verdict.is_good() || golden.cause != Some(Cause::Skin) {
+            continue;
+        }
+        golden.verdict = GOLDEN_ON_A_BAD_RIG.verdict;
+        golden.cause = GOLDEN_ON_A_BAD_RIG.cause;
+        golden.rule = Some(GOLDEN_ON_A_BAD_RIG.name.to_owned());
+        golden.witnesses.clone_from(&witnesses);
+    }
 }
