@@ -6,6 +6,7 @@
 pub mod bench;
 pub mod checks;
 pub mod findings;
+pub mod history;
 pub mod trouble;
 
 pub use bench::{Bench, Devices, Drilled, GoldenRun, Slot, Trouble};

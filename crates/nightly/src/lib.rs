@@ -9,6 +9,7 @@ pub mod evidence;
 pub mod judge;
 pub mod night;
 pub mod rules;
+pub mod trend;
 pub mod verdict;
 
 pub use evidence::{Evidence, EvidenceKind};

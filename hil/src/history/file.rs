@@ -1,0 +1,123 @@
+//! How a history file is opened: which file is one, and how two programs share it.
+
+use std::fs::File;
+use std::io::{ErrorKind, Read};
+use std::path::Path;
+use std::time::Duration;
+
+use sqlx::migrate::Migrator;
+use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection, SqliteJournalMode, SqliteSynchronous};
+use sqlx::{ConnectOptions, Connection, Row, Sqlite, Transaction};
+
+use super::error::{Fault, HistoryError};
+
+/// The schema version that this program writes, and the newest that it reads (`PRAGMA user_version`).
+pub const HISTORY_SCHEMA_VERSION: u32 = 1;
+/// `skrh` in ASCII (`PRAGMA application_id`).
+pub const HISTORY_APPLICATION_ID: u32 = u32::from_be_bytes(*b"skrh");
+
+static MIGRATOR: Migrator = sqlx::migrate!("../migrations/history");
+
+/// How long to wait for another program that writes. A write takes milliseconds.
+const BUSY: Duration = Duration::from_secs(30);
+
+/// Opens a history, after a look at its first page. `create`: one that is not there yet begins empty.
+pub(super) async fn open(path: &Path, create: bool) -> Result<SqliteConnection, HistoryError> {
+    let is_new = !check_first_page(path)?;
+    if is_new && !create {
+        return Err(HistoryError::Missing {
+            path: path.to_owned(),
+        });
+    }
+    let mut conn = SqliteConnectOptions::new()
+        .filename(path)
+        .create_if_missing(create)
+        // One file, and nothing beside it when nobody writes: it can be copied.
+        .journal_mode(SqliteJournalMode::Delete)
+        .synchronous(SqliteSynchronous::Extra)
+        .foreign_keys(true)
+        .busy_timeout(BUSY)
+        .thread_name(|_| "history-sqlite".to_owned())
+        .connect()
+        .await
+        .map_err(|e| Fault::from(e).at(path, "opening it"))?;
+    let sound = check_sound(&mut conn).await;
+    sound.map_err(|fault| fault.at(path, "checking it"))?;
+    Ok(conn)
+}
+
+/// A transaction in which nobody else writes, with the schema of this program.
+pub(super) async fn begin(conn: &mut SqliteConnection) -> Result<Transaction<'_, Sqlite>, Fault> {
+    // Locked from its first statement: of two programs that begin a file together, one makes the schema and the other waits.
+    let mut all = conn.begin_with("BEGIN IMMEDIATE").await?;
+    let done = MIGRATOR.run(&mut *all).await;
+    done.map_err(sqlx::Error::from)?;
+    Ok(all)
+}
+
+async fn check_sound(conn: &mut SqliteConnection) -> Result<(), Fault> {
+    // Names that are no text, over which the SQLite client would panic.
+    let sql = "SELECT CAST(coalesce(sql, '') AS BLOB) AS sql FROM sqlite_schema";
+    for row in sqlx::query(sql).fetch_all(&mut *conn).await? {
+        let text: Vec<u8> = row.try_get("sql")?;
+        if std::str::from_utf8(&text).is_err() {
+            return Err(Fault::damaged("schema", "UTF-8 text", "other bytes"));
+        }
+    }
+    let said: String = sqlx::query_scalar("PRAGMA quick_check(1)")
+        .fetch_one(conn)
+        .await?;
+    if said == "ok" {
+        return Ok(());
+    }
+    Err(Fault::Damaged(said))
+}
+
+/// True for a history, false for nothing at all. Layout: sqlite.org/fileformat.html section 1.3.
+fn check_first_page(path: &Path) -> Result<bool, HistoryError> {
+    let io = |source| HistoryError::Io {
+        path: path.to_owned(),
+        doing: "reading it",
+        source,
+    };
+    let foreign = |found: &str| {
+        Err(HistoryError::Foreign {
+            path: path.to_owned(),
+            found: found.to_owned(),
+        })
+    };
+    let file = match File::open(path) {
+        Ok(file) => file,
+        Err(e) if e.kind() == ErrorKind::NotFound => return Ok(false),
+        Err(e) => return Err(io(e)),
+    };
+    if file.metadata().map_err(io)?.is_dir() {
+        return foreign("a folder");
+    }
+    let mut page = Vec::new();
+    file.take(100).read_to_end(&mut page).map_err(io)?;
+    if page.is_empty() {
+        // Another program has just begun it.
+        return Ok(false);
+    }
+    if page.len() < 100 || !page.starts_with(b"SQLite format 3\0") {
+        return foreign("a file that is not SQLite");
+    }
+    let number = |at: usize| {
+        page[at..at + 4]
+            .iter()
+            .fold(0, |all, byte| all << 8 | u32::from(*byte))
+    };
+    let (version, application) = (number(60), number(68));
+    if application != HISTORY_APPLICATION_ID {
+        return foreign("another SQLite file");
+    }
+    if version > HISTORY_SCHEMA_VERSION {
+        return Err(HistoryError::Newer {
+            path: path.to_owned(),
+            found: version,
+            supported: HISTORY_SCHEMA_VERSION,
+        });
+    }
+    Ok(true)
+}

@@ -1,0 +1,159 @@
+//! Rows of a history, read back.
+
+use std::collections::BTreeMap;
+
+use skinrig_model::Limit;
+use skinrig_nightly::trend::{Acceptance, History, NightHead, Point};
+use skinrig_nightly::{Verdict, Versions};
+use sqlx::Row;
+use sqlx::sqlite::{SqliteConnection, SqliteRow};
+
+use super::Line;
+use super::error::Fault;
+
+/// The benches and suites that the history knows, the one with the newest night first.
+pub(super) async fn lines(conn: &mut SqliteConnection) -> Result<Vec<Line>, Fault> {
+    let rows = sqlx::query(
+        "SELECT rig, suite, count(*) AS nights, max(started) AS newest FROM night GROUP BY rig, suite
+         ORDER BY newest DESC, rig, suite",
+    )
+    .fetch_all(conn)
+    .await?;
+    rows.iter()
+        .map(|row| {
+            Ok(Line {
+                rig: row.try_get("rig")?,
+                suite: row.try_get("suite")?,
+                nights: number(row, "nights")?,
+            })
+        })
+        .collect()
+}
+
+/// Everything of one bench and suite.
+pub(super) async fn history(
+    conn: &mut SqliteConnection,
+    rig: &str,
+    suite: &str,
+) -> Result<History, Fault> {
+    let mut all = History::default();
+    let mut place = BTreeMap::new();
+    let rows = sqlx::query("SELECT * FROM night WHERE rig = ? AND suite = ? ORDER BY started, id")
+        .bind(rig)
+        .bind(suite)
+        .fetch_all(&mut *conn)
+        .await?;
+    for row in &rows {
+        place.insert(row.try_get::<i64, _>("id")?, all.nights.len());
+        all.nights.push(head(row)?);
+    }
+    let rows = sqlx::query("SELECT * FROM firmware ORDER BY night, device")
+        .fetch_all(&mut *conn)
+        .await?;
+    for row in &rows {
+        if let Some(&at) = place.get(&row.try_get("night")?) {
+            let device = (row.try_get("device")?, row.try_get("version")?);
+            all.nights[at].versions.firmware.push(device);
+        }
+    }
+    points(conn, &place, &mut all).await?;
+    let rows = sqlx::query("SELECT * FROM acceptance WHERE rig = ? ORDER BY id")
+        .bind(rig)
+        .fetch_all(conn)
+        .await?;
+    for row in &rows {
+        all.accepted.push(Acceptance {
+            series: row.try_get("series")?,
+            night: row.try_get("night_id")?,
+            reason: row.try_get("reason")?,
+            by: row.try_get("by")?,
+            at: row.try_get("at")?,
+        });
+    }
+    Ok(all)
+}
+
+/// The last attempt's measurements.
+async fn points(
+    conn: &mut SqliteConnection,
+    place: &BTreeMap<i64, usize>,
+    all: &mut History,
+) -> Result<(), Fault> {
+    let rows = sqlx::query(
+        "SELECT m.*, c.attempts FROM measurement m
+         JOIN check_made c ON c.night = m.night AND c.name = m.check_name AND c.attempts = m.attempt
+         JOIN night t ON t.id = m.night
+         ORDER BY t.started, t.id, m.check_name, m.subject, m.metric",
+    )
+    .fetch_all(conn)
+    .await?;
+    for row in &rows {
+        let Some(&night) = place.get(&row.try_get("night")?) else {
+            continue;
+        };
+        let text = |column| row.try_get::<String, _>(column);
+        let name = format!(
+            "{}/{}/{}",
+            text("check_name")?,
+            text("subject")?,
+            text("metric")?
+        );
+        let real = |column| row.try_get::<Option<f64>, _>(column);
+        let limit = real("margin")?.map(|margin| {
+            Ok::<_, Fault>(Limit {
+                at_least: real("at_least")?,
+                at_most: real("at_most")?,
+                margin,
+            })
+        });
+        let point = Point {
+            night,
+            value: real("value")?,
+            interval: real("low")?.zip(real("high")?).map(<[f64; 2]>::from),
+            n: match row.try_get::<Option<i64>, _>("n")? {
+                Some(_) => Some(number(row, "n")?),
+                None => None,
+            },
+            limit: limit.transpose()?,
+            verdict: verdict(row, "verdict")?,
+            part: verdict(row, "part_verdict")?,
+            attempts: number(row, "attempts")?,
+        };
+        all.add(&name, &text("unit")?, point);
+    }
+    Ok(())
+}
+
+fn head(row: &SqliteRow) -> Result<NightHead, Fault> {
+    Ok(NightHead {
+        id: row.try_get("night_id")?,
+        started: row.try_get("started")?,
+        suite: row.try_get("suite")?,
+        suite_sha256: row.try_get("suite_sha256")?,
+        rig: row.try_get("rig")?,
+        rig_kind: row.try_get("rig_kind")?,
+        rig_sha256: row.try_get("rig_sha256")?,
+        versions: Versions {
+            software: row.try_get("software")?,
+            analysis: number(row, "analysis")?,
+            firmware: Vec::new(),
+            skin: row.try_get("skin")?,
+        },
+        verdict: verdict(row, "verdict")?,
+        folder: row.try_get("folder")?,
+        golden: row.try_get("golden")?,
+    })
+}
+
+fn verdict(row: &SqliteRow, column: &str) -> Result<Verdict, Fault> {
+    let name: String = row.try_get(column)?;
+    Verdict::ALL
+        .into_iter()
+        .find(|v| v.name() == name)
+        .ok_or_else(|| Fault::damaged(column, "a verdict", format!("`{}`", name.escape_debug())))
+}
+
+fn number<T: TryFrom<i64>>(row: &SqliteRow, column: &str) -> Result<T, Fault> {
+    let value: i64 = row.try_get(column)?;
+    T::try_from(value).map_err(|_| Fault::damaged(column, "a count", value))
+}

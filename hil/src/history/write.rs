@@ -1,0 +1,147 @@
+//! Rows of a night, written in one transaction.
+
+use sha2::{Digest, Sha256};
+use skinrig_nightly::Night;
+use skinrig_nightly::night::{CheckResult, Measurement, Part};
+use skinrig_nightly::trend::{Acceptance, NightHead};
+use sqlx::{Sqlite, Transaction};
+
+use super::error::Fault;
+
+type Rows<'a> = Transaction<'a, Sqlite>;
+
+/// SHA-256 of the night's JSON, in hexadecimal.
+pub(super) fn digest(night: &Night) -> Result<String, Fault> {
+    let json = serde_json::to_vec(night).map_err(|e| Fault::Damaged(e.to_string()))?;
+    let sum = Sha256::digest(&json);
+    Ok(sum.iter().map(|byte| format!("{byte:02x}")).collect())
+}
+
+/// The digest of the night of this name, when there is one.
+pub(super) async fn known(all: &mut Rows<'_>, head: &NightHead) -> Result<Option<String>, Fault> {
+    let found = sqlx::query_scalar("SELECT sha256 FROM night WHERE rig = ? AND night_id = ?")
+        .bind(&head.rig)
+        .bind(&head.id)
+        .fetch_optional(&mut **all)
+        .await?;
+    Ok(found)
+}
+
+/// Everything of a night.
+pub(super) async fn night(
+    all: &mut Rows<'_>,
+    night: &Night,
+    head: &NightHead,
+    sha256: &str,
+) -> Result<(), Fault> {
+    let versions = &head.versions;
+    let id: i64 = sqlx::query_scalar(
+        "INSERT INTO night (night_id, started, suite, suite_sha256, rig, rig_kind, rig_sha256, software, analysis, skin,
+             verdict, folder, golden, sha256)
+         VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?) RETURNING id",
+    )
+    .bind(&head.id)
+    .bind(&head.started)
+    .bind(&head.suite)
+    .bind(&head.suite_sha256)
+    .bind(&head.rig)
+    .bind(&head.rig_kind)
+    .bind(&head.rig_sha256)
+    .bind(&versions.software)
+    .bind(i64::from(versions.analysis))
+    .bind(&versions.skin)
+    .bind(head.verdict.name())
+    .bind(&head.folder)
+    .bind(&head.golden)
+    .bind(sha256)
+    .fetch_one(&mut **all)
+    .await?;
+    for (device, version) in &versions.firmware {
+        sqlx::query("INSERT INTO firmware (night, device, version) VALUES (?, ?, ?)")
+            .bind(id)
+            .bind(device)
+            .bind(version)
+            .execute(&mut **all)
+            .await?;
+    }
+    for check in &night.checks {
+        self::check(all, id, check).await?;
+    }
+    Ok(())
+}
+
+async fn check(all: &mut Rows<'_>, night: i64, check: &CheckResult) -> Result<(), Fault> {
+    sqlx::query("INSERT INTO check_made (night, name, verdict, attempts) VALUES (?, ?, ?, ?)")
+        .bind(night)
+        .bind(&check.name)
+        .bind(check.verdict.name())
+        .bind(whole(check.attempts.len() as u64))
+        .execute(&mut **all)
+        .await?;
+    for (attempt, made) in (1..).zip(&check.attempts) {
+        for part in &made.parts {
+            for m in &part.measurements {
+                measurement(all, (night, &check.name, attempt), part, m).await?;
+            }
+        }
+    }
+    Ok(())
+}
+
+async fn measurement(
+    all: &mut Rows<'_>,
+    (night, check, attempt): (i64, &str, i64),
+    part: &Part,
+    m: &Measurement,
+) -> Result<(), Fault> {
+    // SQLite has no NaN, and infinity is no value either.
+    let value = m.value.filter(|v| v.is_finite());
+    sqlx::query(
+        "INSERT INTO measurement (night, check_name, attempt, subject, metric, value, unit, at_least, at_most, margin, low, high,
+             n, verdict, part_verdict)
+         VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+    )
+    .bind(night)
+    .bind(check)
+    .bind(attempt)
+    .bind(&part.subject)
+    .bind(&m.metric)
+    .bind(value)
+    .bind(&m.unit)
+    .bind(m.limit.and_then(|l| l.at_least))
+    .bind(m.limit.and_then(|l| l.at_most))
+    .bind(m.limit.map(|l| l.margin))
+    .bind(m.interval.map(|[low, _]| low))
+    .bind(m.interval.map(|[_, high]| high))
+    .bind(m.n.map(whole))
+    .bind(m.verdict.name())
+    .bind(part.verdict.name())
+    .execute(&mut **all)
+    .await?;
+    Ok(())
+}
+
+/// What somebody accepts.
+pub(super) async fn acceptance(
+    all: &mut Rows<'_>,
+    rig: &str,
+    said: &Acceptance,
+) -> Result<(), Fault> {
+    sqlx::query(
+        "INSERT INTO acceptance (rig, night_id, series, reason, by, at) VALUES (?, ?, ?, ?, ?, ?)",
+    )
+    .bind(rig)
+    .bind(&said.night)
+    .bind(&said.series)
+    .bind(&said.reason)
+    .bind(&said.by)
+    .bind(&said.at)
+    .execute(&mut **all)
+    .await?;
+    Ok(())
+}
+
+/// Counts of samples never come near 2^63.
+fn whole(count: u64) -> i64 {
+    i64::try_from(count).unwrap_or(i64::MAX)
+}
