@@ -1,0 +1,195 @@
+//! What a series does when all is well: centre and spread of its reference stretch, robust against odd nights.
+
+use serde::Serialize;
+
+/// A reference of fewer nights says nothing: the series is being learnt.
+pub const FEWEST: usize = 12;
+/// A reference of so many nights takes no more: what comes later is judged by it, however slowly it creeps.
+pub const MOST: usize = 40;
+
+/// A spread below this share of the centre is no spread worth an alarm: metrics that hardly vary would call for changes that matter
+/// to nobody.
+const LEAST_SHARE: f64 = 0.005;
+/// Of a spread: beyond the 90th percentile lie those of a normal variable that are more than 1.2816 standard deviations off.
+const NINE_TENTHS: f64 = 1.281_551_565_5;
+/// Standard deviation of a normal variable over its median absolute deviation.
+const PER_MAD: f64 = 1.482_602_218_5;
+/// The correlation from night to night that is reckoned with, at most.
+const MOST_CORRELATED: f64 = 0.7;
+
+/// A value as the reference takes it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sample {
+    /// The value.
+    pub value: f64,
+    /// Half its 95 % interval, when there is one.
+    pub half_interval: Option<f64>,
+    /// Samples behind it, when it is a share of them.
+    pub of: Option<u64>,
+}
+
+/// What a series does when all is well.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Reference {
+    /// Nights that it is made of.
+    pub nights: usize,
+    /// Median of them.
+    pub centre: f64,
+    /// Spread below the centre, as a standard deviation.
+    pub below: f64,
+    /// Spread above it.
+    pub above: f64,
+    /// Correlation from night to night.
+    pub correlation: f64,
+}
+
+impl Reference {
+    /// The reference made of `samples`, in the order of the nights; `None` for fewer than [`FEWEST`]. `counts`: the values are
+    /// counts of events that come one by one.
+    #[must_use]
+    pub fn of(samples: &[Sample], counts: bool) -> Option<Self> {
+        let nights = samples.len();
+        if nights < FEWEST {
+            return None;
+        }
+        let mut sorted: Vec<f64> = samples.iter().map(|s| s.value).collect();
+        sorted.sort_by(f64::total_cmp);
+        let centre = quantile(&sorted, 0.5);
+        let mut distances: Vec<f64> = sorted.iter().map(|v| (v - centre).abs()).collect();
+        distances.sort_by(f64::total_cmp);
+        let middle = PER_MAD * quantile(&distances, 0.5);
+        let floor = floor(samples, centre, counts);
+        let side = |tail: f64| middle.max(tail / NINE_TENTHS).max(floor);
+        let below = side(centre - quantile(&sorted, 0.1));
+        let above = side(quantile(&sorted, 0.9) - centre);
+        let plain = Self {
+            nights,
+            centre,
+            below,
+            above,
+            correlation: 0.0,
+        };
+        let correlation = correlation(samples.iter().map(|s| plain.raw(s.value)));
+        Some(Self {
+            correlation,
+            ..plain
+        })
+    }
+
+    /// How far off `value` is, in standard deviations of a new night: those of the reference, of the centre itself, and of nights
+    /// that resemble their neighbours.
+    #[must_use]
+    pub fn score(&self, value: f64) -> f64 {
+        let n = self.nights as f64;
+        // Three nights in a row decide: the variance of their mean, over that of nights that know nothing of each other.
+        let r = self.correlation;
+        let alike = (3.0 + 4.0 * r + 2.0 * r * r) / 3.0;
+        // The centre is a median of few, and the spread is estimated: both are worse the fewer there are.
+        let estimated = 1.0 + 1.57 / n + 4.0 / n;
+        self.raw(value) / (alike * estimated).sqrt()
+    }
+
+    fn raw(&self, value: f64) -> f64 {
+        let off = value - self.centre;
+        let spread = if off < 0.0 { self.below } else { self.above };
+        if off == 0.0 { 0.0 } else { off / spread }
+    }
+}
+
+/// The smallest spread that is believed, from what is known besides the values.
+fn floor(samples: &[Sample], centre: f64, counts: bool) -> f64 {
+    let n = samples.len() as f64;
+    let mut floor = LEAST_SHARE * centre.abs();
+    if counts {
+        // A Poisson variable's, its mean at the upper end of what so few nights allow: when none was seen in n nights, 3/n at 95 %.
+        let sum: f64 = samples.iter().map(|s| s.value).sum();
+        floor = floor.max(((sum + 3.0) / n).sqrt());
+    }
+    let mut halves: Vec<f64> = samples.iter().filter_map(|s| s.half_interval).collect();
+    if !halves.is_empty() {
+        halves.sort_by(f64::total_cmp);
+        floor = floor.max(quantile(&halves, 0.5) / 1.96);
+    }
+    let share = centre / 100.0;
+    let of = samples.iter().filter_map(|s| s.of).max();
+    if let Some(of) = of.filter(|of| *of > 0 && (0.0..=1.0).contains(&share)) {
+        // A binomial share's, drawn away from 0 and 1 (A. Agresti and B. A. Coull, The American Statistician 52 (1998) 119-126).
+        let of = of as f64;
+        let share = (share * of + 1.0) / (of + 2.0);
+        floor = floor.max(100.0 * (share * (1.0 - share) / of).sqrt());
+    }
+    floor
+}
+
+/// Correlation of neighbours, from clipped scores: one odd night makes none. Of few nights it comes out too low by about 1/n.
+fn correlation(scores: impl Iterator<Item = f64>) -> f64 {
+    let scores: Vec<f64> = scores.map(|z| z.clamp(-2.5, 2.5)).collect();
+    let n = scores.len() as f64;
+    let mean = scores.iter().sum::<f64>() / n;
+    let square: f64 = scores.iter().map(|z| (z - mean).powi(2)).sum();
+    if square == 0.0 {
+        return 0.0;
+    }
+    let pairs = scores.windows(2);
+    let product: f64 = pairs.map(|w| (w[0] - mean) * (w[1] - mean)).sum();
+    let unbiased = product / square + 1.0 / n;
+    unbiased.clamp(0.0, MOST_CORRELATED)
+}
+
+/// The quantile of sorted values, between two of them linearly.
+pub(super) fn quantile(sorted: &[f64], share: f64) -> f64 {
+    let place = share * sorted.len().saturating_sub(1) as f64;
+    let (low, high) = (place.floor() as usize, place.ceil() as usize);
+    match (sorted.get(low), sorted.get(high)) {
+        (Some(a), Some(b)) => a + (b - a) * place.fract(),
+        _ => f64::NAN,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn samples(values: impl IntoIterator<Item = f64>) -> Vec<Sample> {
+        let one = |value| Sample {
+            value,
+            half_interval: None,
+            of: None,
+        };
+        values.into_iter().map(one).collect()
+    }
+
+    #[test]
+    fn odd_nights_move_neither_centre_nor_spread_and_constants_have_a_floor() {
+        let plain: Vec<f64> = (0..20)
+            .map(|i| 100.0 + f64::from(i * 7 % 5) - 2.0)
+            .collect();
+        let mut odd = plain.clone();
+        odd[3] = 1e6;
+        odd[11] = -1e6;
+        let of = |v: &[f64]| Reference::of(&samples(v.iter().copied()), false).unwrap();
+        let (plain, odd) = (of(&plain), of(&odd));
+        assert!((plain.centre - odd.centre).abs() < 0.1);
+        assert!(odd.above < 1.5 * plain.above);
+        assert_eq!(Reference::of(&samples([1.0; 11]), false), None);
+
+        let same = of(&[50.0; 12]);
+        assert_eq!((same.below, same.score(50.0)), (0.25, 0.0));
+        let none = Reference::of(&samples([0.0; 12]), true).unwrap();
+        assert_eq!((none.above, none.score(0.0)), (0.5, 0.0));
+        assert!(none.score(1.0) < 2.0 && none.score(4.0) > 6.0);
+        // Bytes that were never lost: anything is far off, and no number is divided by nothing.
+        assert_eq!(of(&[0.0; 12]).score(4096.0), f64::INFINITY);
+    }
+
+    #[test]
+    fn nights_that_resemble_their_neighbours_count_for_less() {
+        let slow: Vec<f64> = (0..24).map(|i| f64::from(i / 4 % 2)).collect();
+        let fast: Vec<f64> = (0..24).map(|i| f64::from(i % 2)).collect();
+        let of = |v: Vec<f64>| Reference::of(&samples(v), false).unwrap();
+        let (slow, fast) = (of(slow), of(fast));
+        assert!(slow.correlation > 0.4, "{}", slow.correlation);
+        assert_eq!(fast.correlation, 0.0);
+        assert!(slow.score(3.0) < fast.score(3.0));
+    }
+}

@@ -1,0 +1,264 @@
+//! All series of a bench judged together: which moved, since when, and why, probably.
+
+use serde::Serialize;
+
+use super::cause::{self, Attribution};
+use super::chart::{Chart, Excursion, Way, chart};
+use super::derived::ratios;
+use super::history::{History, NightHead};
+use super::reference::FEWEST;
+use super::run_length::interval_for;
+use crate::rules::Cause;
+
+/// Nights between two false alarms of all series together that the charts are made for, were all scores normal. Real ones are
+/// not, and come to one in more than 100; see `docs/trends.md`.
+pub const NIGHTS_PER_FALSE_ALARM: f64 = 2000.0;
+
+/// Metrics without a level to stay at: free space falls from night to night by design, and has its limit.
+const NOT_CHARTED: &[&str] = &["free"];
+
+/// What the trends of a bench say.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Report {
+    /// In one sentence.
+    pub headline: String,
+    /// What moved and is still off, the most series first.
+    pub alarms: Vec<Alarm>,
+    /// One per series, those of the alarms first.
+    pub charts: Vec<Chart>,
+    /// The nights, oldest first.
+    pub nights: Vec<NightHead>,
+    /// The sum above which an alarm is raised, standard deviations.
+    pub interval: f64,
+}
+
+/// Series that moved in the same night, as far as can be told.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Alarm {
+    /// Names it: the night that raised it.
+    pub id: String,
+    /// Which of the charts.
+    pub charts: Vec<usize>,
+    /// The night that raised it first.
+    pub raised: usize,
+    /// The first night that was off: the earliest and the latest that it may have been.
+    pub since: [usize; 2],
+    /// Why, probably.
+    pub attribution: Attribution,
+}
+
+/// Judges all series of `history`, and the ratios derived from them.
+#[must_use]
+pub fn judge(history: &History) -> Report {
+    let charted = |name: &str| {
+        let metric = name.rsplit('/').next().unwrap_or_default();
+        !NOT_CHARTED.contains(&metric)
+    };
+    let mut series: Vec<_> = history
+        .series
+        .iter()
+        .filter(|s| charted(&s.name))
+        .cloned()
+        .collect();
+    series.extend(ratios(history));
+    let interval = interval_for(series.len(), NIGHTS_PER_FALSE_ALARM);
+    let mut charts: Vec<Chart> = series
+        .iter()
+        .map(|s| chart(s, &history.nights, &history.accepted, interval))
+        .collect();
+    // What is off first, the farthest first; the others by name.
+    charts.sort_by(|a, b| {
+        let off = |c: &Chart| c.off().is_some();
+        let far = |c: &Chart| c.off().and_then(relative).unwrap_or(f64::INFINITY).abs();
+        let both = off(b).cmp(&off(a));
+        let farther = if off(a) && off(b) {
+            far(b).total_cmp(&far(a))
+        } else {
+            std::cmp::Ordering::Equal
+        };
+        both.then(farther)
+            .then_with(|| a.series.name.cmp(&b.series.name))
+    });
+    let alarms = alarms(&charts, &history.nights);
+    Report {
+        headline: headline(&charts, &alarms, &history.nights),
+        alarms,
+        charts,
+        nights: history.nights.clone(),
+        interval,
+    }
+}
+
+/// Excursions whose changes may have been in the same night, together.
+fn alarms(charts: &[Chart], nights: &[NightHead]) -> Vec<Alarm> {
+    let mut open: Vec<(usize, &Excursion)> = charts
+        .iter()
+        .enumerate()
+        .filter_map(|(at, c)| Some((at, c.off()?)))
+        .collect();
+    open.sort_by_key(|(_, e)| (e.change.nights[0], e.change.nights[1]));
+    let mut found: Vec<Alarm> = Vec::new();
+    for (at, excursion) in open {
+        let [first, last] = excursion.change.nights;
+        match found
+            .iter_mut()
+            .find(|a| first <= a.since[1] && last >= a.since[0])
+        {
+            Some(alarm) => {
+                alarm.charts.push(at);
+                alarm.raised = alarm.raised.min(excursion.raised);
+                alarm.since = [alarm.since[0].max(first), alarm.since[1].min(last)];
+            }
+            None => found.push(Alarm {
+                id: String::new(),
+                charts: vec![at],
+                raised: excursion.raised,
+                since: [first, last],
+                attribution: Attribution {
+                    cause: None,
+                    rule: "",
+                    reason: String::new(),
+                    changed: Vec::new(),
+                },
+            }),
+        }
+    }
+    for alarm in &mut found {
+        alarm.charts.sort_unstable();
+        alarm.id.clone_from(&nights[alarm.raised].id);
+        let names: Vec<&str> = alarm
+            .charts
+            .iter()
+            .map(|c| charts[*c].series.name.as_str())
+            .collect();
+        let before = alarm.since[0].saturating_sub(1);
+        alarm.attribution = cause::attribute(&nights[before], &nights[alarm.since[1]], &names);
+    }
+    found.sort_by_key(|a| (std::cmp::Reverse(a.charts.len()), a.raised));
+    found
+}
+
+/// The change relative to the level before; `None` when that was zero.
+#[must_use]
+pub fn relative(excursion: &Excursion) -> Option<f64> {
+    let ratio = (excursion.after - excursion.before) / excursion.before.abs();
+    ratio.is_finite().then_some(ratio)
+}
+
+/// By how much, for people: `-15 %`, `0 -> 4`.
+#[must_use]
+pub fn moved_by(excursion: &Excursion, unit: &str) -> String {
+    match relative(excursion).map(|r| r * 100.0) {
+        Some(percent) if percent.abs() < 1000.0 && unit != "%" => format!("{percent:+.0} %"),
+        _ => {
+            let way = if excursion.way == Way::Up {
+                "up"
+            } else {
+                "down"
+            };
+            let unit = if unit.is_empty() {
+                String::new()
+            } else {
+                format!(" {unit}")
+            };
+            format!(
+                "{way} from {} to {}{unit}",
+                figure(excursion.before),
+                figure(excursion.after)
+            )
+        }
+    }
+}
+
+/// A number with four significant figures, and as many places as that takes.
+#[must_use]
+pub fn figure(value: f64) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return value.to_string();
+    }
+    let places = 3 - value.abs().log10().floor() as i32;
+    if !(0..=9).contains(&places) {
+        return format!("{value:.3e}").replace(".000e", "e");
+    }
+    let text = format!("{value:.*}", places as usize);
+    if text.contains('.') {
+        text.trim_end_matches('0').trim_end_matches('.').to_owned()
+    } else {
+        text
+    }
+}
+
+/// The day of a night, for people.
+#[must_use]
+pub fn day(night: &NightHead) -> &str {
+    night.started.get(..10).unwrap_or(&night.started)
+}
+
+/// What moved, as people call it.
+#[must_use]
+pub const fn name(cause: Option<Cause>) -> &'static str {
+    match cause {
+        Some(Cause::Software) => "the software",
+        Some(Cause::Rig) => "the rig",
+        Some(Cause::Skin) => "the skin",
+        Some(Cause::Infrastructure) => "the computer",
+        None => "not told by the rules",
+    }
+}
+
+fn headline(charts: &[Chart], alarms: &[Alarm], nights: &[NightHead]) -> String {
+    let Some(alarm) = alarms.first() else {
+        let learning = charts.iter().filter(|c| c.reference.is_none()).count();
+        return if charts.is_empty() {
+            "no trends: no night has a value yet".to_owned()
+        } else if learning == charts.len() {
+            format!(
+                "learning: {} of {FEWEST} nights that a reference needs",
+                most_nights(charts)
+            )
+        } else if learning > 0 {
+            format!(
+                "nothing moved in {} nights; {learning} of {} series are being learnt",
+                nights.len(),
+                charts.len()
+            )
+        } else {
+            format!(
+                "nothing moved: {} series over {} nights",
+                charts.len(),
+                nights.len()
+            )
+        };
+    };
+    let first = &charts[alarm.charts[0]];
+    let by = first
+        .off()
+        .map(|e| moved_by(e, &first.series.unit))
+        .unwrap_or_default();
+    let others = match alarm.charts.len() - 1 {
+        0 => String::new(),
+        1 => " and 1 other series".to_owned(),
+        n => format!(" and {n} other series"),
+    };
+    let [from, to] = alarm.since.map(|n| day(&nights[n]));
+    let when = if from == to {
+        format!("on {from}")
+    } else {
+        format!("between {from} and {to}")
+    };
+    let further = match alarms.len() - 1 {
+        0 => String::new(),
+        1 => "; 1 further alarm".to_owned(),
+        n => format!("; {n} further alarms"),
+    };
+    format!(
+        "{} moved ({by}){others} {when}; probable cause: {} ({}){further}",
+        first.series.name,
+        name(alarm.attribution.cause),
+        alarm.attribution.reason,
+    )
+}
+
+fn most_nights(charts: &[Chart]) -> usize {
+    charts.iter().map(|c| c.nights.len()).max().unwrap_or(0)
+}
