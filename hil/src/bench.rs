@@ -92,6 +92,11 @@ pub trait Bench {
     /// Where sessions go: the folder whose disk is checked.
     fn folder(&self) -> &Path;
 
+    /// The firmware of every device that was open so far: `robot`, `camera1`, ..., and its version.
+    fn firmware(&self) -> Vec<(String, String)> {
+        Vec::new()
+    }
+
     /// Whether everything is to end soon: ctrl-C, or the system's polite end. Checks look at it while they wait or move, and
     /// come back with what they have; the runner says why.
     fn stop_asked(&self) -> bool {

@@ -1,6 +1,6 @@
 //! What a check found: values by device and metric, and evidence.
 
-use skinrig_nightly::{Evidence, EvidenceKind};
+use skinrig_nightly::{Evidence, EvidenceKind, Golden};
 
 /// A value that was measured.
 #[derive(Debug, Clone, PartialEq)]
@@ -30,6 +30,19 @@ pub struct Findings {
     pub evidence: Vec<Evidence>,
     /// The check cannot be made on this bench, and why: it is SKIPPED.
     pub not_here: Option<String>,
+    /// What a golden campaign leaves in the night besides its numbers.
+    pub golden: Option<GoldenKept>,
+}
+
+/// What a golden campaign leaves in the night besides its numbers.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct GoldenKept {
+    /// The session and its report, relative to the night's folder.
+    pub files: Golden,
+    /// Name of the skin, from the protocol.
+    pub skin: Option<String>,
+    /// Version of the analysis.
+    pub analysis_version: u32,
 }
 
 impl Findings {

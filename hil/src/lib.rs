@@ -7,7 +7,9 @@ pub mod bench;
 pub mod checks;
 pub mod findings;
 pub mod history;
+pub mod runner;
 pub mod trouble;
 
 pub use bench::{Bench, Devices, Drilled, GoldenRun, Slot, Trouble};
-pub use findings::Findings;
+pub use findings::{Findings, GoldenKept};
+pub use runner::{Onlooker, Tonight};

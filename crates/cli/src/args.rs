@@ -9,6 +9,7 @@ use skinrig_protocol::limits::Margin;
 use skinrig_protocol::quantity::{self, Dimension};
 
 use crate::exit::Exit;
+use crate::hil::args::HilArgs;
 use crate::remote::What;
 
 /// Runs tactile-skin experiments: protocol, robot, event cameras, session, analysis, report.
@@ -83,6 +84,9 @@ pub enum Command {
         printf 'z +5mm\\ntouch 20mm\\npoint nw at -30 40 0 mm\\n' | skinrig jog\n\n\
         ctrl-C holds, rises and disarms; three times switches the motors off where the tip is. Coordinates are the robot's own. `help` lists what can be typed.")]
     Jog(JogArgs),
+
+    /// Check a bench: every night, before a campaign, or after something was changed on it.
+    Hil(HilArgs),
 
     /// Follow a run in the terminal until it ends; reads only, and cannot hold the run up.
     #[command(after_help = "Examples:\n  skinrig watch\n  \

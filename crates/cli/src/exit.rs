@@ -4,28 +4,44 @@ use std::fmt;
 use std::io::IsTerminal;
 use std::process::{ExitCode, Termination};
 
+use skinrig_nightly::NightExit;
 use skinrig_protocol::Diagnostics;
 
 /// How the program ended. The numbers are part of the interface and do not change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[repr(u8)]
 pub enum Exit {
     /// Everything asked for was done.
-    Ok = 0,
+    Ok,
     /// A fault of skinrig itself, or of the machine (disk full, no permission).
-    Internal = 1,
+    Internal,
     /// Bad input: command line, protocol, schedule, data file or session file.
-    Input = 2,
+    Input,
     /// A check before a run failed, or a device, the trigger line or the recorder during it; the session up to there is
     /// kept.
-    Rig = 3,
+    Rig,
     /// A stated limit was not met: `--max-rmse`, `verify`, the alignment of the clocks (an INVALID session).
-    Limit = 4,
+    Limit,
     /// The operator stopped or aborted the run; the session up to there is kept.
-    Stopped = 5,
+    Stopped,
+    /// What a suite of checks found; `hil run` has codes of its own.
+    Night(NightExit),
 }
 
 impl Exit {
+    /// The number that the system is told.
+    #[must_use]
+    pub const fn code(self) -> u8 {
+        match self {
+            Self::Ok => 0,
+            Self::Internal => 1,
+            Self::Input => 2,
+            Self::Rig => 3,
+            Self::Limit => 4,
+            Self::Stopped => 5,
+            Self::Night(night) => night as u8,
+        }
+    }
+
     /// All codes with their meaning, for `--help`.
     pub const HELP: &'static str = "Exit codes:\n  \
         0  done\n  \
@@ -38,7 +54,7 @@ impl Exit {
 
 impl Termination for Exit {
     fn report(self) -> ExitCode {
-        ExitCode::from(self as u8)
+        ExitCode::from(self.code())
     }
 }
 

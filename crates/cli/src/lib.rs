@@ -13,6 +13,7 @@ pub mod devices;
 pub mod exit;
 pub mod export;
 pub mod fault;
+pub mod hil;
 pub mod import;
 pub mod inspect;
 pub mod jog;
@@ -89,6 +90,7 @@ fn dispatch(cli: &Cli, arguments: &[OsString]) -> Outcome {
         Command::Note(a) => control::note(a, json),
         Command::Devices(a) => devices::devices(a, json),
         Command::Jog(a) => jog::jog(a),
+        Command::Hil(a) => hil::hil(a, &command_line(arguments), json),
         Command::Watch(a) => watch::watch(a, json),
         Command::Prototypes(a) => prototypes::prototypes(a, json),
         Command::Tag(a) => tag::tag(a, json),

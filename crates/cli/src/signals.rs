@@ -15,7 +15,24 @@ static PRESSED: AtomicU8 = AtomicU8::new(0);
 pub struct Operator {
     control: ControlHandle,
     over: Arc<AtomicBool>,
+    asked: Arc<AtomicBool>,
+    of_suite: bool,
 }
+
+/// What ctrl-C is answered with, once, twice and three times.
+type Words = [&'static str; 3];
+
+const OF_RUN: Words = [
+    "stopping after this press; ctrl-C again retracts and stops now",
+    "retracting and stopping now; ctrl-C again switches the motors off where the tip is",
+    "switching the motors off where the tip is, and closing the session",
+];
+
+const OF_SUITE: Words = [
+    "ending the suite with this check; what it has not measured stays open. ctrl-C again breaks a golden campaign off",
+    "retracting, and ending the suite; ctrl-C again switches the motors off where the tip is",
+    "switching the motors off where the tip is, and ending the suite",
+];
 
 impl Operator {
     /// Listens from now on. What is asked for before the run begins is heard when it does.
@@ -23,34 +40,45 @@ impl Operator {
     /// # Errors
     /// As [`on_ctrl_c`].
     pub fn listen() -> Result<Self, String> {
-        let (control, over) = (ControlHandle::new(), Arc::new(AtomicBool::new(false)));
-        let (hand, is_over) = (control.clone(), Arc::clone(&over));
+        Self::answering(OF_RUN, false)
+    }
+
+    /// As [`listen`](Self::listen), for a suite of checks: it goes on when a run in it is over.
+    ///
+    /// # Errors
+    /// As [`on_ctrl_c`].
+    pub fn of_suite() -> Result<Self, String> {
+        Self::answering(OF_SUITE, true)
+    }
+
+    fn answering(words: Words, of_suite: bool) -> Result<Self, String> {
+        let flag = || Arc::new(AtomicBool::new(false));
+        let (control, over, asked) = (ControlHandle::new(), flag(), flag());
+        let (hand, is_over, is_asked) = (control.clone(), Arc::clone(&over), Arc::clone(&asked));
         on_ctrl_c(move |times| {
             if is_over.load(Ordering::SeqCst) {
                 // Nothing moves any more and the session is closed.
-                std::process::exit(i32::from(Exit::Stopped as u8));
+                std::process::exit(i32::from(Exit::Stopped.code()));
+            }
+            is_asked.store(true, Ordering::SeqCst);
+            if let Some(words) = words.get(usize::from(times) - 1) {
+                errln!("\n{words}");
             }
             match times {
-                1 => {
-                    errln!("\nstopping after this press; ctrl-C again retracts and stops now");
-                    hand.stop();
-                }
-                2 => {
-                    errln!(
-                        "\nretracting and stopping now; ctrl-C again switches the motors off where the tip is"
-                    );
-                    hand.abort();
-                }
-                3 => {
-                    errln!("\nswitching the motors off where the tip is, and closing the session");
-                    hand.halt();
-                }
+                1 => hand.stop(),
+                2 => hand.abort(),
+                3 => hand.halt(),
                 _ => errln!(
                     "\nclosing the session; if nothing happens, press the force button of the robot"
                 ),
             }
         })?;
-        Ok(Self { control, over })
+        Ok(Self {
+            control,
+            over,
+            asked,
+            of_suite,
+        })
     }
 
     /// The hand on the run.
@@ -59,9 +87,15 @@ impl Operator {
         &self.control
     }
 
-    /// The run is over and its session closed: from now on ctrl-C leaves the program.
+    /// Whether ctrl-C was pressed, or the system asked for an end.
+    #[must_use]
+    pub fn asked(&self) -> bool {
+        self.asked.load(Ordering::SeqCst)
+    }
+
+    /// The run is over and its session closed: from now on ctrl-C leaves the program. Within a suite it does not.
     pub fn run_is_over(&self) {
-        self.over.store(true, Ordering::SeqCst);
+        self.over.store(!self.of_suite, Ordering::SeqCst);
     }
 }
 

@@ -159,7 +159,7 @@ pub fn jog(args: &JogArgs) -> Outcome {
                 hand.halt();
             }
             // Something hangs; the supervisor brakes an arm that nobody commands any more.
-            _ => std::process::exit(i32::from(Exit::Stopped as u8)),
+            _ => std::process::exit(i32::from(Exit::Stopped.code())),
         }
     })
     .map_err(Failure::internal)?;

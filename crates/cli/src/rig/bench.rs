@@ -5,14 +5,15 @@ use std::time::Duration;
 
 use skinrig_controller::ControllerSettings;
 use skinrig_device::{
-    CameraSettings, EventCamera, Indenter, NoiseFilter, RealClock, Rig, Roi, SyncMode, TriggerBox,
+    CameraSettings, DeviceError, EventCamera, Indenter, NoiseFilter, RealClock, Rig, Roi, SyncMode,
+    TriggerBox,
 };
 use skinrig_evk1::biases::parse_bias_file;
-use skinrig_evk1::{Evk1, Evk1Config};
+use skinrig_evk1::{Evk1, Evk1Config, Evk1Error};
 use skinrig_model::{CameraId, HostDuration, RigGeometry, SkinOutline, StereoGeometry};
 use skinrig_omega3::axes::{Axes, Axis};
 use skinrig_omega3::config::{Initialise, SupervisorCommand, Watchdog};
-use skinrig_omega3::{Omega, OmegaConfig};
+use skinrig_omega3::{Omega, OmegaConfig, OmegaError};
 use skinrig_protocol::Protocol;
 use skinrig_protocol::rig::{BoxSetup, CameraSetup, RigFile, RigKind, SyncRole};
 use skinrig_trigger_box::{SerialTriggerBox, TriggerBoxConfig};
@@ -48,13 +49,7 @@ pub fn tighten(protocol: &mut Protocol, rig: &RigFile) {
 /// [`Failure::input`] when the file says that the sample is off: a run presses it, and an arm that lost its power must not
 /// sweep through it. [`Failure::rig`] naming the device that could not be opened and the next step.
 pub fn open(rig: &RigFile, protocol: &Protocol) -> Result<Rig, Failure> {
-    if rig.robot.sample_is_off {
-        return Err(Failure::input(format!(
-            "{}: robot.sample_is_off: expected false, because a run presses the sample, found true\n  \
-             next: initialise the arm with `skinrig jog` while the sample is off, mount the sample, and set it to false",
-            rig.file_name
-        )));
-    }
+    refuse_without_sample(rig)?;
     let clock = RealClock::start();
     // Settings first: a bad bias file is no reason to have opened a device.
     let camera_settings = [
@@ -84,11 +79,26 @@ pub fn open(rig: &RigFile, protocol: &Protocol) -> Result<Rig, Failure> {
     })
 }
 
+/// Refuses a bench whose sample is off.
+///
+/// # Errors
+/// [`Failure::input`]: what presses the sample needs it, and an arm that lost its power must not sweep through it.
+pub(crate) fn refuse_without_sample(rig: &RigFile) -> Result<(), Failure> {
+    if !rig.robot.sample_is_off {
+        return Ok(());
+    }
+    Err(Failure::input(format!(
+        "{}: robot.sample_is_off: expected false, because a run presses the sample, found true\n  \
+         next: initialise the arm with `skinrig jog` while the sample is off, mount the sample, and set it to false",
+        rig.file_name
+    )))
+}
+
 /// A pose this old still tells where a robot is that is moved by hand, or that shares a processor with everything else.
 pub const SLOW_STALE: HostDuration = HostDuration::from_millis(1_000);
 
 /// So long may a run on stand-ins not look while the tip is low.
-const SLOW_LATE: HostDuration = HostDuration::from_millis(5_000);
+pub(crate) const SLOW_LATE: HostDuration = HostDuration::from_millis(5_000);
 
 /// Over so long a speed is taken of an arm that, held up by other work on this computer, catches up in bursts.
 const SLOW_SPEED: HostDuration = HostDuration::from_millis(200);
@@ -140,14 +150,21 @@ fn geometry(rig: &RigFile, outline: SkinOutline) -> RigGeometry {
 /// # Errors
 /// [`Failure::rig`].
 pub fn open_robot(rig: &RigFile, clock: RealClock) -> Result<Box<dyn Indenter>, Failure> {
-    let omega = Omega::open(omega_config(rig)?, clock).map_err(Failure::rig)?;
+    Ok(Box::new(
+        omega(omega_config(rig)?, clock).map_err(Failure::rig)?,
+    ))
+}
+
+/// The robot's driver, which tells its remarks.
+pub(crate) fn omega(config: OmegaConfig, clock: RealClock) -> Result<Omega, OmegaError> {
+    let omega = Omega::open(config, clock)?;
     for remark in omega.remarks() {
         errln!("note: {remark}");
     }
-    Ok(Box::new(omega))
+    Ok(omega)
 }
 
-fn omega_config(rig: &RigFile) -> Result<OmegaConfig, Failure> {
+pub(crate) fn omega_config(rig: &RigFile) -> Result<OmegaConfig, Failure> {
     let (robot, limits) = (&rig.robot, &rig.limits);
     let mut config = OmegaConfig {
         library: robot.library.clone(),
@@ -206,7 +223,7 @@ fn axis(word: &str) -> Axis {
     }
 }
 
-fn open_camera(
+pub(crate) fn open_camera(
     setup: &CameraSetup,
     camera: CameraId,
     clock: RealClock,
@@ -214,21 +231,33 @@ fn open_camera(
     if setup.model != "evk1" {
         return evt3_camera::open(setup, camera, clock);
     }
-    let config = Evk1Config {
-        read_back_exceptions: setup.read_back_exceptions.clone(),
-        max_time_step_us: setup.max_time_high_gap_us,
-        overflow_is_loss: setup.overflow_is_loss,
-        ..Evk1Config::default()
-    };
-    let evk1 = Evk1::open_serial(&setup.serial, camera, config, clock);
-    Ok(Box::new(evk1.map_err(|e| {
+    Ok(Box::new(evk1(setup, camera, clock).map_err(|e| {
         Failure::rig(format!(
             "{camera}: {e}\n  next: `skinrig devices` shows what is connected"
         ))
     })?))
 }
 
-fn camera_settings(
+/// The driver of an EVK1.
+pub(crate) fn evk1(
+    setup: &CameraSetup,
+    camera: CameraId,
+    clock: RealClock,
+) -> Result<Evk1, Evk1Error> {
+    let config = Evk1Config {
+        read_back_exceptions: setup.read_back_exceptions.clone(),
+        max_time_step_us: setup.max_time_high_gap_us,
+        overflow_is_loss: setup.overflow_is_loss,
+        ..Evk1Config::default()
+    };
+    Evk1::open_serial(&setup.serial, camera, config, clock)
+}
+
+/// The settings that a run with this `request` writes to a camera.
+///
+/// # Errors
+/// [`Failure::input`] for a bias file that cannot be read.
+pub(crate) fn camera_settings(
     setup: &CameraSetup,
     request: &skinrig_protocol::CameraRequest,
 ) -> Result<CameraSettings, Failure> {
@@ -269,6 +298,17 @@ fn open_trigger_box(
     kind: RigKind,
     clock: RealClock,
 ) -> Result<Box<dyn TriggerBox>, Failure> {
+    Ok(Box::new(
+        trigger_box(setup, kind, clock).map_err(Failure::rig)?,
+    ))
+}
+
+/// The trigger box's driver; the box is armed.
+pub(crate) fn trigger_box(
+    setup: &BoxSetup,
+    kind: RigKind,
+    clock: RealClock,
+) -> Result<SerialTriggerBox, DeviceError> {
     let mut config = TriggerBoxConfig::new(&setup.port);
     config.serial.clone_from(&setup.serial);
     config.max_drift_ppm = setup.max_drift_ppm;
@@ -279,14 +319,10 @@ fn open_trigger_box(
         config.hello_timeout = Duration::from_secs(20);
         config.silence_ms = 30_000;
     }
-    let open = || {
-        let mut device = SerialTriggerBox::open(config, clock)?;
-        device.set_sync(Some(setup.sync_period_ms))?;
-        device.arm()?;
-        Ok(device)
-    };
-    let device = open().map_err(|e: skinrig_device::DeviceError| Failure::rig(e))?;
-    Ok(Box::new(device))
+    let mut device = SerialTriggerBox::open(config, clock)?;
+    device.set_sync(Some(setup.sync_period_ms))?;
+    device.arm()?;
+    Ok(device)
 }
 
 #[cfg(test)]

@@ -1,0 +1,253 @@
+//! The bench of a rig file for a suite of checks: production drivers, each opened by itself.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+use skinrig_device::{CameraSettings, EventCamera, RealClock};
+use skinrig_hil::{Bench, Devices, Drilled, GoldenRun, Slot, Trouble};
+use skinrig_model::{CameraId, HostDuration};
+use skinrig_nightly::{Evidence, EvidenceKind};
+use skinrig_protocol::CameraRequest;
+use skinrig_protocol::rig::{Drill, RigFile, RigKind};
+use skinrig_protocol::suite::Light;
+
+use super::{drill, golden, trouble};
+use crate::exit::Failure;
+use crate::rig::bench;
+use crate::signals::Operator;
+
+/// How long a program that switches the lamps may take.
+const LAMPS_WITHIN: Duration = Duration::from_secs(10);
+/// Between two looks at it.
+const LOOK_EVERY: Duration = Duration::from_millis(20);
+
+/// A bench with drivers behind it.
+pub struct RealBench {
+    rig: RigFile,
+    folder: PathBuf,
+    operator: Operator,
+    command_line: String,
+    clock: RealClock,
+    devices: Option<Devices>,
+    firmware: Vec<(String, String)>,
+}
+
+impl RealBench {
+    /// The bench of `rig`, with nothing opened yet. What it records goes into `folder`.
+    #[must_use]
+    pub fn new(rig: RigFile, folder: PathBuf, operator: Operator, command_line: &str) -> Self {
+        Self {
+            rig,
+            folder,
+            operator,
+            command_line: command_line.to_owned(),
+            clock: RealClock::start(),
+            devices: None,
+            firmware: Vec::new(),
+        }
+    }
+
+    /// Whoever sits at this terminal.
+    #[must_use]
+    pub const fn operator(&self) -> &Operator {
+        &self.operator
+    }
+
+    /// The arguments as one line.
+    #[must_use]
+    pub fn command_line(&self) -> &str {
+        &self.command_line
+    }
+
+    fn note_firmware(&mut self, device: &str, version: &str) {
+        if !self.firmware.iter().any(|(d, _)| d == device) {
+            self.firmware.push((device.to_owned(), version.to_owned()));
+        }
+    }
+
+    fn open_camera(&self, camera: CameraId) -> Slot<dyn EventCamera> {
+        let setup = &self.rig.cameras[camera.index()];
+        let subject = subject(camera);
+        if setup.model == "evk1" {
+            let opened = bench::evk1(setup, camera, self.clock);
+            return match opened {
+                Ok(evk1) => Ok(Box::new(evk1)),
+                Err(e) => Err(trouble::camera(&e, subject)),
+            };
+        }
+        bench::open_camera(setup, camera, self.clock).map_err(|failure| {
+            let what = failure.message;
+            Box::new(Evidence::new(EvidenceKind::Absent, subject, what))
+        })
+    }
+}
+
+/// What a camera is called in results.
+fn subject(camera: CameraId) -> &'static str {
+    match camera {
+        CameraId::One => "camera1",
+        CameraId::Two => "camera2",
+    }
+}
+
+/// A slot of which nobody has asked yet.
+fn closed(subject: &str) -> Trouble {
+    Box::new(Evidence::new(EvidenceKind::State, subject, "not opened"))
+}
+
+impl Bench for RealBench {
+    fn rig(&self) -> &RigFile {
+        &self.rig
+    }
+
+    fn devices(&mut self) -> &mut Devices {
+        let mut devices = self.devices.take().unwrap_or_else(|| Devices {
+            robot: Err(closed("robot")),
+            cameras: CameraId::ALL.map(|c| Err(closed(subject(c)))),
+            trigger_box: self
+                .rig
+                .trigger_box
+                .is_some()
+                .then(|| Err(closed("trigger box"))),
+            clock: Box::new(self.clock),
+        });
+        if devices.robot.is_err() {
+            devices.robot = match bench::omega_config(&self.rig) {
+                Ok(config) => match bench::omega(config, self.clock) {
+                    Ok(omega) => Ok(Box::new(omega)),
+                    Err(e) => Err(trouble::robot(&e, &self.rig)),
+                },
+                Err(failure) => Err(software("robot", &failure)),
+            };
+        }
+        for camera in CameraId::ALL {
+            let slot = &mut devices.cameras[camera.index()];
+            if slot.is_err() {
+                *slot = self.open_camera(camera);
+            }
+        }
+        if let (Some(slot @ Err(_)), Some(setup)) =
+            (&mut devices.trigger_box, &self.rig.trigger_box)
+        {
+            *slot = match bench::trigger_box(setup, self.rig.kind, self.clock) {
+                Ok(device) => Ok(Box::new(device)),
+                Err(e) => Err(trouble::trigger_box(&e, setup)),
+            };
+        }
+        let mut firmware = Vec::new();
+        if let Ok(robot) = &devices.robot {
+            firmware.push(("robot", robot.identity().firmware));
+        }
+        for camera in CameraId::ALL {
+            if let Ok(device) = &devices.cameras[camera.index()] {
+                firmware.push((subject(camera), device.identity().firmware));
+            }
+        }
+        if let Some(Ok(device)) = &devices.trigger_box {
+            firmware.push(("trigger box", device.identity().firmware));
+        }
+        for (device, version) in firmware {
+            self.note_firmware(device, &version);
+        }
+        self.devices.insert(devices)
+    }
+
+    fn close(&mut self) {
+        // Every driver brings its device to rest when it is dropped.
+        self.devices = None;
+    }
+
+    fn camera_settings(&self, camera: CameraId) -> Result<CameraSettings, Trouble> {
+        let setup = &self.rig.cameras[camera.index()];
+        bench::camera_settings(setup, &CameraRequest::default()).map_err(|failure| {
+            let what = failure.message;
+            let kind = EvidenceKind::Refused;
+            Box::new(
+                Evidence::new(kind, subject(camera), what)
+                    .next("correct the camera's settings in the rig file"),
+            )
+        })
+    }
+
+    fn light(&mut self, light: Light) -> Result<bool, Trouble> {
+        let Some(lamps) = &self.rig.hil.lamps else {
+            return Ok(false);
+        };
+        let words = match light {
+            Light::Dark => &lamps.dark,
+            Light::Lit => &lamps.lit,
+        };
+        switch(words).map(|()| true).map_err(|why| {
+            let what = format!("the lamps' program `{}`: {why}", words.join(" "));
+            let next = "call it by hand, and correct `hil.light` in the rig file";
+            Box::new(Evidence::new(EvidenceKind::State, "computer", what).next(next))
+        })
+    }
+
+    fn permits(&self, drill: Drill) -> bool {
+        self.rig.kind == RigKind::Emulated || self.rig.hil.drills.contains(&drill)
+    }
+
+    fn watchdog_drill(&mut self) -> Result<Drilled, Trouble> {
+        self.close();
+        drill::watchdog(self)
+    }
+
+    fn golden(&mut self, protocol: &Path) -> Result<GoldenRun, Trouble> {
+        self.close();
+        golden::golden(self, protocol)
+    }
+
+    fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    fn firmware(&self) -> Vec<(String, String)> {
+        self.firmware.clone()
+    }
+
+    fn stop_asked(&self) -> bool {
+        self.operator.asked()
+    }
+
+    fn patience(&self) -> HostDuration {
+        match self.rig.kind {
+            RigKind::Emulated => bench::SLOW_LATE,
+            RigKind::Bench => HostDuration::ZERO,
+        }
+    }
+}
+
+fn software(subject: &str, failure: &Failure) -> Trouble {
+    Box::new(Evidence::new(
+        EvidenceKind::Software,
+        subject,
+        &*failure.message,
+    ))
+}
+
+/// Runs a program to its end, without a shell.
+fn switch(words: &[String]) -> Result<(), String> {
+    let (program, arguments) = words.split_first().ok_or("expected a program")?;
+    let mut child = Command::new(program)
+        .args(arguments)
+        .stdin(Stdio::null())
+        .stdout(Stdio::null())
+        .spawn()
+        .map_err(|e| format!("cannot be started: {e}"))?;
+    let until = Instant::now() + LAMPS_WITHIN;
+    loop {
+        match child.try_wait() {
+            Ok(Some(status)) if status.success() => return Ok(()),
+            Ok(Some(status)) => return Err(format!("expected success, found {status}")),
+            Ok(None) if Instant::now() < until => std::thread::sleep(LOOK_EVERY),
+            Ok(None) => {
+                let _ = child.kill();
+                let _ = child.wait();
+                return Err(format!("expected an end within {LAMPS_WITHIN:?}"));
+            }
+            Err(e) => return Err(format!("cannot be waited for: {e}")),
+        }
+    }
+}

@@ -1,0 +1,23 @@
+//! `skinrig hil`: a suite of checks on a bench.
+
+pub mod args;
+pub mod bench;
+mod drill;
+mod folder;
+mod golden;
+mod live;
+pub mod run;
+mod trouble;
+
+use crate::exit::Outcome;
+use args::{HilArgs, HilCommand};
+
+/// `skinrig hil`.
+///
+/// # Errors
+/// [`crate::exit::Failure`] with the code that says what kind.
+pub fn hil(args: &HilArgs, command_line: &str, json: bool) -> Outcome {
+    match &args.command {
+        HilCommand::Run(a) => run::run(a, command_line, json),
+    }
+}

@@ -1,0 +1,106 @@
+//! Why a device could not be opened, as evidence: what the driver says, and a second look at bus or port where it says only
+//! that nobody is there.
+
+use skinrig_device::DeviceError;
+use skinrig_evk1::{Evk1Error, FoundState, UsbError};
+use skinrig_hil::Trouble;
+use skinrig_nightly::{Evidence, EvidenceKind};
+use skinrig_omega3::OmegaError;
+use skinrig_omega3::enumerate::Availability;
+use skinrig_protocol::rig::{BoxSetup, RigFile};
+use skinrig_trigger_box::serial::SerialDial;
+use skinrig_trigger_box::{Dial, OpenError};
+
+const DEVICES: &str = "`skinrig devices` shows what is connected, and docs/bench.md how";
+
+fn trouble(kind: EvidenceKind, subject: &str, what: &dyn std::fmt::Display) -> Trouble {
+    Box::new(Evidence::new(kind, subject, what.to_string()).next(DEVICES))
+}
+
+/// Why the robot could not be opened.
+pub fn robot(error: &OmegaError, rig: &RigFile) -> Trouble {
+    let kind = match error {
+        OmegaError::Load(_) | OmegaError::Thread(_) | OmegaError::Supervisor(_) => {
+            EvidenceKind::Absent
+        }
+        OmegaError::NotFound { .. } => robot_not_found(rig),
+        OmegaError::Config(_) => EvidenceKind::Refused,
+        OmegaError::Unfit { .. } => EvidenceKind::State,
+        OmegaError::ReadBack { .. } => EvidenceKind::ReadBack,
+        OmegaError::Call { .. } | OmegaError::Late { .. } => EvidenceKind::DeviceLost,
+    };
+    trouble(kind, "robot", error)
+}
+
+/// The robot of the rig file is not among those that are free: what is there?
+fn robot_not_found(rig: &RigFile) -> EvidenceKind {
+    let listed = skinrig_omega3::load::load(rig.robot.library.as_deref())
+        .ok()
+        .and_then(|loaded| skinrig_omega3::enumerate::list(&loaded.library).ok());
+    let states = listed.unwrap_or_default();
+    let any = |state: Availability| states.iter().any(|f| f.availability == state);
+    if any(Availability::Busy) {
+        EvidenceKind::Busy
+    } else if any(Availability::NotPermitted) {
+        EvidenceKind::NotPermitted
+    } else if states.is_empty() {
+        EvidenceKind::Absent
+    } else {
+        EvidenceKind::OtherDevice
+    }
+}
+
+/// Why a camera, called `subject` in results, could not be opened.
+pub fn camera(error: &Evk1Error, subject: &str) -> Trouble {
+    let kind = match error {
+        Evk1Error::NotFound { .. } => camera_not_found(),
+        Evk1Error::NotEvk1 { .. } => EvidenceKind::OtherDevice,
+        Evk1Error::Usb { cause, .. } => match cause {
+            UsbError::NoUsb(_) | UsbError::Gone => EvidenceKind::Absent,
+            UsbError::Busy => EvidenceKind::Busy,
+            UsbError::NoPermission => EvidenceKind::NotPermitted,
+            _ => EvidenceKind::DeviceLost,
+        },
+        Evk1Error::ReadBack { .. } | Evk1Error::Setting { .. } => EvidenceKind::ReadBack,
+        Evk1Error::Refused { .. } => EvidenceKind::Refused,
+        _ => EvidenceKind::State,
+    };
+    trouble(kind, subject, error)
+}
+
+/// No camera with this serial number answers: is there one that may not be asked?
+fn camera_not_found() -> EvidenceKind {
+    let states: Vec<_> = skinrig_evk1::enumerate()
+        .unwrap_or_default()
+        .into_iter()
+        .map(|found| found.state)
+        .collect();
+    let any = |is: fn(&FoundState) -> bool| states.iter().any(is);
+    if any(|s| matches!(s, FoundState::Busy)) {
+        EvidenceKind::Busy
+    } else if any(|s| matches!(s, FoundState::NoPermission)) {
+        EvidenceKind::NotPermitted
+    } else if any(|s| matches!(s, FoundState::Faulty(_))) {
+        EvidenceKind::DeviceLost
+    } else {
+        EvidenceKind::Absent
+    }
+}
+
+/// Why the trigger box could not be opened.
+pub fn trigger_box(error: &DeviceError, setup: &BoxSetup) -> Trouble {
+    let kind = match error {
+        DeviceError::Lost { .. } => match SerialDial::new(&setup.port).dial() {
+            Err(OpenError::Absent(_)) => EvidenceKind::Absent,
+            Err(OpenError::Busy(_)) => EvidenceKind::Busy,
+            Err(OpenError::NotPermitted(_)) => EvidenceKind::NotPermitted,
+            Err(OpenError::Other { .. }) | Ok(_) => EvidenceKind::DeviceLost,
+        },
+        // Another box, or another firmware.
+        DeviceError::Refused { .. } => EvidenceKind::OtherDevice,
+        DeviceError::ReadBack { .. } => EvidenceKind::ReadBack,
+        DeviceError::State { .. } => EvidenceKind::State,
+        DeviceError::Diverged { .. } => EvidenceKind::Software,
+    };
+    trouble(kind, "trigger box", error)
+}

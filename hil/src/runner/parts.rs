@@ -1,0 +1,141 @@
+//! The runner: from what a check found to parts and measurements, each with its limit. What should have been measured and was
+//! not is there too.
+
+use skinrig_nightly::{Evidence, EvidenceKind, Measurement, Part, Verdict};
+use skinrig_protocol::suite::{Check, Measure};
+
+use crate::findings::{Findings, Value};
+
+const CAMERAS: &[&str] = &["camera1", "camera2"];
+/// Parts appear in this order, whatever is found first.
+const ORDER: &[&str] = &[
+    "robot",
+    "camera1",
+    "camera2",
+    "trigger box",
+    "computer",
+    "skin",
+];
+/// What a metric belongs to that nobody measured and that may belong to any device.
+const ANY: &[&str] = &["bench"];
+
+/// On which devices a check must measure `metric`.
+fn subjects(measure: &Measure, metric: &str, has_box: bool) -> &'static [&'static str] {
+    match measure {
+        Measure::Identity if has_box => &["robot", "camera1", "camera2", "trigger box"],
+        Measure::Identity => &["robot", "camera1", "camera2"],
+        // From one camera to the other.
+        Measure::Clocks { .. } if metric == "offset" => ANY,
+        Measure::Settings
+        | Measure::TriggerLoopback { .. }
+        | Measure::Clocks { .. }
+        | Measure::Idle { .. }
+        | Measure::Noise { .. }
+        | Measure::TestPattern { .. } => CAMERAS,
+        Measure::Disk { .. } => &["computer"],
+        Measure::Golden { .. } => &["skin"],
+        Measure::RobotState
+        | Measure::Repeatability { .. }
+        | Measure::StepResponse { .. }
+        | Measure::Depth { .. }
+        | Measure::ForceCeiling { .. }
+        | Measure::WatchdogDrill
+        | Measure::StopDrill => &["robot"],
+    }
+}
+
+/// The parts of an attempt. A value that the suite does not know, or that came twice, is a fault of this program and told as
+/// one in `found.evidence`.
+pub(super) fn parts(check: &Check, found: &mut Findings, has_box: bool) -> Vec<Part> {
+    let mut faults = Vec::new();
+    let mut parts: Vec<Part> = Vec::new();
+    for value in &found.values {
+        let known = check.metrics.iter().any(|m| m.name == value.metric);
+        let twice = find(&parts, &value.subject, value.metric);
+        if !known || twice {
+            let what = if twice { "measured twice" } else { "not known" };
+            faults.push(format!(
+                "{}: {} of {}: {what}",
+                check.name, value.metric, value.subject
+            ));
+            continue;
+        }
+        add(&mut parts, &value.subject, measurement(check, value));
+    }
+    for metric in check.metrics {
+        if !check.limits.contains_key(metric.name) {
+            continue;
+        }
+        let wanted = subjects(&check.measure, metric.name, has_box);
+        let anywhere = parts
+            .iter()
+            .any(|p| p.measurements.iter().any(|m| m.metric == metric.name));
+        for subject in wanted {
+            let there = find(&parts, subject, metric.name) || (wanted == ANY && anywhere);
+            if !there {
+                let missing = Value {
+                    subject: (*subject).to_owned(),
+                    metric: metric.name,
+                    value: None,
+                    interval: None,
+                    n: None,
+                    needs: 0,
+                    note: None,
+                };
+                add(&mut parts, subject, measurement(check, &missing));
+            }
+        }
+    }
+    for what in faults {
+        found
+            .evidence
+            .push(Evidence::new(EvidenceKind::Software, "computer", what));
+    }
+    let place = |name: &str| ORDER.iter().position(|o| *o == name);
+    parts.sort_by_key(|p| place(&p.subject).unwrap_or(ORDER.len()));
+    let rank = |metric: &str| check.metrics.iter().position(|m| m.name == metric);
+    for part in &mut parts {
+        part.measurements.sort_by_key(|m| rank(&m.metric));
+        part.verdict = Verdict::worst(part.measurements.iter().map(|m| m.verdict));
+    }
+    parts
+}
+
+fn find(parts: &[Part], subject: &str, metric: &str) -> bool {
+    let part = parts.iter().find(|p| p.subject == subject);
+    part.is_some_and(|p| p.measurements.iter().any(|m| m.metric == metric))
+}
+
+fn add(parts: &mut Vec<Part>, subject: &str, measurement: Measurement) {
+    match parts.iter_mut().find(|p| p.subject == subject) {
+        Some(part) => part.measurements.push(measurement),
+        None => parts.push(Part {
+            subject: subject.to_owned(),
+            measurements: vec![measurement],
+            verdict: Verdict::Fail,
+        }),
+    }
+}
+
+fn measurement(check: &Check, value: &Value) -> Measurement {
+    let metric = check.metrics.iter().find(|m| m.name == value.metric);
+    let limit = check.limits.get(value.metric).copied();
+    // JSON has no number for these; what is no number was not measured.
+    let number = value.value.filter(|v| v.is_finite());
+    let odd = value.value.filter(|v| !v.is_finite());
+    Measurement {
+        metric: value.metric.to_owned(),
+        value: number,
+        unit: metric.map_or("", |m| m.unit).to_owned(),
+        interval: value.interval.filter(|i| i.iter().all(|v| v.is_finite())),
+        n: value.n,
+        needs: value.needs,
+        limit,
+        verdict: Verdict::on(number, value.n, value.needs, limit.as_ref()),
+        note: match (&value.note, odd) {
+            (Some(note), Some(odd)) => Some(format!("{note}; measured {odd}")),
+            (None, Some(odd)) => Some(format!("measured {odd}")),
+            (note, None) => note.clone(),
+        },
+    }
+}
