@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use skinrig_controller::ControlHandle;
 use skinrig_device::{CameraSettings, Clock, EventCamera, Indenter, TriggerBox};
 use skinrig_model::{CameraId, HostDuration};
 use skinrig_nightly::{Evidence, Golden};
@@ -43,12 +44,14 @@ pub struct GoldenRun {
 }
 
 /// What the drill of a watchdog gave.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Drilled {
     /// From the kill until the motors were known to be off, s; `None`: they never were.
     pub braked_within_s: Option<f64>,
     /// How far the tip was from where it had been held, mm.
     pub drop_mm: f64,
+    /// What the robot says of why its motors went off.
+    pub note: Option<String>,
 }
 
 /// A bench.
@@ -101,6 +104,11 @@ pub trait Bench {
     /// come back with what they have; the runner says why.
     fn stop_asked(&self) -> bool {
         false
+    }
+
+    /// The operator's hand on the arm: a halt switches the motors off at once, wherever it is.
+    fn control(&self) -> ControlHandle {
+        ControlHandle::new()
     }
 
     /// How late stand-ins that share this computer's processors may be; zero on a bench of hardware.

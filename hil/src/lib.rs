@@ -3,10 +3,12 @@
 //! A check ([`checks::make`]) asks a [`Bench`] for devices, which it knows by their traits alone, and fills a [`Findings`]: values, and
 //! evidence of whatever kept it from measuring. It never judges: limits, verdicts and causes are `skinrig-nightly`'s.
 
+pub mod arm;
 pub mod bench;
 pub mod checks;
 pub mod findings;
 pub mod history;
+pub mod room;
 pub mod runner;
 pub mod trouble;
 

@@ -49,7 +49,7 @@ pub(crate) struct Core<'a> {
     /// Presses taken again at once so far.
     pub(crate) retaken: u32,
     pub(crate) robot_from_skin: RigidTransform<Robot, Skin>,
-    pub(crate) indenter: GuardedIndenter,
+    pub(crate) indenter: GuardedIndenter<'static>,
     pub(crate) cameras: [Box<dyn EventCamera>; 2],
     pub(crate) camera_settings: [CameraSettings; 2],
     pub(crate) trigger_box: Option<Box<dyn TriggerBox>>,

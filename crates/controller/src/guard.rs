@@ -25,8 +25,8 @@ pub struct Floor {
 
 /// Owns the indenter. Takes targets in the skin frame, refuses what the limits of the run forbid, gives poses in the
 /// skin frame, and feeds them to its watchdog: when that trips, the robot holds or brakes before anybody is asked.
-pub struct GuardedIndenter {
-    inner: Box<dyn Indenter>,
+pub struct GuardedIndenter<'a> {
+    inner: Box<dyn Indenter + 'a>,
     robot_from_skin: RigidTransform<Robot, Skin>,
     skin_from_robot: RigidTransform<Skin, Robot>,
     limits: RunLimits,
@@ -42,11 +42,11 @@ pub struct GuardedIndenter {
     samples: Vec<RobotSample>,
 }
 
-impl GuardedIndenter {
+impl<'a> GuardedIndenter<'a> {
     /// Takes `inner` over. A newest sample older than the settings allow forbids motion.
     #[must_use]
     pub fn new(
-        inner: Box<dyn Indenter>,
+        inner: Box<dyn Indenter + 'a>,
         robot_from_skin: RigidTransform<Robot, Skin>,
         limits: RunLimits,
         settings: &ControllerSettings,

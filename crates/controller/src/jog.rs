@@ -1,8 +1,11 @@
 //! Moving the robot by hand: single motions and slow touches under the guard of runs.
 
+mod watch;
+
 use skinrig_device::{Clock, Indenter, MotionLimits};
 use skinrig_model::{
-    DeviceIdentity, HostDuration, HostTime, Point3, PoseSample, RigidTransform, Setting, Skin,
+    DeviceIdentity, HostDuration, HostTime, Point3, PoseSample, RigidTransform, Robot, Setting,
+    Skin,
 };
 use skinrig_protocol::TouchSearch;
 use skinrig_protocol::plan::RunLimits;
@@ -25,9 +28,9 @@ const RETRACT_MM: f64 = 10.0;
 pub type Stop<'a> = &'a dyn Fn() -> bool;
 
 /// A robot that is moved by hand. Dropped, it holds, rises and disarms.
-pub struct Jog {
-    indenter: GuardedIndenter,
-    clock: Box<dyn Clock>,
+pub struct Jog<'a> {
+    indenter: GuardedIndenter<'a>,
+    clock: Box<dyn Clock + 'a>,
     settings: ControllerSettings,
     limits: RunLimits,
     fresh: Vec<PoseSample>,
@@ -60,7 +63,7 @@ pub enum Touched {
     Stopped(PoseSample),
 }
 
-impl Jog {
+impl<'a> Jog<'a> {
     /// Limits the robot, powers it, and waits for its pose. Coordinates, those of `limits` included, are the robot's own:
     /// where the skin lies is what a touch-off is to find out. Nothing goes below the `floor`. Of `control` only a halt is
     /// heard: it disarms at once, and ends whatever is under way with [`ControllerError::Halted`].
@@ -68,8 +71,8 @@ impl Jog {
     /// # Errors
     /// What the robot answers; [`ControllerError::PoseStream`] when it tells no pose. It is then disarmed.
     pub fn start(
-        indenter: Box<dyn Indenter>,
-        clock: Box<dyn Clock>,
+        indenter: Box<dyn Indenter + 'a>,
+        clock: Box<dyn Clock + 'a>,
         limits: RunLimits,
         robot_limits: &MotionLimits,
         floor: Option<Floor>,
@@ -79,6 +82,35 @@ impl Jog {
         let indenter =
             GuardedIndenter::new(indenter, RigidTransform::identity(), limits, &settings)
                 .above(floor);
+        Self::begin(indenter, clock, limits, robot_limits, control, settings)
+    }
+
+    /// As [`start`](Self::start) in the frame of a skin whose place is known: below the clearance height of `limits` the tip
+    /// moves up and down only, and no deeper than they say.
+    ///
+    /// # Errors
+    /// As [`start`](Self::start).
+    pub fn on_skin(
+        indenter: Box<dyn Indenter + 'a>,
+        clock: Box<dyn Clock + 'a>,
+        robot_from_skin: RigidTransform<Robot, Skin>,
+        limits: RunLimits,
+        robot_limits: &MotionLimits,
+        control: &ControlHandle,
+        settings: ControllerSettings,
+    ) -> Result<(Self, Vec<Setting>), ControllerError> {
+        let indenter = GuardedIndenter::new(indenter, robot_from_skin, limits, &settings);
+        Self::begin(indenter, clock, limits, robot_limits, control, settings)
+    }
+
+    fn begin(
+        indenter: GuardedIndenter<'a>,
+        clock: Box<dyn Clock + 'a>,
+        limits: RunLimits,
+        robot_limits: &MotionLimits,
+        control: &ControlHandle,
+        settings: ControllerSettings,
+    ) -> Result<(Self, Vec<Setting>), ControllerError> {
         let mut jog = Self {
             indenter,
             clock,
@@ -334,7 +366,7 @@ impl Jog {
     }
 }
 
-impl Drop for Jog {
+impl Drop for Jog<'_> {
     fn drop(&mut self) {
         let _ = self.finish();
     }

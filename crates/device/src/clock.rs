@@ -14,6 +14,17 @@ pub trait Clock: Send {
     fn wait_until(&mut self, t: HostTime);
 }
 
+/// Whoever holds one for a while may lend it on.
+impl<T: Clock + ?Sized> Clock for &mut T {
+    fn now(&self) -> HostTime {
+        (**self).now()
+    }
+
+    fn wait_until(&mut self, t: HostTime) {
+        (**self).wait_until(t);
+    }
+}
+
 /// The clock of a bench: the operating system's monotonic clock since the session began.
 ///
 /// Copies tell the same time, so every driver thread carries one and stamps what it receives the moment it

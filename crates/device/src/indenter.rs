@@ -99,3 +99,38 @@ pub trait Indenter: Send {
     /// [`DeviceError::Lost`]; the motors are then off by the device's own watchdog.
     fn disarm(&mut self) -> Result<(), DeviceError>;
 }
+
+/// Whoever holds one for a while may lend it on.
+impl<T: Indenter + ?Sized> Indenter for &mut T {
+    fn identity(&self) -> DeviceIdentity {
+        (**self).identity()
+    }
+
+    fn capabilities(&self) -> IndenterCapabilities {
+        (**self).capabilities()
+    }
+
+    fn configure(&mut self, limits: &MotionLimits) -> Result<Vec<Setting>, DeviceError> {
+        (**self).configure(limits)
+    }
+
+    fn arm(&mut self) -> Result<(), DeviceError> {
+        (**self).arm()
+    }
+
+    fn command(&mut self, target: Point3<Robot>, speed_mm_s: f64) -> Result<(), DeviceError> {
+        (**self).command(target, speed_mm_s)
+    }
+
+    fn poll(&mut self, samples: &mut Vec<RobotSample>) -> Result<(), DeviceError> {
+        (**self).poll(samples)
+    }
+
+    fn hold(&mut self) -> Result<(), DeviceError> {
+        (**self).hold()
+    }
+
+    fn disarm(&mut self) -> Result<(), DeviceError> {
+        (**self).disarm()
+    }
+}

@@ -255,7 +255,7 @@ fn words(p: &PoseSample) -> String {
 
 /// The robot and what was typed so far.
 struct Table {
-    jog: Jog,
+    jog: Jog<'static>,
     stop: Arc<AtomicBool>,
     search: TouchSearch,
     speed_mm_s: f64,

@@ -306,7 +306,7 @@ fn play(acts: &[Act], on_trip: OnTrip) -> Result<u32, TestCaseError> {
 
 fn step(
     act: &Act,
-    guard: &mut GuardedIndenter,
+    guard: &mut GuardedIndenter<'_>,
     books: &Shared,
     clock: &BooksClock,
     poses: &mut Vec<skinrig_model::PoseSample>,

@@ -36,7 +36,7 @@ fn around() -> Surroundings {
 }
 
 /// A robot at (0, 0, 10), and its guard.
-fn guarded() -> (Shared, GuardedIndenter) {
+fn guarded() -> (Shared, GuardedIndenter<'static>) {
     let world = World::shared(Faults::default(), [0.0, 0.0, 10.0]);
     let robot = Box::new(MockIndenter(world.clone()));
     let settings = ControllerSettings::default();

@@ -13,7 +13,7 @@ use skinrig_sim::rig::simulated_rig;
 const NOBODY: fn() -> bool = || false;
 
 /// A jog in the robot's own coordinates, whose floor is `max_depth_mm` below the skin. The skin's surface is at z = -15 mm.
-fn jog(max_depth_mm: Option<f64>, control: &ControlHandle) -> Jog {
+fn jog(max_depth_mm: Option<f64>, control: &ControlHandle) -> Jog<'static> {
     let rig = simulated_rig(&SimConfig::new(1, SimLevel::Kinematic));
     let can = rig.indenter.capabilities();
     let (min_mm, max_mm) = (can.workspace_min_mm, can.workspace_max_mm);
@@ -55,7 +55,7 @@ fn jog(max_depth_mm: Option<f64>, control: &ControlHandle) -> Jog {
     }
 }
 
-fn down_to(jog: &mut Jog, z_mm: f64) -> Result<f64, ControllerError> {
+fn down_to(jog: &mut Jog<'_>, z_mm: f64) -> Result<f64, ControllerError> {
     let here = jog.look()?.commanded;
     jog.go(here.plane().at_height(z_mm), 10.0, &NOBODY)?;
     Ok(jog.look()?.measured.z_mm)

@@ -1,0 +1,122 @@
+//! A bench of simulated devices that a check cannot tell from another.
+
+use std::cell::Cell;
+use std::path::Path;
+
+use skinrig_device::CameraSettings;
+use skinrig_hil::bench::{Bench, Devices, Drilled, GoldenRun, Trouble};
+use skinrig_hil::{Findings, checks};
+use skinrig_model::{CameraId, HostDuration, SimLevel};
+use skinrig_nightly::{Evidence, EvidenceKind};
+use skinrig_protocol::RigFile;
+use skinrig_protocol::rig::Drill;
+use skinrig_protocol::suite::{Light, Suite};
+use skinrig_sim::{Fault, SimConfig, simulated_rig};
+
+const RIG: &str = include_str!("../../rigs/emulated.yaml");
+
+/// Opens again when closed; counts how often.
+pub struct SimBench {
+    pub rig: RigFile,
+    config: SimConfig,
+    devices: Option<Devices>,
+    pub opened: u32,
+    pub drills: Vec<Drill>,
+    pub drilled: Option<Drilled>,
+    /// Looks until everything is to end.
+    pub patience_of_operator: Cell<Option<u32>>,
+}
+
+impl SimBench {
+    pub fn new(faults: Vec<Fault>) -> Self {
+        let environment = |_: &str| Some("/nowhere".to_owned());
+        let rig = RigFile::parse("emulated.yaml", RIG.as_bytes(), &environment).unwrap();
+        let mut config = SimConfig::new(1, SimLevel::Kinematic);
+        config.robot_from_skin = rig.frame.robot_from_skin;
+        config.workspace_mm = (rig.limits.workspace_min_mm, rig.limits.workspace_max_mm);
+        config.faults = faults;
+        Self {
+            rig,
+            config,
+            devices: None,
+            opened: 0,
+            drills: vec![Drill::Watchdog, Drill::Stop],
+            drilled: None,
+            patience_of_operator: Cell::new(None),
+        }
+    }
+
+    /// Makes the check that `text` asks for, with its parameters: `robot_state: {creep: {at_most: 1 mm}}`.
+    pub fn make(&mut self, text: &str) -> Findings {
+        let text = format!("skinrig_suite: 1\nname: one\nbudget: 1 h\nchecks:\n  {text}\n");
+        let suite = Suite::parse("suite.yaml", text.as_bytes()).unwrap_or_else(|e| panic!("{e}"));
+        let [check] = &suite.checks[..] else {
+            panic!("one check");
+        };
+        checks::make(check, self)
+    }
+}
+
+impl Bench for SimBench {
+    fn rig(&self) -> &RigFile {
+        &self.rig
+    }
+
+    fn devices(&mut self) -> &mut Devices {
+        if self.devices.is_none() {
+            self.opened += 1;
+        }
+        let config = &self.config;
+        self.devices.get_or_insert_with(|| {
+            let rig = simulated_rig(config);
+            let [one, two] = rig.cameras;
+            Devices {
+                robot: Ok(rig.indenter),
+                cameras: [Ok(one), Ok(two)],
+                trigger_box: rig.trigger_box.map(Ok),
+                clock: rig.clock,
+            }
+        })
+    }
+
+    fn close(&mut self) {
+        self.devices = None;
+    }
+
+    fn camera_settings(&self, _: CameraId) -> Result<CameraSettings, Trouble> {
+        Ok(CameraSettings::default())
+    }
+
+    fn light(&mut self, _: Light) -> Result<bool, Trouble> {
+        Ok(false)
+    }
+
+    fn permits(&self, drill: Drill) -> bool {
+        self.drills.contains(&drill)
+    }
+
+    fn watchdog_drill(&mut self) -> Result<Drilled, Trouble> {
+        let why = || Evidence::new(EvidenceKind::Software, "robot", "no drill here");
+        self.drilled.clone().ok_or_else(|| Box::new(why()))
+    }
+
+    fn golden(&mut self, _: &Path) -> Result<GoldenRun, Trouble> {
+        let why = Evidence::new(EvidenceKind::Absent, "robot", "no golden skin here");
+        Err(Box::new(why))
+    }
+
+    fn folder(&self) -> &Path {
+        Path::new(".")
+    }
+
+    fn stop_asked(&self) -> bool {
+        let left = self.patience_of_operator.get();
+        self.patience_of_operator
+            .set(left.map(|n| n.saturating_sub(1)));
+        left == Some(0)
+    }
+
+    fn patience(&self) -> HostDuration {
+        HostDuration::ZERO
+    }
+}

@@ -1,0 +1,185 @@
+//! The robot's checks on simulated devices: what a healthy robot gives, and what each fault makes of it.
+#![expect(clippy::unwrap_used, reason = "tests")]
+
+mod bench;
+
+use bench::SimBench;
+use skinrig_hil::{Drilled, Findings};
+use skinrig_model::HostTime;
+use skinrig_nightly::EvidenceKind;
+use skinrig_sim::{Fault, Moment, When};
+
+const STATE: &str = "robot_state: {faults: {at_most: 0}}";
+const REPEATABILITY: &str = "repeatability: {approaches: 3, spread: {at_most: 1 mm}}";
+const STEP: &str = "step_response: {steps: 4, error: {at_most: 1 mm}}";
+const DEPTH: &str = "depth: {depth: 1 mm, presses: 2, error: {at_most: 1 mm}}";
+const FORCE: &str = "force_ceiling: {force: 1 N, depth: 2.5 mm, peak: {at_most: 2 N}}";
+const STOP: &str = "stop_drill: {distance: {at_most: 1 mm}}";
+const WATCHDOG: &str = "watchdog_drill: {drop: {at_most: 1 mm}}";
+
+fn value(found: &Findings, metric: &str) -> Option<f64> {
+    let of = |v: &&skinrig_hil::findings::Value| v.metric == metric;
+    let values: Vec<_> = found.values.iter().filter(of).collect();
+    assert_eq!(values.len(), 1, "{metric} once in {found:?}");
+    values[0].value
+}
+
+fn kinds(found: &Findings) -> Vec<EvidenceKind> {
+    found.evidence.iter().map(|e| e.kind).collect()
+}
+
+/// The arm is braked after every check: it takes no command.
+fn is_braked(bench: &mut SimBench) -> bool {
+    use skinrig_hil::bench::Bench;
+    let devices = bench.devices();
+    let robot = devices.robot.as_mut().unwrap();
+    let mut seen = Vec::new();
+    robot.poll(&mut seen).unwrap();
+    let at = seen
+        .last()
+        .map_or_else(|| skinrig_model::Point3::new(0.0, 0.0, 0.0), |s| s.measured);
+    robot.command(at, 1.0).is_err()
+}
+
+#[test]
+fn a_healthy_robot_gives_small_numbers_and_is_braked_after_each_check() {
+    let mut bench = SimBench::new(Vec::new());
+    let state = bench.make(STATE);
+    assert_eq!(value(&state, "faults"), Some(0.0));
+    // Its wander is 4 um, its noise 3 um per axis: a mean over 100 ms knows a place to a few um.
+    assert!(value(&state, "creep").unwrap() < 0.02, "{state:?}");
+    let repeats = bench.make(REPEATABILITY);
+    assert!(value(&repeats, "spread").unwrap() < 0.02, "{repeats:?}");
+    assert!(value(&repeats, "error").unwrap() < 0.05, "{repeats:?}");
+    let step = bench.make(STEP);
+    assert!(value(&step, "settling").unwrap() < 0.2, "{step:?}");
+    assert!(value(&step, "overshoot").unwrap() < 0.2, "{step:?}");
+    assert!(value(&step, "error").unwrap() < 0.05, "{step:?}");
+    assert!(is_braked(&mut bench));
+    let depth = bench.make(DEPTH);
+    assert_eq!(depth.evidence, []);
+    // A touch is told at 0.2 N, which a skin of 0.6 N/mm gives 0.33 mm deep.
+    let surface = value(&depth, "surface").unwrap();
+    assert!((0.25..0.5).contains(&surface), "{depth:?}");
+    assert!(value(&depth, "error").unwrap() < 0.05, "{depth:?}");
+    let force = bench.make(FORCE);
+    let peak = value(&force, "peak").unwrap();
+    assert!((0.9..1.3).contains(&peak), "{force:?}");
+    assert_eq!(value(&force, "trips"), Some(0.0));
+    assert!(is_braked(&mut bench));
+    let stop = bench.make(STOP);
+    assert!(value(&stop, "stopped_within").unwrap() < 1.0, "{stop:?}");
+    let way = value(&stop, "distance").unwrap();
+    // From 40 mm/s with 500 mm/s^2: 1.6 mm, and the lag behind the set point.
+    assert!((0.2..4.0).contains(&way), "{stop:?}");
+    for found in [state, repeats, step, depth, force, stop] {
+        assert_eq!(found.evidence, [], "{found:?}");
+        assert_eq!(found.not_here, None);
+    }
+    assert!(is_braked(&mut bench));
+    assert_eq!(bench.opened, 1);
+}
+
+#[test]
+fn a_robot_that_is_lost_leaves_nothing_measured_and_is_opened_again() {
+    let lost = Fault::IndenterLost(When::Moment(Moment::Travel, 4));
+    let mut bench = SimBench::new(vec![lost]);
+    let found = bench.make(REPEATABILITY);
+    assert!(
+        kinds(&found).contains(&EvidenceKind::DeviceLost),
+        "{found:?}"
+    );
+    assert_eq!(value(&found, "spread"), None);
+    assert_eq!(value(&found, "error"), None);
+    let again = bench.make(STATE);
+    assert_eq!(value(&again, "faults"), Some(0.0), "{again:?}");
+    assert_eq!(bench.opened, 2);
+}
+
+#[test]
+fn a_limit_that_does_not_read_back_is_a_fault_of_the_robot() {
+    let mut bench = SimBench::new(vec![Fault::IndenterReadBack]);
+    let found = bench.make(STATE);
+    assert_eq!(value(&found, "faults"), Some(1.0), "{found:?}");
+    assert_eq!(value(&found, "creep"), None);
+    assert_eq!(kinds(&found), [EvidenceKind::ReadBack]);
+}
+
+#[test]
+fn a_stuck_and_a_sluggish_robot_are_found_out() {
+    let mut bench = SimBench::new(vec![Fault::IndenterStuck(When::At(HostTime(0)))]);
+    let found = bench.make(REPEATABILITY);
+    assert_eq!(value(&found, "spread"), None);
+    assert!(kinds(&found).contains(&EvidenceKind::State), "{found:?}");
+    let slow = Fault::Sluggish {
+        when: When::At(HostTime(0)),
+        percent: 10,
+    };
+    let mut bench = SimBench::new(vec![slow]);
+    let healthy = SimBench::new(Vec::new()).make(STEP);
+    let found = bench.make(STEP);
+    let settling = |found: &Findings| value(found, "settling").unwrap();
+    assert!(
+        settling(&found) > 2.0 * settling(&healthy) + 0.1,
+        "{found:?} {healthy:?}"
+    );
+}
+
+#[test]
+fn a_skin_that_is_too_soft_for_the_depth_says_nothing_about_the_limit() {
+    let mut bench = SimBench::new(Vec::new());
+    let found = bench.make("force_ceiling: {force: 6 N, depth: 1 mm, peak: {at_most: 7 N}}");
+    assert_eq!(kinds(&found), [EvidenceKind::TooLittle]);
+    let peak = found.values.iter().find(|v| v.metric == "peak").unwrap();
+    assert!(peak.n < Some(peak.needs), "{peak:?}");
+}
+
+#[test]
+fn nothing_goes_deeper_than_the_rig_file_allows() {
+    let mut bench = SimBench::new(Vec::new());
+    bench.rig.limits.max_depth_mm = 1.5;
+    for text in [DEPTH, FORCE] {
+        let found = bench.make(text);
+        assert_eq!(kinds(&found), [EvidenceKind::Refused], "{found:?}");
+        assert!(found.values.iter().all(|v| v.value.is_none()));
+    }
+    bench.rig.robot.sample_is_off = true;
+    assert!(bench.make(DEPTH).not_here.is_some());
+    bench.rig.limits.workspace_max_mm[2] = -12.0;
+    let found = bench.make(REPEATABILITY);
+    assert_eq!(kinds(&found), [EvidenceKind::Refused], "{found:?}");
+}
+
+#[test]
+fn drills_are_made_where_they_are_permitted() {
+    let mut bench = SimBench::new(Vec::new());
+    bench.drills.clear();
+    for text in [STOP, WATCHDOG] {
+        let found = bench.make(text);
+        assert!(found.not_here.unwrap().contains("hil"), "{text}");
+        assert_eq!(found.values, []);
+    }
+    assert_eq!(bench.opened, 0);
+    let mut bench = SimBench::new(Vec::new());
+    for (braked_within_s, expected) in [(Some(0.3), Some(0.3)), (None, None)] {
+        bench.drilled = Some(Drilled {
+            braked_within_s,
+            drop_mm: 2.0,
+            note: None,
+        });
+        let found = bench.make(WATCHDOG);
+        assert_eq!(value(&found, "braked_within"), expected);
+        assert_eq!(value(&found, "drop"), Some(2.0));
+    }
+}
+
+#[test]
+fn who_wants_to_stop_gets_a_braked_arm_soon() {
+    let mut bench = SimBench::new(Vec::new());
+    bench.patience_of_operator.set(Some(400));
+    let found = bench.make(REPEATABILITY);
+    assert_eq!(kinds(&found), [EvidenceKind::Stopped], "{found:?}");
+    assert_eq!(value(&found, "spread"), None);
+    bench.patience_of_operator.set(None);
+    assert!(is_braked(&mut bench));
+}
