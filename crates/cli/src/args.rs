@@ -8,6 +8,7 @@ use skinrig_protocol::PlantedFault;
 use skinrig_protocol::limits::Margin;
 use skinrig_protocol::quantity::{self, Dimension};
 
+use crate::doctor::DoctorArgs;
 use crate::exit::Exit;
 use crate::hil::args::HilArgs;
 use crate::remote::What;
@@ -78,6 +79,13 @@ pub enum Command {
         after_help = "Examples:\n  skinrig devices\n  skinrig devices --rig hil/rigs/NAME.yaml"
     )]
     Devices(DevicesArgs),
+
+    /// Say whether this machine is fit for the bench: permissions, cables, versions, disk, real-time limits, clock; and what to do.
+    #[command(
+        after_help = "Examples:\n  skinrig doctor\n  skinrig doctor --rig hil/rigs/NAME.yaml --sessions sessions/\n\n\
+        Nothing moves. Opening the trigger box's port resets the box. Exit code 3 when there is a problem."
+    )]
+    Doctor(DoctorArgs),
 
     /// Move the robot by hand under the limits of the rig file, and record touched points; lines from standard input.
     #[command(after_help = "Examples:\n  skinrig jog --rig hil/rigs/NAME.yaml\n  \

@@ -7,7 +7,7 @@ use serde::Serialize;
 use skinrig_evk1::FoundState;
 use skinrig_omega3::enumerate::Availability;
 use skinrig_omega3::load::LoadError;
-use skinrig_protocol::rig::RigFile;
+use skinrig_protocol::rig::{RigFile, RigKind};
 use skinrig_trigger_box::PortState;
 
 use crate::args::DevicesArgs;
@@ -16,24 +16,32 @@ use crate::rig::bench;
 
 /// How long a trigger box may take to say hello: opening its port resets it.
 const HELLO: Duration = Duration::from_secs(4);
+/// The same for a simulated processor that has to wait for a real one.
+const EMULATED_HELLO: Duration = Duration::from_secs(20);
 
 /// One thing that was found, or that should have been.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-struct Line {
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
+pub(crate) struct Line {
     /// `robot`, `camera`, `trigger box` or `port`.
-    device: &'static str,
+    pub device: &'static str,
     /// Model and place.
-    what: String,
+    pub what: String,
     /// Its serial number, where it told one.
-    serial: Option<String>,
-    /// `ready`, `busy`, `not permitted`, `other device`, `absent`, `not asked` or `faulty`.
-    state: &'static str,
+    pub serial: Option<String>,
+    /// `ready`, `busy`, `not permitted`, `other device`, `other firmware`, `absent`, `not asked` or `faulty`.
+    pub state: &'static str,
     /// More about the state.
-    detail: String,
+    pub detail: String,
     /// What the rig file wants of it, for example `camera1`.
-    role: Option<String>,
+    pub role: Option<String>,
     /// What to do next.
-    next_step: Option<String>,
+    pub next_step: Option<String>,
+    /// What a device that is ready says of its firmware.
+    #[serde(skip)]
+    pub firmware: Option<String>,
+    /// Bus and address of a USB device that was found as such.
+    #[serde(skip)]
+    pub usb: Option<(u8, u8)>,
 }
 
 /// `skinrig devices`.
@@ -42,9 +50,7 @@ struct Line {
 /// [`crate::exit::Failure`] for a rig file that cannot be read. Nothing connected is no error.
 pub fn devices(args: &DevicesArgs, json: bool) -> Outcome {
     let rig = args.rig.as_deref().map(bench::load).transpose()?;
-    let mut lines = robots(rig.as_ref());
-    lines.extend(cameras(rig.as_ref()));
-    lines.extend(trigger_boxes(rig.as_ref()));
+    let lines = survey(rig.as_ref());
     if json {
         crate::print_json(&serde_json::json!({
             "rig": rig.as_ref().map(|r| &r.name),
@@ -55,6 +61,14 @@ pub fn devices(args: &DevicesArgs, json: bool) -> Outcome {
     }
     print(&lines, rig.as_ref());
     Ok(Exit::Ok)
+}
+
+/// Everything that is connected, and what the rig file misses. Nothing moves; opening the box's port resets it.
+pub(crate) fn survey(rig: Option<&RigFile>) -> Vec<Line> {
+    let mut lines = robots(rig);
+    lines.extend(cameras(rig));
+    lines.extend(trigger_boxes(rig));
+    lines
 }
 
 fn print(lines: &[Line], rig: Option<&RigFile>) {
@@ -97,11 +111,10 @@ fn robots(rig: Option<&RigFile>) -> Vec<Line> {
     let line = |what: &str, state, detail: String, next_step: Option<String>| Line {
         device: "robot",
         what: what.to_owned(),
-        serial: None,
         state,
         detail,
-        role: None,
         next_step,
+        ..Line::default()
     };
     let wanted = rig.map(|r| r.robot.serial);
     let library = rig.and_then(|r| r.robot.library.as_deref());
@@ -138,6 +151,7 @@ fn robots(rig: Option<&RigFile>) -> Vec<Line> {
             Line {
                 serial: f.serial.map(|s| s.to_string()),
                 role: (f.serial.is_some() && f.serial == wanted).then(|| "robot".to_owned()),
+                firmware: f.firmware.clone(),
                 ..line(
                     f.model.as_deref().unwrap_or("Force Dimension device"),
                     state,
@@ -160,11 +174,9 @@ fn cameras(rig: Option<&RigFile>) -> Vec<Line> {
     let line = |what: &str, state, detail: String| Line {
         device: "camera",
         what: what.to_owned(),
-        serial: None,
         state,
         detail,
-        role: None,
-        next_step: None,
+        ..Line::default()
     };
     let wanted = |serial: &str| {
         let cameras = &rig?.cameras;
@@ -187,6 +199,7 @@ fn cameras(rig: Option<&RigFile>) -> Vec<Line> {
                         FoundState::Ready(identity) => Line {
                             serial: Some(identity.serial.clone()),
                             role: wanted(&identity.serial),
+                            firmware: Some(identity.firmware()),
                             ..line(&place("EVK1 Gen3.1"), "ready", identity.firmware())
                         },
                         FoundState::Busy => line(
@@ -202,7 +215,11 @@ fn cameras(rig: Option<&RigFile>) -> Vec<Line> {
                         }
                         FoundState::Faulty(what) => line(&place("camera"), "faulty", what.clone()),
                     };
-                    Line { next_step, ..found }
+                    Line {
+                        next_step,
+                        usb: Some(f.address),
+                        ..found
+                    }
                 }),
         ),
     }
@@ -250,7 +267,8 @@ fn other_cameras(lines: &mut Vec<Line>, wanted: &dyn Fn(&str) -> Option<String>)
                 serial: Some(serial),
                 state: "ready",
                 detail: format!("model {}", model.word()),
-                next_step: None,
+                usb: Some(found.place),
+                ..Line::default()
             });
         }
     }
@@ -311,6 +329,7 @@ fn missing(
         detail,
         role,
         next_step: Some(next_step.to_owned()),
+        ..Line::default()
     });
 }
 
@@ -319,29 +338,42 @@ fn trigger_boxes(rig: Option<&RigFile>) -> Vec<Line> {
     let port = rig
         .and_then(|r| r.trigger_box.as_ref())
         .map(|b| b.port.clone());
+    let hello = match rig.map(|r| r.kind) {
+        Some(RigKind::Emulated) => EMULATED_HELLO,
+        _ => HELLO,
+    };
     let mut lines = Vec::new();
-    for found in skinrig_trigger_box::enumerate(port.as_slice(), HELLO) {
+    for found in skinrig_trigger_box::enumerate(port.as_slice(), hello) {
         use skinrig_trigger_box::OpenError;
+        use skinrig_trigger_box::greeting::GreetingError;
         let (state, detail) = match &found.state {
             PortState::Ready(identity) => ("ready", format!("firmware {}", identity.firmware)),
             PortState::Closed(OpenError::Absent(_)) => ("absent", String::new()),
             PortState::Closed(OpenError::Busy(_)) => ("busy", String::new()),
             PortState::Closed(OpenError::NotPermitted(_)) => ("not permitted", String::new()),
             PortState::Closed(_) => ("faulty", String::new()),
+            PortState::Unusable(GreetingError::WrongFirmware {
+                firmware, protocol, ..
+            }) => (
+                "other firmware",
+                format!("firmware {firmware} with protocol {protocol}"),
+            ),
             PortState::Unusable(_) => ("other device", String::new()),
         };
-        let (serial, next_step) = match &found.state {
-            PortState::Ready(identity) => (Some(identity.serial.clone()), None),
+        let (identity, next_step) = match &found.state {
+            PortState::Ready(identity) => (Some(identity.clone()), None),
             other => (None, Some(other.to_string())),
         };
         lines.push(Line {
             device: "trigger box",
             what: found.port,
-            serial,
+            serial: identity.as_ref().map(|i| i.serial.clone()),
             state,
             detail,
             role: Some("trigger_box".to_owned()),
             next_step,
+            firmware: identity.map(|i| i.firmware),
+            ..Line::default()
         });
     }
     for path in serial_ports(Path::new("/dev/serial/by-id")) {
@@ -349,13 +381,11 @@ fn trigger_boxes(rig: Option<&RigFile>) -> Vec<Line> {
             lines.push(Line {
                 device: "port",
                 what: path,
-                serial: None,
                 state: "not asked",
-                detail: String::new(),
-                role: None,
                 next_step: Some(
                     "if this is the trigger box, name the port in the rig file: only ports that are named are opened".to_owned(),
                 ),
+                ..Line::default()
             });
         }
     }
@@ -380,9 +410,8 @@ mod tests {
             what: "camera, USB bus 1 device 4".to_owned(),
             serial: serial.map(str::to_owned),
             state,
-            detail: String::new(),
             role: role.map(str::to_owned),
-            next_step: None,
+            ..Line::default()
         }
     }
 

@@ -10,6 +10,7 @@ pub mod compare;
 pub mod contacts;
 pub mod control;
 pub mod devices;
+pub mod doctor;
 pub mod exit;
 pub mod export;
 pub mod fault;
@@ -89,6 +90,7 @@ fn dispatch(cli: &Cli, arguments: &[OsString]) -> Outcome {
         Command::Control(a) => control::control(a, json),
         Command::Note(a) => control::note(a, json),
         Command::Devices(a) => devices::devices(a, json),
+        Command::Doctor(a) => doctor::doctor(a, json),
         Command::Jog(a) => jog::jog(a),
         Command::Hil(a) => hil::hil(a, &command_line(arguments), json),
         Command::Watch(a) => watch::watch(a, json),

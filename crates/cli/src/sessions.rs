@@ -126,7 +126,11 @@ fn none_in(folder: &Path) -> Failure {
     ))
 }
 
-fn files(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
+/// The session files of a folder, in no order.
+///
+/// # Errors
+/// [`Failure::input`] when it cannot be read.
+pub(crate) fn files(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     let refused = |e: std::io::Error| Failure::input(format!("{}: {e}", folder.display()));
     let mut found = Vec::new();
     for entry in std::fs::read_dir(folder).map_err(refused)? {

@@ -362,7 +362,8 @@ fn same(wanted: &str, found: &str) -> bool {
 
 /// Whether `found`, what a device says of its firmware, names the version `wanted` as a whole: `3.0` is in
 /// `FPGA 3.0, system 1c`, not in `13.0` or `3.01`.
-fn says_version(found: &str, wanted: &str) -> bool {
+#[must_use]
+pub fn says_version(found: &str, wanted: &str) -> bool {
     let part = |c: char| c.is_ascii_alphanumeric() || c == '.';
     found.match_indices(wanted).any(|(at, _)| {
         let before = found[..at].chars().next_back();

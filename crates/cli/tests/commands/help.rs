@@ -2,7 +2,9 @@
 
 use crate::support::{ROOT, skinrig};
 
-const COMMANDS: [&str; 22] = [
+const COMMANDS: [&str; 24] = [
+    "doctor",
+    "devices",
     "check",
     "plan",
     "status",

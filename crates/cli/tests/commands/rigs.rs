@@ -46,6 +46,42 @@ fn nothing_connected_is_no_error_and_every_line_has_a_next_step() {
 }
 
 #[test]
+fn the_doctor_tells_of_a_bench_that_is_not_there_what_is_missing() {
+    let lab = Lab::new();
+    let sessions = lab.text("s");
+    let doctor = |more: &[&str]| {
+        let mut arguments = vec!["doctor", "--sessions", &sessions];
+        arguments.extend_from_slice(more);
+        without_devices(&arguments)
+    };
+    let verdict = |json: &Value, area: &str, check: &str| {
+        let all = json["findings"].as_array().unwrap();
+        let found = all
+            .iter()
+            .find(|f| f["area"] == area && f["check"] == check);
+        found.map_or(Value::Null, |f| f["verdict"].clone())
+    };
+    // Without a rig file nothing is missing; what the machine itself lacks is its own business.
+    let alone = doctor(&["--json"]).json();
+    assert_eq!(alone["kind"], Value::Null);
+    for (area, check) in [("cables", "devices"), ("versions", "robot library")] {
+        assert_eq!(verdict(&alone, area, check), "not checked", "{alone}");
+    }
+    let bench = doctor(&["--rig", EMULATED, "--json"]).code(3).json();
+    assert_eq!(bench["kind"], "emulated");
+    for (area, check) in [("cables", "trigger_box"), ("versions", "robot library")] {
+        assert_eq!(verdict(&bench, area, check), "problem", "{bench}");
+    }
+    assert!(bench["problems"].as_u64() >= Some(2), "{bench}");
+    let plain = doctor(&["--rig", EMULATED]).code(3);
+    assert!(plain.out.starts_with("rig       emulated\n"), "{plain:?}");
+    assert!(plain.out.contains("problem") && plain.out.contains("next: "));
+    doctor(&["--rig", QUICK])
+        .code(2)
+        .complains(&["this is not a rig"]);
+}
+
+#[test]
 fn a_rig_file_is_read_with_the_same_care_as_a_protocol() {
     let lab = Lab::new();
     let run =

@@ -14,8 +14,8 @@ use crate::requests;
 use crate::usb::{Access, LibUsb, Slot, Transport, bus};
 
 /// What to do when a user may not open the camera.
-pub const UDEV_STEP: &str = "write `SUBSYSTEM==\"usb\", ATTR{idVendor}==\"04b4\", MODE=\"0666\"` to \
-     /etc/udev/rules.d/88-evk1.rules, run `udevadm control --reload`, plug the camera in again";
+pub const UDEV_STEP: &str =
+    "install hil/udev/70-skinrig.rules (hil/README.md), then plug the camera in again";
 
 /// The FPGA loads its configuration within this time.
 const BOOT_LIMIT: HostDuration = HostDuration::from_millis(10_000);

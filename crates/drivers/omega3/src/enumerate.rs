@@ -7,6 +7,10 @@ use skinrig_drd_abi::{DEVICE_OMEGA3, DeviceId, ErrorCode, SERIAL_UNKNOWN};
 use crate::error::next_step;
 use crate::sdk::{Answer, CallError, Sdk};
 
+/// USB vendor of Force Dimension. Product numbers differ among omega.3 (0402, 0301), so rules and lists name the vendor alone
+/// (udev rules of chai3d and yarp-omega3).
+pub const USB_VENDOR: u16 = 0x1451;
+
 /// A connected device of Force Dimension.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Found {
@@ -18,6 +22,8 @@ pub struct Found {
     pub type_number: Option<i32>,
     /// Its serial number, when it could be asked and has one.
     pub serial: Option<u16>,
+    /// Version of its controller's firmware, when it could be asked.
+    pub firmware: Option<String>,
     /// Whether it can be used.
     pub availability: Availability,
 }
@@ -105,8 +111,14 @@ pub(crate) fn unknown(index: i8, error: CallError) -> Found {
         model: None,
         type_number: None,
         serial: None,
+        firmware: None,
         availability: error.into(),
     }
+}
+
+/// As short as the number can be told: 3.0, not 3.00, and 3.123 in full.
+pub(crate) fn firmware_text(version: f64) -> String {
+    format!("{version:?}")
 }
 
 /// Looks at an open device.
@@ -122,6 +134,7 @@ pub(crate) fn look(sdk: &dyn Sdk, index: i8, id: DeviceId) -> Found {
         model: sdk.system_name(id),
         type_number: type_number.ok(),
         serial: sdk.serial(id).ok().filter(|s| *s != SERIAL_UNKNOWN),
+        firmware: sdk.firmware(id).ok().map(firmware_text),
         availability,
     }
 }

@@ -145,7 +145,7 @@ pub const fn next_step(code: ErrorCode) -> &'static str {
     match code {
         ErrorCode::COM => "check power and USB cable, then start again",
         ErrorCode::NO_DRIVER_FOUND => {
-            "give yourself access: a udev rule for USB vendor 1451, then plug the robot in again"
+            "give yourself access: install hil/udev/70-skinrig.rules (hil/README.md), then plug the robot in again"
         }
         ErrorCode::NO_DEVICE_FOUND => "plug the robot in and switch it on",
         ErrorCode::DEVICE_IN_USE => "end the other program that holds the robot",

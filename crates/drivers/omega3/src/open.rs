@@ -116,13 +116,16 @@ fn find(sdk: &dyn Sdk, config: &OmegaConfig) -> Result<(DeviceId, Found), OmegaE
         }
         None => {}
     }
-    let next = match seen.as_slice() {
-        [] => "plug the robot in, switch it on, and check your rights (a udev rule for USB vendor 1451)".to_owned(),
-        [only] => only
-            .next_step()
-            .unwrap_or_else(|| "correct the serial in the rig file, or connect that robot".to_owned()),
-        _ => "name the serial of this bench's robot in the rig file, and free that robot".to_owned(),
-    };
+    let next =
+        match seen.as_slice() {
+            [] => "plug the robot in, switch it on, and check your rights (`skinrig doctor`)"
+                .to_owned(),
+            [only] => only.next_step().unwrap_or_else(|| {
+                "correct the serial in the rig file, or connect that robot".to_owned()
+            }),
+            _ => "name the serial of this bench's robot in the rig file, and free that robot"
+                .to_owned(),
+        };
     let list: Vec<String> = seen.iter().map(Found::to_string).collect();
     Err(OmegaError::NotFound {
         expected,
@@ -199,8 +202,7 @@ impl Procedure<'_> {
                 .push(format!("type {number} is taken for an omega.3"));
         }
         let firmware = self.call("ask for its firmware", self.sdk.firmware(self.id))?;
-        // As short as the number can be told: 3.0, not 3.00, and 3.123 in full.
-        opened.firmware = format!("{firmware:?}");
+        opened.firmware = enumerate::firmware_text(firmware);
         match self.sdk.check_memory(self.id) {
             Some(answer) => self.call("check its controller's memory", answer)?,
             None => opened

@@ -1,0 +1,195 @@
+//! Whether everything is plugged in, and well: devices of the rig file, hubs, controllers, USB speed.
+
+use skinrig_omega3::enumerate::USB_VENDOR;
+use skinrig_protocol::rig::RigKind;
+
+use super::Case;
+use super::finding::{Finding, check};
+use super::survey::{Library, name_of};
+use super::usb::{self, UsbDevice};
+use crate::devices::Line;
+
+const AREA: &str = "cables";
+const SPEED: &str = "USB speed";
+/// What a camera needs, Mbit/s: its words at 50 Mev/s are 200 MB/s.
+const CAMERA_MBIT: u64 = 5000;
+/// What the robot has, Mbit/s (USB 2.0 high speed).
+const ROBOT_MBIT: u64 = 480;
+
+/// All findings about cables.
+pub(super) fn findings(case: &Case<'_>) -> Vec<Finding> {
+    let devices = usb::list(case.machine);
+    let mut findings = connected(case, devices.as_deref().ok());
+    let cameras: Vec<&Line> = case.survey.cameras().collect();
+    match &devices {
+        Ok(devices) => {
+            let seen: Vec<(&Line, Option<&UsbDevice>)> = cameras
+                .iter()
+                .map(|l| (*l, devices.iter().find(|d| Some(d.place) == l.usb)))
+                .collect();
+            findings.extend(seen.iter().map(|(l, d)| hub(l, *d)));
+            findings.push(controllers(&seen));
+            findings.extend(seen.iter().map(|(l, d)| camera_speed(l, *d)));
+            findings.push(robot_speed(devices));
+        }
+        Err(why) => {
+            findings.push(check(AREA, "USB tree", "hubs, controllers, speeds").not_checked(why))
+        }
+    }
+    findings
+}
+
+/// Whether what the rig file names is there; without one, what is.
+fn connected(case: &Case<'_>, devices: Option<&[UsbDevice]>) -> Vec<Finding> {
+    let Some(rig) = case.rig else {
+        return unnamed(case);
+    };
+    let mut roles = vec!["robot", "camera1", "camera2"];
+    if rig.trigger_box.is_some() {
+        roles.push("trigger_box");
+    }
+    let library = matches!(case.survey.library, Library::Loaded { .. });
+    let on_bus = |vendor: u16| devices.map(|all| all.iter().any(|d| d.vendor == vendor));
+    let finding = |role: &str| {
+        let check = check(AREA, role, format!("{} is connected", wanted(case, role)));
+        let Some(line) = case.survey.role(role) else {
+            // Without its library a robot has no line.
+            return match on_bus(USB_VENDOR) {
+                _ if role != "robot" || library => check.not_checked("nobody looked"),
+                Some(false) if rig.kind == RigKind::Bench => check.problem(
+                    "no device of Force Dimension (USB vendor 1451) on the bus",
+                    "plug the robot in and switch it on",
+                ),
+                _ => check.not_checked("without its library the robot cannot be asked"),
+            };
+        };
+        let next = || line.next_step.clone().unwrap_or_default();
+        match line.state {
+            "ready" => check.ok(line.what.as_str()),
+            "absent" => check.problem("not connected", next()),
+            "not asked" => check.not_checked(line.detail.as_str()),
+            "faulty" | "other device" => check.problem(with_detail(line), next()),
+            state => check.ok(format!("{}, {state}", line.what)),
+        }
+    };
+    let mut findings: Vec<Finding> = roles.iter().map(|role| finding(role)).collect();
+    // What does not answer does not tell whether it is the one that is missing.
+    let nameless = |l: &&Line| l.role.is_none() && is_faulty(l);
+    findings.extend(case.survey.lines.iter().filter(nameless).map(fault));
+    findings
+}
+
+fn unnamed(case: &Case<'_>) -> Vec<Finding> {
+    let mut findings =
+        vec![check(AREA, "devices", "those of the rig file").not_checked("no rig file names them")];
+    for line in &case.survey.lines {
+        if line.state == "ready" {
+            findings.push(check(AREA, name_of(line), "answers").ok(line.what.as_str()));
+        } else if is_faulty(line) {
+            findings.push(fault(line));
+        }
+    }
+    findings
+}
+
+/// A machine without USB is no fault of a cable; among the permissions it is told.
+fn is_faulty(line: &Line) -> bool {
+    line.state == "faulty" && line.what != "USB"
+}
+
+fn fault(line: &Line) -> Finding {
+    let check = check(AREA, name_of(line), "answers as it should");
+    let next = line.next_step.clone();
+    check.problem(
+        with_detail(line),
+        next.unwrap_or_else(|| "unplug it, wait 5 s, plug it in again".to_owned()),
+    )
+}
+
+fn with_detail(line: &Line) -> String {
+    match line.detail.as_str() {
+        "" => format!("{}, {}", line.what, line.state),
+        detail => format!("{}, {}: {detail}", line.what, line.state),
+    }
+}
+
+/// What the rig file names for a role.
+fn wanted(case: &Case<'_>, role: &str) -> String {
+    let Some(rig) = case.rig else {
+        return role.to_owned();
+    };
+    match role {
+        "robot" => format!("{} {}", rig.robot.model, rig.robot.serial),
+        "camera1" => format!("{} {}", rig.cameras[0].model, rig.cameras[0].serial),
+        "camera2" => format!("{} {}", rig.cameras[1].model, rig.cameras[1].serial),
+        _ => rig
+            .trigger_box
+            .as_ref()
+            .map_or_else(String::new, |b| format!("a box at {}", b.port)),
+    }
+}
+
+fn hub(line: &Line, device: Option<&UsbDevice>) -> Finding {
+    let check = check(
+        AREA,
+        format!("{}: hub", name_of(line)),
+        "no hub between camera and computer",
+    );
+    match device {
+        None => check.not_checked("the kernel does not list it"),
+        Some(UsbDevice { hub: Some(hub), .. }) => check.warning(
+            format!("behind the hub at {hub}"),
+            "plug the camera into the computer itself: a hub shares its rate, and adds a cable that may fail",
+        ),
+        Some(_) => check.ok("none"),
+    }
+}
+
+fn controllers(seen: &[(&Line, Option<&UsbDevice>)]) -> Finding {
+    let check = check(
+        AREA,
+        "cameras: controllers",
+        "each camera on a USB controller of its own",
+    );
+    let of = |(_, device): &(&Line, Option<&UsbDevice>)| device.and_then(|d| d.controller.clone());
+    match seen.iter().map(of).collect::<Vec<_>>().as_slice() {
+        [Some(one), Some(two)] if one == two => check.warning(
+            format!("both on {one}"),
+            "plug one camera into a port of another controller (`lsusb -t` shows the tree), or add one: both at full rate lose data \
+             on one",
+        ),
+        [Some(one), Some(two)] => check.ok(format!("{one} and {two}")),
+        [_, _] => check.not_checked("the kernel does not tell the controllers"),
+        other => check.not_checked(format!("{} cameras on the bus", other.len())),
+    }
+}
+
+fn camera_speed(line: &Line, device: Option<&UsbDevice>) -> Finding {
+    let check = check(
+        SPEED,
+        name_of(line),
+        format!("{CAMERA_MBIT} Mbit/s or more (USB 3)"),
+    );
+    match device.and_then(|d| d.speed_mbit) {
+        Some(mbit) if mbit >= CAMERA_MBIT => check.ok(format!("{mbit} Mbit/s")),
+        Some(mbit) => check.problem(
+            format!("{mbit} Mbit/s"),
+            "use a USB 3 port (blue, or marked SS) and a USB 3 cable; push the plug home: half in, it is a USB 2 plug",
+        ),
+        None => check.not_checked("the kernel does not tell its speed"),
+    }
+}
+
+fn robot_speed(devices: &[UsbDevice]) -> Finding {
+    let check = check(SPEED, "robot", format!("{ROBOT_MBIT} Mbit/s (USB 2.0)"));
+    let robot = devices.iter().find(|d| d.vendor == USB_VENDOR);
+    match robot.map(|d| d.speed_mbit) {
+        Some(Some(mbit)) if mbit >= ROBOT_MBIT => check.ok(format!("{mbit} Mbit/s")),
+        Some(Some(mbit)) => check.warning(
+            format!("{mbit} Mbit/s"),
+            "use another port and cable: the regulation asks the arm thousands of times a second",
+        ),
+        Some(None) => check.not_checked("the kernel does not tell its speed"),
+        None => check.not_checked("no device of Force Dimension (USB vendor 1451) on the bus"),
+    }
+}

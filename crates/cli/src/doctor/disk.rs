@@ -1,0 +1,123 @@
+//! Room and kind of the disk that sessions go to. How fast it writes is measured elsewhere.
+
+use std::path::{Path, PathBuf};
+
+use super::Case;
+use super::finding::{Finding, check};
+use crate::rig::gates::size;
+
+const AREA: &str = "disk";
+/// Left after a session, bytes; and both cameras together, bytes/s: the defaults of `preflight` in a rig file.
+const MIN_FREE_B: f64 = 2e9;
+const DATA_RATE_B_S: f64 = 20e6;
+/// A session as long as this should fit, s. The preflight knows the length of the protocol and asks for no more than it needs.
+const ROOM_FOR_S: f64 = 3600.0;
+
+/// All findings about the disk.
+pub(super) fn findings(case: &Case<'_>) -> Vec<Finding> {
+    // The folder may have to be made first.
+    let absolute = std::path::absolute(case.sessions).unwrap_or_else(|_| case.sessions.to_owned());
+    let there = absolute.ancestors().find(|f| f.exists());
+    let there = there.unwrap_or(Path::new("/"));
+    vec![space(case, there), file_system(case, there)]
+}
+
+fn space(case: &Case<'_>, folder: &Path) -> Finding {
+    let limits = case.rig.map(|r| r.preflight);
+    let keep_b = limits.map_or(MIN_FREE_B, |l| l.min_free_disk_b);
+    let rate_b_s = limits.map_or(DATA_RATE_B_S, |l| l.data_rate_b_s);
+    let check = check(
+        AREA,
+        "free",
+        format!(
+            "{} to be left (preflight.min_free_disk), and an hour at {}/s (preflight.data_rate)",
+            size(keep_b),
+            size(rate_b_s)
+        ),
+    );
+    let next = "make room, or give another folder with --sessions";
+    match (case.machine.free_b)(folder) {
+        Err(why) => check.not_checked(why),
+        Ok(free_b) if free_b < keep_b => check.problem(size(free_b), next),
+        Ok(free_b) => {
+            let room_s = (free_b - keep_b) / rate_b_s;
+            let found = format!("{}: room for {:.1} h", size(free_b), room_s / 3600.0);
+            if room_s < ROOM_FOR_S {
+                check.warning(found, next)
+            } else {
+                check.ok(found)
+            }
+        }
+    }
+}
+
+/// A file system on which sessions do not belong, and why.
+fn unfit(kind: &str) -> Option<&'static str> {
+    Some(match kind {
+        "tmpfs" | "ramfs" => "it lies in memory and is gone when the computer is switched off",
+        "nfs" | "nfs4" | "cifs" | "smb3" | "smbfs" | "9p" | "afs" | "ceph" | "glusterfs"
+        | "lustre" | "fuse.sshfs" | "fuse.rclone" => {
+            "it lies behind a network, whose pauses become lost data; SQLite's log does not work across machines"
+        }
+        "vfat" | "msdos" => "a file ends at 4 GB there",
+        "fuseblk" | "fuse.ntfs-3g" | "fuse.exfat" => {
+            "a program of its own writes it, slowly, and a cut of power may cost more than the last write"
+        }
+        _ => return None,
+    })
+}
+
+fn file_system(case: &Case<'_>, folder: &Path) -> Finding {
+    let check = check(AREA, "file system", "a local disk that may be written");
+    let mounts = match case.machine.text("/proc/self/mountinfo") {
+        Ok(mounts) => mounts,
+        Err(why) => return check.not_checked(why),
+    };
+    let folder = std::fs::canonicalize(folder).unwrap_or_else(|_| folder.to_owned());
+    // The last of several mounts on one place covers the others.
+    let under = mounts
+        .lines()
+        .filter_map(Mount::parse)
+        .filter(|m| folder.starts_with(&m.point))
+        .enumerate()
+        .max_by_key(|(i, m)| (m.point.components().count(), *i));
+    let Some((_, mount)) = under else {
+        return check.not_checked(format!("no mount holds {}", folder.display()));
+    };
+    let found = format!("{} at {}", mount.kind, mount.point.display());
+    let next = "give another folder with --sessions";
+    match unfit(&mount.kind) {
+        _ if mount.read_only => check.problem(format!("{found}, read-only"), next),
+        Some(why) => check.warning(format!("{found}: {why}"), next),
+        None => check.ok(found),
+    }
+}
+
+/// A line of `/proc/self/mountinfo` (`proc_pid_mountinfo(5)`).
+struct Mount {
+    point: PathBuf,
+    read_only: bool,
+    kind: String,
+}
+
+impl Mount {
+    fn parse(line: &str) -> Option<Self> {
+        let (place, system) = line.split_once(" - ")?;
+        let mut place = place.split(' ').skip(4);
+        let (point, options) = (place.next()?, place.next()?);
+        let has = |options: &str| options.split(',').any(|o| o == "ro");
+        let mut system = system.split(' ');
+        let kind = system.next()?.to_owned();
+        let super_options = system.nth(1).unwrap_or("");
+        Some(Self {
+            // White space and backslashes are written in octal.
+            point: point
+                .replace("\\040", " ")
+                .replace("\\011", "\t")
+                .replace("\\134", "\\")
+                .into(),
+            read_only: has(options) || has(super_options),
+            kind,
+        })
+    }
+}

@@ -1,0 +1,88 @@
+//! `skinrig doctor`: whether this machine is fit for the bench, and what to do about what is not.
+//!
+//! Devices are asked as `skinrig devices` asks them; everything else is read from files of the system below one folder, so
+//! that tests can plant a machine. What cannot be checked says why, and is neither good nor bad.
+
+mod access;
+mod bench;
+mod cables;
+mod clock;
+mod disk;
+mod finding;
+mod machine;
+mod permissions;
+mod power;
+mod real_time;
+mod survey;
+#[cfg(all(test, unix))]
+mod tests;
+mod usb;
+mod versions;
+
+use std::path::PathBuf;
+
+use clap::Args;
+use skinrig_protocol::rig::RigFile;
+
+use crate::exit::{Exit, Outcome};
+use crate::rig::bench as rig_bench;
+use finding::{Finding, Verdict};
+use machine::Machine;
+use survey::Survey;
+
+/// Arguments of `doctor`.
+#[derive(Debug, Args)]
+pub struct DoctorArgs {
+    /// Also hold what this rig file says against what is there.
+    #[arg(long, value_name = "FILE")]
+    pub rig: Option<PathBuf>,
+
+    /// The folder where sessions will be written.
+    #[arg(long, value_name = "DIR", default_value = "sessions")]
+    pub sessions: PathBuf,
+}
+
+/// What is examined.
+struct Case<'a> {
+    machine: &'a Machine,
+    rig: Option<&'a RigFile>,
+    survey: &'a Survey,
+    sessions: &'a std::path::Path,
+}
+
+/// `skinrig doctor`.
+///
+/// # Errors
+/// [`crate::exit::Failure`] for a rig file that cannot be read. Problems are no error: they are [`Exit::Rig`].
+pub fn doctor(args: &DoctorArgs, json: bool) -> Outcome {
+    let rig = args.rig.as_deref().map(rig_bench::load).transpose()?;
+    let findings = examine(&Case {
+        machine: &Machine::this(),
+        rig: rig.as_ref(),
+        survey: &Survey::make(rig.as_ref()),
+        sessions: &args.sessions,
+    });
+    if json {
+        crate::print_json(&finding::json(rig.as_ref(), &findings));
+    } else {
+        crate::terminal::out(format_args!("{}", finding::table(rig.as_ref(), &findings)));
+    }
+    Ok(if findings.iter().any(|f| f.verdict == Verdict::Problem) {
+        Exit::Rig
+    } else {
+        Exit::Ok
+    })
+}
+
+/// Everything, in the order in which it is told.
+fn examine(case: &Case<'_>) -> Vec<Finding> {
+    let mut findings = permissions::findings(case);
+    findings.extend(cables::findings(case));
+    findings.extend(versions::findings(case));
+    findings.extend(disk::findings(case));
+    findings.extend(real_time::findings(case));
+    findings.extend(power::findings(case));
+    findings.extend(clock::findings(case));
+    findings.extend(bench::findings(case));
+    findings
+}

@@ -1,0 +1,147 @@
+//! Whether this process may keep real time: priority, locked memory, USB buffers, memory.
+
+use std::collections::BTreeMap;
+
+use skinrig_evk1::Evk1Config;
+
+use super::Case;
+use super::access::{CAP_IPC_LOCK, CAP_SYS_NICE};
+use super::finding::{Check, Finding, check};
+use crate::rig::gates::size;
+
+const AREA: &str = "real time";
+/// Share of the last minute in which something waited for memory, percent.
+const MOST_PRESSURE_PERCENT: f64 = 1.0;
+
+/// All findings about real time.
+pub(super) fn findings(case: &Case<'_>) -> Vec<Finding> {
+    let limits = case.machine.text("/proc/self/limits");
+    vec![
+        priority(case, &limits),
+        locked_memory(case, &limits),
+        usb_buffers(case),
+        memory(case),
+        pressure(case),
+    ]
+}
+
+/// The soft limit of a line of `/proc/self/limits`, `u64::MAX` without one.
+fn soft(limits: &Result<String, String>, name: &str) -> Result<u64, String> {
+    let text = limits.as_ref().map_err(Clone::clone)?;
+    let line = text.lines().find_map(|l| l.strip_prefix(name));
+    let word = line.and_then(|rest| rest.split_whitespace().next());
+    match word {
+        Some("unlimited") => Ok(u64::MAX),
+        Some(number) => number.parse().map_err(|_| format!("{name}: {number}")),
+        None => Err(format!("/proc/self/limits does not tell `{name}`")),
+    }
+}
+
+/// The robot's library asks for a priority of its regulation's thread and locks memory (its imports `pthread_setschedparam` and
+/// `mlockall`); without these rights it runs without.
+fn raise(case: &Case<'_>) -> String {
+    let user = case
+        .machine
+        .user()
+        .map_or_else(|_| "USER".to_owned(), |u| u.name);
+    format!(
+        "printf '{user} - rtprio 99\\n{user} - memlock unlimited\\n' | sudo tee /etc/security/limits.d/skinrig.conf; then log out and \
+         in again"
+    )
+}
+
+fn may(case: &Case<'_>, capability: u64) -> bool {
+    let user = case.machine.user();
+    user.is_ok_and(|u| u.capabilities & capability != 0)
+}
+
+fn priority(case: &Case<'_>, limits: &Result<String, String>) -> Finding {
+    let check = check(
+        AREA,
+        "priority",
+        "real-time priorities allowed (RLIMIT_RTPRIO)",
+    );
+    match soft(limits, "Max realtime priority") {
+        Err(why) => check.not_checked(why),
+        Ok(n) if n > 0 => check.ok(format!("up to {}", n.min(99))),
+        Ok(_) if may(case, CAP_SYS_NICE) => check.ok("by CAP_SYS_NICE"),
+        Ok(_) => check.warning("none", raise(case)),
+    }
+}
+
+fn locked_memory(case: &Case<'_>, limits: &Result<String, String>) -> Finding {
+    let check = check(AREA, "locked memory", "unlimited (RLIMIT_MEMLOCK)");
+    match soft(limits, "Max locked memory") {
+        Err(why) => check.not_checked(why),
+        Ok(u64::MAX) => check.ok("unlimited"),
+        Ok(_) if may(case, CAP_IPC_LOCK) => check.ok("by CAP_IPC_LOCK"),
+        Ok(bytes) => check.warning(size(bytes as f64), raise(case)),
+    }
+}
+
+/// The kernel gives all of a machine's USB transfers so much memory together.
+fn usb_buffers(case: &Case<'_>) -> Finding {
+    let config = Evk1Config::default();
+    let need_b = 2 * config.transfers * config.transfer_bytes;
+    let need_mb = need_b.div_ceil(1 << 20) as u64;
+    let check = check(
+        AREA,
+        "USB buffers",
+        format!("at least {need_mb} MiB for both cameras' transfers (usbfs_memory_mb)"),
+    );
+    let file = "/sys/module/usbcore/parameters/usbfs_memory_mb";
+    match case.machine.number(file) {
+        None => check.not_checked(format!("cannot read {file}")),
+        Some(0) => check.ok("unlimited"),
+        Some(mb) if mb >= need_mb => check.ok(format!("{mb} MiB")),
+        Some(mb) => check.problem(
+            format!("{mb} MiB"),
+            format!("echo 64 | sudo tee {file}; lasting: usbcore.usbfs_memory_mb=64 on the kernel's command line"),
+        ),
+    }
+}
+
+/// What the cameras' backlogs take at worst, twice: the recorder needs as much again.
+fn memory(case: &Case<'_>) -> Finding {
+    let need_b = (4 * Evk1Config::default().backlog_bytes) as f64;
+    let check = check(AREA, "memory", format!("{} available", size(need_b)));
+    match case.machine.table("/proc/meminfo") {
+        Err(why) => check.not_checked(why),
+        Ok(table) => match kib(&table, "MemAvailable") {
+            None => check.not_checked("/proc/meminfo does not tell MemAvailable"),
+            Some(bytes) if bytes >= need_b => check.ok(size(bytes)),
+            Some(bytes) => check.warning(
+                size(bytes),
+                "end other programs: a browser, a desktop, other analyses",
+            ),
+        },
+    }
+}
+
+fn kib(table: &BTreeMap<String, String>, key: &str) -> Option<f64> {
+    let number = table.get(key)?.strip_suffix("kB")?.trim();
+    number.parse::<f64>().ok().map(|kib| kib * 1024.0)
+}
+
+/// Swapping shows as time that something waited for memory (`/proc/pressure`).
+fn pressure(case: &Case<'_>) -> Finding {
+    let check: Check = check(
+        AREA,
+        "memory pressure",
+        format!("at most {MOST_PRESSURE_PERCENT} % of the last minute spent waiting for memory"),
+    );
+    let text = match case.machine.text("/proc/pressure/memory") {
+        Ok(text) => text,
+        Err(why) => return check.not_checked(why),
+    };
+    let some = text.lines().find(|l| l.starts_with("some "));
+    let word = some.and_then(|l| l.split(' ').find_map(|w| w.strip_prefix("avg60=")));
+    match word.and_then(|w| w.parse::<f64>().ok()) {
+        None => check.not_checked("/proc/pressure/memory does not tell it"),
+        Some(percent) if percent <= MOST_PRESSURE_PERCENT => check.ok(format!("{percent} %")),
+        Some(percent) => check.warning(
+            format!("{percent} %"),
+            "find out who takes the memory (`ps --sort=-rss -eo pid,rss,comm | head`), and end it; a pause of the disk becomes lost data",
+        ),
+    }
+}

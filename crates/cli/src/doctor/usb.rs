@@ -1,0 +1,54 @@
+//! The USB tree as the kernel tells it under `/sys/bus/usb/devices`.
+
+use super::machine::Machine;
+
+/// Where the kernel lists devices.
+const DEVICES: &str = "/sys/bus/usb/devices";
+
+/// A device on a bus.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct UsbDevice {
+    /// USB vendor.
+    pub vendor: u16,
+    /// Bus and address on it, as libusb tells them.
+    pub place: (u8, u8),
+    /// Mbit/s.
+    pub speed_mbit: Option<u64>,
+    /// The hub between it and the computer, as the kernel names it.
+    pub hub: Option<String>,
+    /// The controller of its bus. A controller's USB 2 and USB 3 halves are two buses and have the same.
+    pub controller: Option<String>,
+}
+
+impl UsbDevice {
+    /// The file by which it is opened.
+    pub fn node(&self) -> String {
+        let (bus, address) = self.place;
+        format!("/dev/bus/usb/{bus:03}/{address:03}")
+    }
+}
+
+/// Every device but hubs of the controllers themselves.
+///
+/// # Errors
+/// A fragment that says what cannot be read.
+pub(super) fn list(machine: &Machine) -> Result<Vec<UsbDevice>, String> {
+    let names = machine.names(DEVICES)?;
+    // `3-1.4` is port 4 of the hub at port 1 of bus 3; `3-1.4:1.0` is one of its interfaces, `usb3` the bus itself.
+    let devices = names.iter().filter(|n| n.contains('-') && !n.contains(':'));
+    Ok(devices.filter_map(|name| device(machine, name)).collect())
+}
+
+fn device(machine: &Machine, name: &str) -> Option<UsbDevice> {
+    let of = |key: &str| machine.text(&format!("{DEVICES}/{name}/{key}")).ok();
+    let place = (of("busnum")?.parse().ok()?, of("devnum")?.parse().ok()?);
+    let bus = name.split('-').next()?;
+    Some(UsbDevice {
+        vendor: u16::from_str_radix(&of("idVendor")?, 16).ok()?,
+        place,
+        speed_mbit: of("speed").and_then(|speed| speed.parse().ok()),
+        hub: name.rsplit_once('.').map(|(hub, _)| hub.to_owned()),
+        // A bus has the name of its controller for a serial number.
+        controller: machine.text(&format!("{DEVICES}/usb{bus}/serial")).ok(),
+    })
+}
