@@ -4,7 +4,7 @@
 
 use std::path::Path;
 
-use emulated_libdrd::{ArmConfig, EmulatedArm};
+use emulated_libdrd::{ArmConfig, EmulatedArm, Fault, When};
 use serde_json::Value;
 use skinrig_emulated_camera::config::Access;
 use skinrig_emulated_camera::{Bus, BusConfig, DeviceConfig, Evk1Config};
@@ -17,9 +17,19 @@ fn camera(serial: &str, change: impl FnOnce(&mut Evk1Config)) -> DeviceConfig {
 }
 
 /// What the doctor says of these devices, and its exit code.
-fn doctor(cameras: Vec<DeviceConfig>, arm: &ArmConfig) -> (Value, Option<i32>) {
+fn doctor(cameras: Vec<DeviceConfig>, fault: Option<Fault>) -> (Value, Option<i32>) {
     let bus = Bus::start(&BusConfig { devices: cameras }).unwrap();
-    let arm = EmulatedArm::spawn(arm).unwrap();
+    let arm = EmulatedArm::spawn(&ArmConfig {
+        devices: vec![emulated_libdrd::DeviceConfig {
+            serial: 4711,
+            ..Default::default()
+        }],
+        ..ArmConfig::default()
+    });
+    let arm = arm.unwrap();
+    if let Some(fault) = fault {
+        arm.inject(When::Now, fault).unwrap();
+    }
     let folder = tempfile::tempdir().unwrap();
     let mut command = bus.command(env!("CARGO_BIN_EXE_skinrig")).unwrap();
     command
@@ -31,13 +41,18 @@ fn doctor(cameras: Vec<DeviceConfig>, arm: &ArmConfig) -> (Value, Option<i32>) {
         .arg(folder.path());
     let output = command.output().unwrap();
     let json = serde_json::from_slice(&output.stdout);
-    (json.unwrap_or_else(|e| panic!("{e}\n{output:?}")), output.status.code())
+    (
+        json.unwrap_or_else(|e| panic!("{e}\n{output:?}")),
+        output.status.code(),
+    )
 }
 
 /// Verdict and next step of a check.
 fn told<'a>(said: &'a Value, area: &str, check: &str) -> (&'a str, &'a str) {
     let all = said["findings"].as_array().unwrap();
-    let found = all.iter().find(|f| f["area"] == area && f["check"] == check);
+    let found = all
+        .iter()
+        .find(|f| f["area"] == area && f["check"] == check);
     let found = found.unwrap_or_else(|| panic!("{area}, {check}: {said:#}"));
     (
         found["verdict"].as_str().unwrap(),
@@ -51,35 +66,33 @@ fn a_slow_camera_a_forbidden_one_and_a_robot_without_a_cable_are_told_apart() {
         camera("00000001", |c| c.speed_mbit = 480),
         camera("00000002", |c| c.access = Access::NotPermitted),
     ];
-    let unplugged = ArmConfig {
-        devices: Vec::new(),
-        ..ArmConfig::default()
-    };
-    let (said, code) = doctor(cameras, &unplugged);
+    let (said, code) = doctor(cameras, Some(Fault::Unplug));
     assert_eq!(code, Some(3), "{said:#}");
     assert_eq!(said["kind"], "emulated");
     let (verdict, next) = told(&said, "USB speed", "camera1");
-    assert!(verdict == "problem" && next.contains("USB 3 cable"), "{said:#}");
+    assert!(
+        verdict == "problem" && next.contains("USB 3 cable"),
+        "{said:#}"
+    );
     // Nobody may ask the other one, not even whether it is camera 2.
     let (verdict, next) = told(&said, "permissions", "camera at bus 1 device 3");
-    assert!(verdict == "problem" && next.contains("70-skinrig.rules"), "{said:#}");
+    assert!(
+        verdict == "problem" && next.contains("70-skinrig.rules"),
+        "{said:#}"
+    );
     assert_eq!(told(&said, "cables", "camera2").0, "not checked");
     let (verdict, next) = told(&said, "cables", "robot");
-    assert!(verdict == "problem" && next.contains("plug it in"), "{said:#}");
+    assert!(
+        verdict == "problem" && next.contains("plug it in"),
+        "{said:#}"
+    );
     assert_eq!(told(&said, "versions", "robot library").0, "ok");
 }
 
 #[test]
 fn devices_as_they_should_be_are_no_problem() {
     let cameras = ["00000001", "00000002"].map(|serial| camera(serial, |_| {}));
-    let arm = ArmConfig {
-        devices: vec![emulated_libdrd::DeviceConfig {
-            serial: 4711,
-            ..Default::default()
-        }],
-        ..ArmConfig::default()
-    };
-    let (said, _) = doctor(cameras.into(), &arm);
+    let (said, _) = doctor(cameras.into(), None);
     for (area, check) in [
         ("permissions", "camera1"),
         ("permissions", "robot"),
@@ -91,6 +104,10 @@ fn devices_as_they_should_be_are_no_problem() {
         ("versions", "camera1"),
         ("bench", "devices"),
     ] {
-        assert_eq!(told(&said, area, check).0, "ok", "{area}, {check}: {said:#}");
+        assert_eq!(
+            told(&said, area, check).0,
+            "ok",
+            "{area}, {check}: {said:#}"
+        );
     }
 }
