@@ -1,16 +1,19 @@
 //! How many events fell on each pixel of the crop: all that the clustering needs to know of a press.
 
+use std::ops::Range;
+
 use skinrig_model::{CdEvent, SENSOR_HEIGHT, SENSOR_WIDTH};
 
+use crate::counters::Counters;
 use crate::pixels::PixelSet;
 
 /// Event counts per pixel: all columns, the rows of a crop.
 ///
-/// Counters are 32 bit wide and so is their sum; [`PixelGrid::add_many`] refuses what would overflow it.
+/// The sum of all counts is below 2^32; [`PixelGrid::add_many`] refuses what would overflow it.
 #[derive(Debug, Clone)]
 pub struct PixelGrid {
     rows: (u16, u16),
-    counts: Vec<u32>,
+    counts: Counters,
     occupied: PixelSet,
     events: u32,
 }
@@ -26,7 +29,7 @@ impl PixelGrid {
         let height = (usize::from(rows.1) + 1).saturating_sub(usize::from(rows.0));
         Self {
             rows,
-            counts: vec![0; height * Self::WIDTH],
+            counts: Counters::new(height * Self::WIDTH),
             occupied: PixelSet::new(height),
             events: 0,
         }
@@ -67,10 +70,9 @@ impl PixelGrid {
             return false;
         };
         let index = usize::from(v - self.rows.0) * Self::WIDTH + usize::from(u);
-        let Some(count) = self.counts.get_mut(index) else {
+        if !self.counts.add_many(index, n) {
             return false;
-        };
-        *count += n;
+        }
         if n > 0 {
             self.occupied.insert(index);
         }
@@ -86,16 +88,11 @@ impl PixelGrid {
         for (counted, event) in events[..fitting].iter().enumerate() {
             let index = usize::from(event.y) * Self::WIDTH + usize::from(event.x);
             let index = index.wrapping_sub(first);
-            match self.counts.get_mut(index) {
-                Some(count) if event.x < SENSOR_WIDTH => {
-                    *count += 1;
-                    self.occupied.insert(index);
-                }
-                _ => {
-                    self.events += counted as u32;
-                    return false;
-                }
+            if event.x >= SENSOR_WIDTH || !self.counts.add(index) {
+                self.events += counted as u32;
+                return false;
             }
+            self.occupied.insert(index);
         }
         self.events += fitting as u32;
         fitting == events.len()
@@ -103,8 +100,8 @@ impl PixelGrid {
 
     /// Empties the grid; costs as much as it held.
     pub fn clear(&mut self) {
-        for index in self.occupied.iter() {
-            self.counts[index] = 0;
+        for pixels in self.occupied.blocks() {
+            self.counts.clear(pixels);
         }
         self.occupied.reset(self.height());
         self.events = 0;
@@ -120,16 +117,22 @@ impl PixelGrid {
     /// Count of the pixel with this index.
     #[must_use]
     pub fn count(&self, index: u32) -> u32 {
-        self.counts[index as usize]
+        // No more than all events.
+        self.counts.get(index as usize) as u32
+    }
+
+    /// Events on the pixels with these indices.
+    #[inline]
+    pub(crate) fn sum(&self, indices: Range<usize>) -> u32 {
+        self.counts.sum(indices) as u32
     }
 
     /// Events per column.
     #[must_use]
     pub fn columns(&self) -> [u32; Self::WIDTH] {
         let mut sums = [0; Self::WIDTH];
-        // Row by row, side by side: no sum is above that of all events.
-        for row in self.counts.chunks_exact(Self::WIDTH) {
-            sums.iter_mut().zip(row).for_each(|(sum, n)| *sum += n);
+        for index in self.occupied.iter() {
+            sums[index % Self::WIDTH] += self.count(index as u32);
         }
         sums
     }
@@ -137,11 +140,5 @@ impl PixelGrid {
     /// The pixels with events of one row, counted from the crop's first: the first 64 in the first word.
     pub(crate) fn occupied(&self, row: usize) -> &[u64] {
         self.occupied.row(row)
-    }
-
-    /// Counts of one row, counted from the crop's first.
-    #[must_use]
-    pub fn row(&self, row: usize) -> &[u32] {
-        &self.counts[row * Self::WIDTH..(row + 1) * Self::WIDTH]
     }
 }

@@ -18,6 +18,7 @@ mod caveats;
 mod check;
 pub mod clock;
 mod closeups;
+mod counters;
 pub mod cmre;
 pub mod coverage;
 pub mod dbscan;

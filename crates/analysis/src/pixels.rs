@@ -1,5 +1,7 @@
 //! A set of pixels, one bit each, that is walked in order.
 
+use std::ops::Range;
+
 use skinrig_model::SENSOR_WIDTH;
 
 /// Bits of a word.
@@ -51,6 +53,13 @@ impl PixelSet {
         }
     }
 
+    /// Stretches of 64 indices that hold all of the set, those without any left out.
+    pub fn blocks(&self) -> impl Iterator<Item = Range<usize>> {
+        let words = self.words.iter().enumerate();
+        let occupied = words.filter(|(_, word)| **word != 0);
+        occupied.map(|(i, _)| i * BITS..(i + 1) * BITS)
+    }
+
     /// The words of one row.
     pub fn row(&self, row: usize) -> &[u64] {
         &self.words[row * ROW_WORDS..(row + 1) * ROW_WORDS]
@@ -84,6 +93,10 @@ mod tests {
             let mut indices = Vec::new();
             set.append_to(&mut indices);
             prop_assert!(indices.iter().map(|i| *i as usize).eq(members.iter().copied()));
+            let blocks: Vec<usize> = set.blocks().map(|b| b.start).collect();
+            prop_assert!(blocks.is_sorted_by(|a, b| a < b));
+            prop_assert!(members.iter().all(|m| blocks.contains(&(m / BITS * BITS))));
+            prop_assert!(blocks.len() <= members.len());
             set.reset(1);
             prop_assert_eq!(set.iter().next(), None);
         }

@@ -198,7 +198,6 @@ impl Dbscan {
         self.all.resize(count, Tile::default());
         for row in 0..self.height {
             let (first, start) = (self.tiles.first(row), row % SIDE * SIDE);
-            let (counts, _) = grid.row(row).as_chunks::<SIDE>();
             for (i, word) in grid.occupied(row).iter().enumerate() {
                 let mut left = *word;
                 while left != 0 {
@@ -211,7 +210,8 @@ impl Dbscan {
                         self.occupied.push(first + at);
                     }
                     tile.occupied |= bits << start;
-                    tile.events += counts[at].iter().sum::<u32>();
+                    let pixel = row * WIDTH + at * SIDE;
+                    tile.events += grid.sum(pixel..pixel + SIDE);
                 }
             }
         }
