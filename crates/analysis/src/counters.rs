@@ -66,15 +66,23 @@ impl Counters {
         u64::from(rounds) << u8::BITS | u64::from(self.low[index])
     }
 
-    /// Sum of some.
+    /// The sum of the eight from an index on, and a bit for each of them that is above 1.
     #[inline]
-    pub fn sum(&self, indices: Range<usize>) -> u64 {
-        let low: u32 = self.low[indices.clone()]
+    pub fn eight(&self, first: usize) -> (u64, u64) {
+        let word = self.low[first..first + 8]
             .iter()
-            .map(|n| u32::from(*n))
-            .sum();
-        let rounds = self.rounds.get(indices).unwrap_or_default().iter();
-        u64::from(low) + (rounds.map(|n| u64::from(*n)).sum::<u64>() << u8::BITS)
+            .rev()
+            .fold(0, |word, n| word << u8::BITS | u64::from(*n));
+        let (mut sum, mut bits) = (bytes::sum(word), bytes::nonzero(word & !bytes::ONES));
+        if let Some(rounds) = self.rounds.get(first..first + 8) {
+            sum += rounds
+                .iter()
+                .map(|n| u64::from(*n) << u8::BITS)
+                .sum::<u64>();
+            let above = rounds.iter().map(|n| u64::from(*n > 0)).zip(0..);
+            bits = above.fold(bits, |all, (bit, i)| all | bit << i);
+        }
+        (sum, bits)
     }
 
     /// Sets some back to 0.
@@ -91,6 +99,27 @@ impl Counters {
     }
 }
 
+/// Eight bytes in a word, the first one lowest.
+mod bytes {
+    /// A one in each.
+    pub const ONES: u64 = 0x0101_0101_0101_0101;
+    const LOW_SEVEN: u64 = 0x7f7f_7f7f_7f7f_7f7f;
+    const EVEN: u64 = 0x00ff_00ff_00ff_00ff;
+
+    /// Their sum: in four pairs, then all of those in the uppermost 16 bits of the product.
+    pub const fn sum(word: u64) -> u64 {
+        let pairs = (word & EVEN) + (word >> 8 & EVEN);
+        pairs.wrapping_mul(0x0001_0001_0001_0001) >> 48
+    }
+
+    /// A bit for each that is not 0: its uppermost bit, set by a carry from those below, is moved to its place in the
+    /// uppermost byte of the product.
+    pub const fn nonzero(word: u64) -> u64 {
+        let uppermost = ((word & LOW_SEVEN) + LOW_SEVEN | word) & !LOW_SEVEN;
+        (uppermost >> 7).wrapping_mul(0x0102_0408_1020_4080) >> 56
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use proptest::collection::vec;
@@ -101,20 +130,21 @@ mod tests {
     proptest! {
         #[test]
         fn counts_are_those_of_wide_counters(
-            steps in vec((0usize..6, prop_oneof![Just(1u32), 0u32..1000, any::<u32>()]), 0..40),
-            cleared in 0usize..5,
+            steps in vec((0usize..10, prop_oneof![Just(1u32), 0u32..1000, any::<u32>()]), 0..40),
+            cleared in 0usize..9,
         ) {
-            let mut counters = Counters::new(5);
-            let mut wide = [0u64; 5];
+            let mut counters = Counters::new(9);
+            let mut wide = [0u64; 9];
             for (index, n) in steps {
                 let counted = if n == 1 { counters.add(index) } else { counters.add_many(index, n) };
-                prop_assert_eq!(counted, index < 5);
+                prop_assert_eq!(counted, index < 9);
                 if let Some(wide) = wide.get_mut(index) {
                     *wide += u64::from(n);
                 }
             }
             prop_assert!(counters.iter().eq(wide));
-            prop_assert_eq!(counters.sum(1..4), wide[1..4].iter().sum::<u64>());
+            let above = (0..8).fold(0, |all, i| all | u64::from(wide[1 + i] > 1) << i);
+            prop_assert_eq!(counters.eight(1), (wide[1..].iter().sum(), above));
             counters.clear(0..cleared);
             wide[..cleared].fill(0);
             prop_assert!(counters.iter().eq(wide));

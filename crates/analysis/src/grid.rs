@@ -1,7 +1,5 @@
 //! How many events fell on each pixel of the crop: all that the clustering needs to know of a press.
 
-use std::ops::Range;
-
 use skinrig_model::{CdEvent, SENSOR_HEIGHT, SENSOR_WIDTH};
 
 use crate::counters::Counters;
@@ -121,10 +119,11 @@ impl PixelGrid {
         self.counts.get(index as usize) as u32
     }
 
-    /// Events on the pixels with these indices.
+    /// Events on the eight pixels from an index on, and which of them have more than one.
     #[inline]
-    pub(crate) fn sum(&self, indices: Range<usize>) -> u32 {
-        self.counts.sum(indices) as u32
+    pub(crate) fn eight(&self, first: usize) -> (u32, u64) {
+        let (sum, repeated) = self.counts.eight(first);
+        (sum as u32, repeated)
     }
 
     /// Events per column.

@@ -92,6 +92,8 @@ pub struct Dbscan {
 struct Tile {
     /// Pixels with events.
     occupied: u64,
+    /// Pixels with more than one event.
+    repeated: u64,
     /// Core pixels.
     core: u64,
     /// Events.
@@ -211,7 +213,9 @@ impl Dbscan {
                     }
                     tile.occupied |= bits << start;
                     let pixel = row * WIDTH + at * SIDE;
-                    tile.events += grid.sum(pixel..pixel + SIDE);
+                    let (events, repeated) = grid.eight(pixel);
+                    tile.events += events;
+                    tile.repeated |= repeated << start;
                 }
             }
         }
@@ -254,22 +258,25 @@ impl Dbscan {
     /// True when enough events lie in the disc about a pixel of a tile whose first pixel has the index `corner`.
     #[inline]
     fn is_core(&self, grid: &PixelGrid, tile: usize, corner: usize, at: usize) -> bool {
-        let mut events = 0;
-        for Part { step, mask } in self.tiles.parts(at) {
-            let near = &self.all[tile.wrapping_add(step.by)];
-            let mut within = near.occupied & mask;
-            if within == 0 {
-                continue;
+        let parts = self.tiles.parts(at);
+        let (mut events, mut repeated) = (0, 0);
+        // Every pixel has one event at least: no branch depends on single pixels.
+        for Part { by, mask, .. } in parts {
+            let near = &self.all[tile.wrapping_add(*by)];
+            events += (near.occupied & mask).count_ones();
+            repeated |= near.repeated & mask;
+            if events >= self.min_samples {
+                return true;
             }
-            if within == near.occupied {
-                events += near.events;
-            } else {
-                let corner = corner.wrapping_add(step.pixels);
-                while within != 0 {
-                    events +=
-                        grid.count((corner + offset(within.trailing_zeros() as usize)) as u32);
-                    within &= within - 1;
-                }
+        }
+        if repeated == 0 {
+            return false;
+        }
+        for Part { step, by, mask } in parts {
+            let repeated = self.all[tile.wrapping_add(*by)].repeated & mask;
+            let corner = corner.wrapping_add(self.tiles.steps()[*step].pixels);
+            for at in ones(repeated) {
+                events = events.saturating_add(grid.count((corner + offset(at)) as u32) - 1);
             }
             if events >= self.min_samples {
                 return true;
@@ -409,8 +416,8 @@ impl Dbscan {
             .tiles
             .parts(at)
             .iter()
-            .filter_map(|Part { step, mask }| {
-                let other = tile.wrapping_add(step.by);
+            .filter_map(|Part { step, by, mask }| {
+                let other = tile.wrapping_add(*by);
                 let within = self.all[other].core & mask;
                 (within != 0).then_some((step, other, within))
             });
@@ -425,7 +432,7 @@ impl Dbscan {
             return Some(label);
         }
         let pixels = met.flat_map(|(step, other, within)| {
-            let corner = self.corner(other);
+            let (corner, step) = (self.corner(other), &self.tiles.steps()[*step]);
             ones(within).map(move |to| (step.squared(at, to), corner + offset(to), other, to))
         });
         // No two of them have the same index.

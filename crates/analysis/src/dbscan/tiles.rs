@@ -42,8 +42,10 @@ impl Step {
 /// What a disc covers of one of the tiles that it meets.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Part {
-    /// The way to the tile.
-    pub step: Step,
+    /// The way to the tile: the place of its step among all.
+    pub step: usize,
+    /// [`Step::by`].
+    pub by: usize,
     /// The pixels covered, at least one.
     pub mask: u64,
 }
@@ -101,10 +103,14 @@ impl Tiles {
         let mut parts = Vec::new();
         let mut starts = [0; SIDE * SIDE + 1];
         for at in 0..SIDE * SIDE {
-            let all = steps.iter().map(|(step, masks)| Part {
-                step: *step,
-                mask: masks[at],
-            });
+            let all = steps
+                .iter()
+                .zip(0..)
+                .map(|((Step { by, .. }, masks), step)| Part {
+                    step,
+                    by: *by,
+                    mask: masks[at],
+                });
             parts.extend(all.filter(|part| part.mask != 0));
             starts[at + 1] = parts.len();
         }
