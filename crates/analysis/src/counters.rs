@@ -85,6 +85,29 @@ impl Counters {
         (sum, bits)
     }
 
+    /// The sums of those that lie `N` apart, as in the columns of a table of so many.
+    pub fn columns<const N: usize>(&self) -> [u64; N] {
+        let mut sums = [0; N];
+        // So many bytes fit into 16 bits: row by row, side by side.
+        for rows in self.low.chunks(256 * N) {
+            let mut some = [0u16; N];
+            for row in rows.chunks(N) {
+                some.iter_mut()
+                    .zip(row)
+                    .for_each(|(sum, n)| *sum += u16::from(*n));
+            }
+            sums.iter_mut()
+                .zip(some)
+                .for_each(|(sum, n)| *sum += u64::from(n));
+        }
+        for row in self.rounds.chunks(N) {
+            sums.iter_mut()
+                .zip(row)
+                .for_each(|(sum, n)| *sum += u64::from(*n) << u8::BITS);
+        }
+        sums
+    }
+
     /// Sets some back to 0.
     pub fn clear(&mut self, indices: Range<usize>) {
         self.low[indices.clone()].fill(0);
@@ -115,7 +138,7 @@ mod bytes {
     /// A bit for each that is not 0: its uppermost bit, set by a carry from those below, is moved to its place in the
     /// uppermost byte of the product.
     pub const fn nonzero(word: u64) -> u64 {
-        let uppermost = ((word & LOW_SEVEN) + LOW_SEVEN | word) & !LOW_SEVEN;
+        let uppermost = (((word & LOW_SEVEN) + LOW_SEVEN) | word) & !LOW_SEVEN;
         (uppermost >> 7).wrapping_mul(0x0102_0408_1020_4080) >> 56
     }
 }
@@ -144,6 +167,8 @@ mod tests {
             }
             prop_assert!(counters.iter().eq(wide));
             let above = (0..8).fold(0, |all, i| all | u64::from(wide[1 + i] > 1) << i);
+            let columns = [0, 1, 2].map(|k| wide.iter().skip(k).step_by(3).sum::<u64>());
+            prop_assert_eq!(counters.columns(), columns);
             prop_assert_eq!(counters.eight(1), (wide[1..].iter().sum(), above));
             counters.clear(0..cleared);
             wide[..cleared].fill(0);
@@ -156,5 +181,12 @@ mod tests {
         let mut counters = Counters::new(2);
         (0..70_000).for_each(|_| assert!(counters.add(1)));
         assert_eq!((counters.get(0), counters.get(1)), (0, 70_000));
+    }
+
+    #[test]
+    fn many_full_bytes_side_by_side() {
+        let mut counters = Counters::new(1000);
+        (0..1000).for_each(|i| assert!(counters.add_many(i, 255)));
+        assert_eq!(counters.columns(), [255_000]);
     }
 }

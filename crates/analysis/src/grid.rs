@@ -129,11 +129,7 @@ impl PixelGrid {
     /// Events per column.
     #[must_use]
     pub fn columns(&self) -> [u32; Self::WIDTH] {
-        let mut sums = [0; Self::WIDTH];
-        for index in self.occupied.iter() {
-            sums[index % Self::WIDTH] += self.count(index as u32);
-        }
-        sums
+        self.counts.columns().map(|events| events as u32)
     }
 
     /// The pixels with events of one row, counted from the crop's first: the first 64 in the first word.

@@ -83,6 +83,8 @@ pub struct Dbscan {
     /// The tiles with events.
     occupied: Vec<usize>,
     groups: Vec<Group>,
+    /// Per group another one of its cluster, with an earlier first pixel; or itself.
+    parents: Vec<u32>,
     /// Rows of the grid.
     height: usize,
     clusters: Vec<Cluster>,
@@ -109,8 +111,6 @@ struct Group {
     core: u64,
     /// Index of its first pixel.
     first: u32,
-    /// Another group of its cluster, with an earlier first pixel; or itself.
-    parent: u32,
     label: u32,
 }
 
@@ -127,6 +127,7 @@ impl Dbscan {
             all: Vec::new(),
             occupied: Vec::new(),
             groups: Vec::new(),
+            parents: Vec::new(),
             height: 0,
             clusters: Vec::new(),
         }
@@ -223,6 +224,7 @@ impl Dbscan {
 
     fn find_core(&mut self, grid: &PixelGrid) {
         self.groups.clear();
+        self.parents.clear();
         for &index in &self.occupied {
             let tile = self.all[index];
             let corner = self.corner(index);
@@ -242,11 +244,11 @@ impl Dbscan {
                 let first = left.trailing_zeros() as usize;
                 let core = self.connected(first, left);
                 left &= !core;
+                self.parents.push(self.groups.len() as u32);
                 self.groups.push(Group {
                     tile: index,
                     core,
                     first: (corner + offset(first)) as u32,
-                    parent: self.groups.len() as u32,
                     label: 0,
                 });
             }
@@ -301,29 +303,29 @@ impl Dbscan {
 
     /// Joins the groups that have pixels within eps of each other.
     fn join(&mut self) {
-        let steps = self.tiles.steps().iter().enumerate();
-        let forward = steps.filter(|(_, step)| step.is_forward());
-        for a in 0..self.groups.len() {
-            let Group { tile, core, .. } = self.groups[a];
-            let mut root = find(&mut self.groups, a);
+        let parents = &mut self.parents;
+        for (a, Group { tile, core, .. }) in self.groups.iter().enumerate() {
+            let mut root = find(parents, a);
             // Near tiles first: what they join need not be looked at again.
-            for (k, step) in forward.clone() {
+            for (k, step) in self.tiles.forward() {
                 let able = core & step.able;
                 if able == 0 {
                     continue;
                 }
                 let (from, to) = self.all[tile.wrapping_add(step.by)].groups;
                 for b in from as usize..to as usize {
-                    let found = find(&mut self.groups, b);
+                    let found = find(parents, b);
+                    if found == root {
+                        continue;
+                    }
                     let others = self.groups[b].core;
-                    let touch = |at| self.tiles.masks(at)[k] & others != 0;
-                    if found != root && ones(able).any(touch) {
+                    if ones(able).any(|at| self.tiles.masks(at)[*k] & others != 0) {
                         let (early, late) = if self.groups[found].first < self.groups[root].first {
                             (found, root)
                         } else {
                             (root, found)
                         };
-                        self.groups[late].parent = early as u32;
+                        parents[late] = early as u32;
                         root = early;
                     }
                 }
@@ -333,18 +335,17 @@ impl Dbscan {
 
     /// Numbers the clusters by their first core pixel.
     fn number(&mut self) {
-        let roots = self
-            .groups
-            .iter()
-            .enumerate()
-            .filter(|(i, g)| g.parent as usize == *i);
-        let mut roots: Vec<(u32, usize)> = roots.map(|(i, g)| (g.first, i)).collect();
+        let firsts = self.groups.iter().map(|g| g.first).enumerate();
+        let mut roots: Vec<(u32, usize)> = firsts
+            .filter(|(i, _)| self.parents[*i] as usize == *i)
+            .map(|(i, first)| (first, i))
+            .collect();
         roots.sort_unstable();
         for (label, (_, root)) in (0..).zip(&roots) {
             self.groups[*root].label = label;
         }
         for i in 0..self.groups.len() {
-            let root = find(&mut self.groups, i);
+            let root = find(&mut self.parents, i);
             self.groups[i].label = self.groups[root].label;
         }
         self.clusters.clear();
@@ -453,10 +454,11 @@ const fn offset(at: usize) -> usize {
 }
 
 /// The first group of a group's cluster, as far as it is known.
-fn find(groups: &mut [Group], mut i: usize) -> usize {
-    while groups[i].parent as usize != i {
-        groups[i].parent = groups[groups[i].parent as usize].parent;
-        i = groups[i].parent as usize;
+#[inline]
+fn find(parents: &mut [u32], mut i: usize) -> usize {
+    while parents[i] as usize != i {
+        parents[i] = parents[parents[i] as usize];
+        i = parents[i] as usize;
     }
     i
 }

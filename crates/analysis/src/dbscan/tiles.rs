@@ -24,7 +24,7 @@ pub(super) struct Step {
 
 impl Step {
     /// True for half of the steps to other tiles, one of each two that lead there and back.
-    pub fn is_forward(&self) -> bool {
+    fn is_forward(&self) -> bool {
         (self.rows, self.columns) > (0, 0)
     }
 
@@ -59,6 +59,8 @@ pub(super) struct Tiles {
     stride: usize,
     /// Near tiles first, the tile itself the very first. None when no disc holds even its own pixel.
     steps: Vec<Step>,
+    /// One of each two that lead to another tile and back, with its place among all.
+    forward: Vec<(usize, Step)>,
     /// For each pixel of a tile, what the disc about it covers of the tile at each step.
     masks: Vec<u64>,
     /// For each pixel of a tile the parts of the disc about it, near tiles first.
@@ -114,9 +116,11 @@ impl Tiles {
             parts.extend(all.filter(|part| part.mask != 0));
             starts[at + 1] = parts.len();
         }
+        let numbered = steps.iter().map(|(step, _)| *step).enumerate();
         Self {
             margin,
             stride,
+            forward: numbered.filter(|(_, step)| step.is_forward()).collect(),
             masks: (0..SIDE * SIDE)
                 .flat_map(|at| steps.iter().map(move |(_, masks)| masks[at]))
                 .collect(),
@@ -129,6 +133,11 @@ impl Tiles {
     /// The steps to all tiles that a disc about some pixel of a tile meets.
     pub fn steps(&self) -> &[Step] {
         &self.steps
+    }
+
+    /// One of each two steps that lead to another tile and back, with its place among all; near tiles first.
+    pub fn forward(&self) -> &[(usize, Step)] {
+        &self.forward
     }
 
     /// What the disc about a pixel of a tile, by its place, covers at each step.
