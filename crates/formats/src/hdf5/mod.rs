@@ -21,6 +21,5 @@ pub use read::EventReader;
 pub use tree::{Container, DvsEntry};
 pub use write::EventWriter;
 
-/// Rows that are delivered or written at once: a batch stays in the second-level cache, and is one chunk of a
-/// file written here.
+/// Rows that are written at once: they stay in the second-level cache, and are one chunk of a file written here.
 const BATCH_ROWS: usize = 16_384;
