@@ -10,6 +10,7 @@ pub mod findings;
 pub mod history;
 pub mod room;
 pub mod runner;
+mod streams;
 pub mod trouble;
 
 pub use bench::{Bench, Devices, Drilled, GoldenRun, Slot, Trouble};

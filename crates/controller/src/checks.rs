@@ -6,6 +6,7 @@ use skinrig_model::{
     CameraId, DeviceIdentity, DeviceRole, HostDuration, PreflightCheck, RawChunk, Record, Setting,
     TriggerEdge,
 };
+use skinrig_protocol::rig::RigFile;
 
 use crate::core::{Collect, Core};
 use crate::error::{ControllerError, Halt};
@@ -121,6 +122,78 @@ impl Watch {
     }
 }
 
+impl ExpectedDevice {
+    /// Whom a rig file expects: the robot, both cameras, and the trigger box when it has one.
+    #[must_use]
+    pub fn of_rig(file: &RigFile) -> Vec<Self> {
+        let robot = &file.robot;
+        let mut expected = vec![Self {
+            role: DeviceRole::Indenter,
+            serial: Some(robot.serial.to_string()),
+            versions: [&robot.firmware, &robot.library_version]
+                .into_iter()
+                .flatten()
+                .cloned()
+                .collect(),
+            settings: robot
+                .velocity_threshold
+                .map(|t| ("velocity_threshold".to_owned(), t.to_string()))
+                .into_iter()
+                .collect(),
+        }];
+        for (id, camera) in CameraId::ALL.into_iter().zip(&file.cameras) {
+            expected.push(Self {
+                role: DeviceRole::of_camera(id),
+                serial: Some(camera.serial.clone()),
+                versions: camera.fpga.iter().map(|v| format!("FPGA {v}")).collect(),
+                settings: Vec::new(),
+            });
+        }
+        if let Some(device) = &file.trigger_box {
+            expected.push(Self {
+                role: DeviceRole::TriggerBox,
+                serial: device.serial.clone(),
+                versions: device.firmware.iter().cloned().collect(),
+                settings: Vec::new(),
+            });
+        }
+        expected
+    }
+}
+
+/// Checks who a device says it is against whom is `wanted` in its role; without one anybody will do.
+#[must_use]
+pub fn identity_checks(
+    role: DeviceRole,
+    wanted: Option<&ExpectedDevice>,
+    identity: &DeviceIdentity,
+) -> Vec<PreflightCheck> {
+    let serial = wanted.and_then(|w| w.serial.as_deref());
+    let mut checks = vec![PreflightCheck::new(
+        format!("{role}: identity"),
+        serial.map_or_else(|| "any serial number".to_owned(), |s| format!("serial {s}")),
+        format!("{} {}", identity.model, identity.serial),
+        serial.is_none_or(|s| s == identity.serial),
+        "connect the right device, or correct its serial number in the rig file",
+    )];
+    for version in wanted.iter().flat_map(|w| &w.versions) {
+        checks.push(PreflightCheck::new(
+            format!("{role}: version"),
+            version.as_str(),
+            identity.firmware.as_str(),
+            says_version(&identity.firmware, version),
+            "install the expected version, or accept this one in the rig file after testing it",
+        ));
+    }
+    checks
+}
+
+/// The settings that were written and read back as something else; values that were only read do not count.
+pub fn differing(settings: &[Setting]) -> impl Iterator<Item = &Setting> {
+    let written = settings.iter().filter(|s| s.requested != Setting::AS_FOUND);
+    written.filter(|s| !same(&s.requested, &s.read_back))
+}
+
 impl Core<'_> {
     /// Checks an identity and what was read back from its device.
     pub(crate) fn check_device(
@@ -133,24 +206,7 @@ impl Core<'_> {
             return;
         };
         let wanted = preflight.expected.iter().find(|e| e.role == role);
-        let mut checks = Vec::new();
-        let serial = wanted.and_then(|w| w.serial.as_deref());
-        checks.push(PreflightCheck::new(
-            format!("{role}: identity"),
-            serial.map_or_else(|| "any serial number".to_owned(), |s| format!("serial {s}")),
-            format!("{} {}", identity.model, identity.serial),
-            serial.is_none_or(|s| s == identity.serial),
-            "connect the right device, or correct its serial number in the rig file",
-        ));
-        for version in wanted.iter().flat_map(|w| &w.versions) {
-            checks.push(PreflightCheck::new(
-                format!("{role}: version"),
-                version.as_str(),
-                identity.firmware.as_str(),
-                says_version(&identity.firmware, version),
-                "install the expected version, or accept this one in the rig file after testing it",
-            ));
-        }
+        let mut checks = identity_checks(role, wanted, identity);
         for (name, value) in wanted.iter().flat_map(|w| &w.settings) {
             let found = settings.iter().find(|s| s.name == *name);
             checks.push(PreflightCheck::new(
@@ -326,9 +382,7 @@ impl Core<'_> {
 /// Everything that was written reads back; values that were only read do not count.
 fn read_back(role: DeviceRole, settings: &[Setting]) -> PreflightCheck {
     let written = settings.iter().filter(|s| s.requested != Setting::AS_FOUND);
-    let differing: Vec<String> = written
-        .clone()
-        .filter(|s| !same(&s.requested, &s.read_back))
+    let differing: Vec<String> = differing(settings)
         .map(|s| format!("{} {} instead of {}", s.name, s.read_back, s.requested))
         .collect();
     PreflightCheck::new(

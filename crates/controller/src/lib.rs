@@ -55,7 +55,7 @@ mod touch;
 mod verdict;
 pub mod watchdog;
 
-pub use checks::{ExpectedDevice, Loopback, Preflight, says_version};
+pub use checks::{ExpectedDevice, Loopback, Preflight, differing, identity_checks, says_version};
 pub use control::{ControlHandle, NotesFull};
 pub use error::{ControllerError, GuardError};
 pub use guard::{Floor, GuardedIndenter};

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use skinrig_model::{CameraId, DeviceIdentity, RawChunk, Setting, StreamFormat};
+use skinrig_model::{CameraId, DeviceIdentity, DeviceRole, RawChunk, Setting, StreamFormat};
 
 use crate::DeviceError;
 
@@ -68,6 +68,25 @@ pub struct CameraSettings {
     pub trigger_channels: Vec<u8>,
 }
 
+/// Events that a camera makes by itself, in place of what its pixels see.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TestPattern {
+    /// How many are wanted, events per second.
+    pub rate_ev_s: f64,
+}
+
+/// What a camera's pattern generator makes: a scan of all pixels down each column, from the first column to the last, again and
+/// again, at an even rate.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PatternScan {
+    /// Events per second of the camera's own clock: the nearest to what was wanted.
+    pub rate_ev_s: f64,
+    /// Columns of the scan; not bound to the sensor's.
+    pub columns: u16,
+    /// Rows of the scan; likewise.
+    pub rows: u16,
+}
+
 /// A source of raw event bytes.
 ///
 /// States: stopped -> [`start`](Self::start) -> streaming -> [`stop`](Self::stop) -> stopped.
@@ -128,5 +147,27 @@ pub trait EventCamera: Send {
     /// [`DeviceError::Lost`] when a camera that could tell does not answer.
     fn temperature_c(&mut self) -> Result<Option<f64>, DeviceError> {
         Ok(None)
+    }
+
+    /// From the next start on lets the camera's own generator make events in place of its pixels. `None` gives the pixels
+    /// back, and so does [`configure`](Self::configure). Only while stopped. Answers what the generator makes; `None` when the
+    /// pixels are back.
+    ///
+    /// # Errors
+    /// [`DeviceError::Refused`] from a camera without a generator, and for a rate that it cannot make;
+    /// [`DeviceError::ReadBack`]; [`DeviceError::State`] while streaming.
+    fn test_pattern(
+        &mut self,
+        pattern: Option<TestPattern>,
+    ) -> Result<Option<PatternScan>, DeviceError> {
+        match pattern {
+            None => Ok(None),
+            Some(_) => Err(DeviceError::Refused {
+                role: DeviceRole::of_camera(self.camera()),
+                serial: self.identity().serial,
+                expected: "a camera that makes events by itself".to_owned(),
+                found: self.identity().model,
+            }),
+        }
     }
 }

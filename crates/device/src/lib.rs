@@ -13,7 +13,10 @@ pub mod limits;
 pub mod rig;
 pub mod trigger;
 
-pub use camera::{CameraCapabilities, CameraSettings, EventCamera, NoiseFilter, Roi, SyncMode};
+pub use camera::{
+    CameraCapabilities, CameraSettings, EventCamera, NoiseFilter, PatternScan, Roi, SyncMode,
+    TestPattern,
+};
 pub use clock::{Clock, RealClock};
 pub use error::DeviceError;
 pub use indenter::{Indenter, IndenterCapabilities, MotionLimits, RobotSample};

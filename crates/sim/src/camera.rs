@@ -2,7 +2,9 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
-use skinrig_device::{CameraCapabilities, CameraSettings, DeviceError, EventCamera};
+use skinrig_device::{
+    CameraCapabilities, CameraSettings, DeviceError, EventCamera, PatternScan, TestPattern,
+};
 use skinrig_formats::{Scanner, evt2};
 use skinrig_model::{
     CameraId, DeviceIdentity, DeviceRole, HostTime, RawChunk, SENSOR_HEIGHT, SENSOR_WIDTH, Setting,
@@ -14,6 +16,7 @@ use crate::config::SimConfig;
 use crate::drifting::DriftingClock;
 use crate::faults::{Fault, HOT_C, HOT_NS, HOT_RISE_NS, STORM_NS, When};
 use crate::line::LineEdge;
+use crate::pattern::Scanning;
 use crate::random::{Purpose, Stream};
 use crate::scene::{GRID_NS, PixelModel};
 use crate::world::{Shared, World};
@@ -38,6 +41,9 @@ pub const TRIGGER_CHANNEL: u8 = 0;
 /// Temperature of a simulated camera that no fault heats, °C.
 pub const TEMPERATURE_C: f64 = 35.0;
 
+/// Rates of the pattern that a simulated camera makes, events per second.
+const PATTERN_RATES_EV_S: std::ops::RangeInclusive<f64> = 1.0..=50e6;
+
 /// Makes the pixel model for the n-th start of a camera; `None` when there are no pixels at this level.
 pub type PixelFactory = Box<dyn Fn(u64) -> Option<Box<dyn PixelModel>> + Send>;
 
@@ -61,6 +67,7 @@ pub struct SimCamera {
     draw_clock: crate::config::CameraClockConfig,
     clock: Option<DriftingClock>,
     settings: CameraSettings,
+    pattern: Option<PatternScan>,
     starts: u64,
     streaming: Option<Streaming>,
     scanner: Scanner,
@@ -122,6 +129,7 @@ impl SimCamera {
             draw_clock: config.camera_clock,
             clock: None,
             settings: CameraSettings::default(),
+            pattern: None,
             starts: 0,
             streaming: None,
             scanner: Scanner::new(StreamFormat::Evt2),
@@ -345,6 +353,7 @@ impl EventCamera for SimCamera {
     fn configure(&mut self, settings: &CameraSettings) -> Result<Vec<Setting>, DeviceError> {
         self.expect_stopped()?;
         self.check(settings)?;
+        self.pattern = None;
         let mut biases: BTreeMap<String, i64> =
             BIASES.iter().map(|b| (b.0.to_owned(), b.3)).collect();
         biases.extend(settings.biases.iter().map(|(n, v)| (n.clone(), *v)));
@@ -398,9 +407,14 @@ impl EventCamera for SimCamera {
             ),
         };
         self.clock = Some(clock);
+        let pixels = match &self.pattern {
+            None => (self.make_pixels)(self.starts),
+            Some(scan) => Some(Box::new(Scanning::new(*scan)) as Box<dyn PixelModel>),
+        };
         self.streaming = Some(Streaming {
             grid,
-            pixels: (self.make_pixels)(self.starts),
+            pixels,
+            has_region: self.pattern.is_none(),
             encoder: evt2::Encoder::new(clock.own_us(start_ns)),
             edges: VecDeque::new(),
             tips: Vec::new(),
@@ -433,6 +447,31 @@ impl EventCamera for SimCamera {
         self.streaming = None;
         self.shared.world().unwatch(self.id.index());
         flushed
+    }
+
+    fn test_pattern(
+        &mut self,
+        pattern: Option<TestPattern>,
+    ) -> Result<Option<PatternScan>, DeviceError> {
+        self.expect_stopped()?;
+        self.pattern = match pattern {
+            None => None,
+            Some(TestPattern { rate_ev_s }) if PATTERN_RATES_EV_S.contains(&rate_ev_s) => {
+                Some(PatternScan {
+                    rate_ev_s,
+                    columns: SENSOR_WIDTH,
+                    rows: SENSOR_HEIGHT,
+                })
+            }
+            Some(TestPattern { rate_ev_s }) => {
+                let (low, high) = (PATTERN_RATES_EV_S.start(), PATTERN_RATES_EV_S.end());
+                return Err(self.refused(
+                    format!("a pattern of {low} to {high} events/s"),
+                    rate_ev_s.to_string(),
+                ));
+            }
+        };
+        Ok(self.pattern)
     }
 
     fn temperature_c(&mut self) -> Result<Option<f64>, DeviceError> {

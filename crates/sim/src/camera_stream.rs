@@ -18,6 +18,8 @@ use crate::scene::{GRID_NS, PixelEvent, PixelModel, TipSample};
 pub(crate) struct Streaming {
     pub grid: i64,
     pub pixels: Option<Box<dyn PixelModel>>,
+    /// Events come from pixels, of which a region may be on.
+    pub has_region: bool,
     pub encoder: evt2::Encoder,
     /// Trigger edges not yet encoded, with the instant at which the camera sees them.
     pub edges: VecDeque<LineEdge>,
@@ -67,7 +69,7 @@ impl Streaming {
                 self.edges.pop_front();
                 encode_edge(&mut self.encoder, edge, triggered, clock, &mut self.fresh);
             }
-            if set.roi.is_some_and(|r| {
+            if set.roi.filter(|_| self.has_region).is_some_and(|r| {
                 !(r.x..r.x + r.width).contains(&event.x)
                     || !(r.y..r.y + r.height).contains(&event.y)
             }) {

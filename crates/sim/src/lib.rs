@@ -19,6 +19,7 @@ pub mod line;
 pub mod moments;
 pub mod motion;
 pub mod optical;
+mod pattern;
 pub mod random;
 pub mod replay;
 pub mod rig;

@@ -7,6 +7,7 @@ mod drills;
 mod golden;
 mod identity;
 mod noise;
+mod pixels;
 mod robot;
 mod settings;
 mod stream;

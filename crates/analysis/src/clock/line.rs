@@ -15,18 +15,31 @@ pub struct Pair {
 /// A line `camera = offset + (1 + drift) host` and how well it fits.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Line {
+    /// Camera time at host time 0, µs.
     pub offset_us: f64,
+    /// How much faster the camera's clock is, as a fraction.
     pub drift: f64,
+    /// Standard error of the drift.
     pub drift_se: f64,
+    /// RMS residual of the pairs that were used, µs.
     pub rms_us: f64,
+    /// Their largest absolute residual, µs.
     pub max_us: f64,
     /// For each pair, whether it was used.
     pub used: Vec<bool>,
 }
 
 impl Line {
+    /// How many pairs were used.
+    #[must_use]
     pub fn n(&self) -> usize {
         self.used.iter().filter(|u| **u).count()
+    }
+
+    /// How much later than the line the camera's time of `pair` is, µs.
+    #[must_use]
+    pub fn residual_us(&self, pair: Pair) -> f64 {
+        (pair.camera_us - pair.host_us) - self.offset_us - self.drift * pair.host_us
     }
 }
 
@@ -39,8 +52,9 @@ const MAD_TO_SIGMA: f64 = 1.482_602_218_505_602;
 
 /// Fits a line robustly: median of the slopes between pairs half the session apart (Theil 1950, with the
 /// pairing that keeps it linear in time), then least squares on the pairs within five robust standard
-/// deviations, which are never taken smaller than `floor_us`. `None` with fewer than 3 usable pairs or no
+/// deviations, which are never taken smaller than `floor_us`, µs. `None` with fewer than 3 usable pairs or no
 /// spread in time.
+#[must_use]
 pub fn fit(pairs: &[Pair], floor_us: f64) -> Option<Line> {
     let n = pairs.len();
     if n < 3 {

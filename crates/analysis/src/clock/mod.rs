@@ -5,6 +5,7 @@ pub(crate) mod line;
 mod marks;
 mod presses;
 
+pub use line::{Line, Pair, fit as fit_line};
 pub use marks::{MarksFit, fit_marks};
 pub use presses::{PressSpan, RatesFit, fit_rates};
 

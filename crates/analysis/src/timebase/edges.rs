@@ -46,6 +46,11 @@ pub struct CameraFromBox {
     pub instants: Vec<Option<f64>>,
     /// Standard deviation of a rising edge about the instant of its train, µs.
     pub edge_sigma_us: f64,
+    /// Of each train that was sent, how many of its pulses have both edges.
+    pub whole_pulses: Vec<u32>,
+    /// Standard deviation of the rising edges about their own train's mean, µs, and how many edges it stands on; no edge is left
+    /// out.
+    pub jitter: Option<(f64, u64)>,
     /// Edges sent, seen, lost, doubled, spurious.
     pub counts: LineCounts,
     /// Anchors that the others contradict.
@@ -130,6 +135,8 @@ impl Edges {
                 .ok_or_else(|| format!("only {} trains were seen", seen.len()))?;
         }
         let edge_sigma_us = edge_sigma_us(&matched);
+        let whole_pulses = matched.iter().map(|m| m.whole_pulses).collect();
+        let jitter = jitter(&matched);
         let counts = self.count(&epoch.trains, &matched, &map, reference_us);
         Ok(CameraFromBox {
             map,
@@ -137,6 +144,8 @@ impl Edges {
             sent_us: epoch.trains.iter().map(|t| t.box_us).collect(),
             instants,
             edge_sigma_us,
+            whole_pulses,
+            jitter,
             counts,
             contradicted,
         })
@@ -157,14 +166,19 @@ impl Edges {
                     start_us: start,
                     ..Matched::default()
                 };
+                let mut rose = false;
                 for (offset, rising) in train.train.edges() {
                     let at = map.value(train.box_us + offset as f64);
-                    if let Some((index, off)) = self.nearest(at, rising, reference_us, near_us) {
+                    let found = self.nearest(at, rising, reference_us, near_us);
+                    if let Some((index, off)) = found {
                         out.edges.push(index);
                         if rising {
                             out.rises.push(off);
                         }
                     }
+                    // A falling edge follows its rising one.
+                    out.whole_pulses += u32::from(!rising && rose && found.is_some());
+                    rose = rising && found.is_some();
                 }
                 out
             })
@@ -253,6 +267,8 @@ struct Matched {
     edges: Vec<usize>,
     /// How much later than it should be each of the rising edges is: falling ones may have another delay.
     rises: Vec<f64>,
+    /// Pulses of which both edges were found.
+    whole_pulses: u32,
 }
 
 impl Matched {
@@ -273,6 +289,21 @@ fn edge_sigma_us(matched: &[Matched]) -> f64 {
         .flat_map(|(m, middle)| m.rises.iter().map(move |r| (r - middle).abs()))
         .collect();
     1.482_602_218_505_602 * median(&mut off).unwrap_or(0.0)
+}
+
+/// Standard deviation of rising edges about the means of their trains, pooled over trains (each takes one degree of freedom), and
+/// the number of edges.
+fn jitter(matched: &[Matched]) -> Option<(f64, u64)> {
+    let (mut squares, mut free, mut n) = (0.0, 0, 0);
+    for rises in matched.iter().map(|m| &m.rises) {
+        if rises.len() >= LEAST_RISES {
+            let mean = rises.iter().sum::<f64>() / rises.len() as f64;
+            squares += rises.iter().map(|r| (r - mean) * (r - mean)).sum::<f64>();
+            free += rises.len() - 1;
+            n += rises.len() as u64;
+        }
+    }
+    (free > 0).then(|| ((squares / free as f64).sqrt(), n))
 }
 
 /// (box time, camera time) of the trains that are certain, in order of box time.

@@ -9,6 +9,9 @@ mod epochs;
 mod host;
 mod piecewise;
 mod residuals;
+mod wire;
+
+pub use self::wire::{Wire, WireTrain, wire};
 
 use skinrig_model::{AlignmentSettings, BoxReport, HostTime, TriggerEdge};
 

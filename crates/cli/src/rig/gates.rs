@@ -5,7 +5,7 @@ use std::path::Path;
 use chrono::Utc;
 use skinrig_controller::{ExpectedDevice, Loopback, Preflight};
 use skinrig_device::Rig;
-use skinrig_model::{DeviceRole, HostDuration, PreflightCheck};
+use skinrig_model::{HostDuration, PreflightCheck};
 use skinrig_protocol::rig::{Frame, PreflightLimits, RigFile, RigKind};
 
 /// Space that must be left on the disk after a session of the simulated rig, bytes.
@@ -34,7 +34,7 @@ pub fn of_bench(file: &RigFile, rig: &Rig, folder: &Path, expected_s: f64) -> Pr
     });
     Preflight {
         made,
-        expected: expected(file),
+        expected: ExpectedDevice::of_rig(file),
         clocks_within: Some(limits.clocks_within),
         loopback: loopback(rig, limits.loopback_within),
     }
@@ -78,44 +78,6 @@ fn loopback(rig: &Rig, within: HostDuration) -> Option<Loopback> {
         channels: [channel; 2],
         within,
     })
-}
-
-fn expected(file: &RigFile) -> Vec<ExpectedDevice> {
-    let robot = &file.robot;
-    let threshold = robot.velocity_threshold;
-    let mut expected = vec![ExpectedDevice {
-        role: DeviceRole::Indenter,
-        serial: Some(robot.serial.to_string()),
-        versions: [&robot.firmware, &robot.library_version]
-            .into_iter()
-            .flatten()
-            .cloned()
-            .collect(),
-        settings: threshold
-            .map(|t| ("velocity_threshold".to_owned(), t.to_string()))
-            .into_iter()
-            .collect(),
-    }];
-    for (role, camera) in [DeviceRole::Camera1, DeviceRole::Camera2]
-        .into_iter()
-        .zip(&file.cameras)
-    {
-        expected.push(ExpectedDevice {
-            role,
-            serial: Some(camera.serial.clone()),
-            versions: camera.fpga.iter().map(|v| format!("FPGA {v}")).collect(),
-            settings: Vec::new(),
-        });
-    }
-    if let Some(device) = &file.trigger_box {
-        expected.push(ExpectedDevice {
-            role: DeviceRole::TriggerBox,
-            serial: device.serial.clone(),
-            versions: device.firmware.iter().cloned().collect(),
-            settings: Vec::new(),
-        });
-    }
-    expected
 }
 
 /// Room for the session, and some left.

@@ -3,7 +3,7 @@
 use skinrig_model::{HostDuration, HostTime, RawChunk};
 
 use super::pass;
-use crate::{CameraSettings, Clock, DeviceError, EventCamera, Roi};
+use crate::{CameraSettings, Clock, DeviceError, EventCamera, Roi, TestPattern};
 
 /// The promises of [`EventCamera`]. `make` gives a fresh, stopped camera and its clock; `settings` are what
 /// the rig writes to it.
@@ -13,6 +13,7 @@ pub fn event_camera(
 ) {
     camera_states(make, settings);
     camera_stream(make, settings);
+    camera_pattern(make, settings);
 }
 
 fn camera_states(
@@ -129,6 +130,54 @@ fn camera_stream(
         }
     }
     check_chunks(camera.as_ref(), &all, clock.now());
+}
+
+/// A camera either makes a pattern, and gives its pixels back, or refuses it.
+fn camera_pattern(
+    make: &mut dyn FnMut() -> (Box<dyn EventCamera>, Box<dyn Clock>),
+    settings: &CameraSettings,
+) {
+    let (mut camera, mut clock) = make();
+    camera
+        .configure(settings)
+        .expect("camera: the rig's settings must be accepted");
+    let pixels = camera.test_pattern(None);
+    assert_eq!(pixels, Ok(None), "camera: no pattern is always possible");
+    let wanted = |rate_ev_s| Some(TestPattern { rate_ev_s });
+    let scan = match camera.test_pattern(wanted(200e3)) {
+        Ok(scan) => scan.expect("camera: a pattern that is made must be told"),
+        Err(DeviceError::Refused { .. }) => return,
+        Err(e) => panic!("camera: a pattern must be made or refused: {e}"),
+    };
+    assert!(
+        (100e3..400e3).contains(&scan.rate_ev_s) && scan.columns > 0 && scan.rows > 0,
+        "camera: expected a pattern of about 200000 events/s, found {scan:?}"
+    );
+    for rate_ev_s in [0.0, -1.0, 1e12, f64::NAN] {
+        expect_error!(
+            camera.test_pattern(wanted(rate_ev_s)),
+            DeviceError::Refused { .. },
+            format!("camera: a pattern of {rate_ev_s} events/s must be refused")
+        );
+    }
+    camera.start().expect("camera: start with a pattern");
+    expect_error!(
+        camera.test_pattern(None),
+        DeviceError::State { .. },
+        "camera: a pattern while streaming must be a State error"
+    );
+    let mut chunks = Vec::new();
+    pass(clock.as_mut(), HostDuration::from_millis(200), || {
+        camera.poll(&mut chunks).expect("camera: poll");
+    });
+    camera.stop(&mut chunks).expect("camera: stop");
+    let events: u64 = chunks.iter().map(|c| c.facts.cd_events).sum();
+    assert!(
+        events > 0,
+        "camera: expected events of the pattern, found none"
+    );
+    let pixels = camera.test_pattern(None);
+    assert_eq!(pixels, Ok(None), "camera: the pixels must come back");
 }
 
 fn check_chunks(camera: &dyn EventCamera, chunks: &[RawChunk], now: HostTime) {

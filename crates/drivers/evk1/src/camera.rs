@@ -4,7 +4,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use skinrig_device::{
-    CameraCapabilities, CameraSettings, Clock, DeviceError, EventCamera, RealClock, SyncMode,
+    CameraCapabilities, CameraSettings, Clock, DeviceError, EventCamera, PatternScan, RealClock,
+    SyncMode, TestPattern,
 };
 use skinrig_model::{
     CameraId, DeviceIdentity, DeviceRole, HostDuration, HostTime, RawChunk, SENSOR_HEIGHT,
@@ -23,7 +24,7 @@ use crate::report::StreamReport;
 use crate::settings::Checked;
 use crate::triggers::{self, CHANNELS, TriggerOut};
 use crate::usb::Transport;
-use crate::{noise_filter, sequences, sync};
+use crate::{noise_filter, pattern, sequences, sync};
 
 /// A Prophesee EVK1 Gen3.1, initialised. It is powered down when it is dropped.
 pub struct Evk1 {
@@ -33,6 +34,8 @@ pub struct Evk1 {
     transport: Box<dyn Transport>,
     clock: Box<dyn Clock>,
     settings: Option<Checked>,
+    /// The pattern generator may be on.
+    pattern: bool,
     stream: Option<Stream>,
     chunker: Chunker,
     report: StreamReport,
@@ -108,6 +111,7 @@ impl Evk1 {
         let mut registers = Registers::new(transport.as_mut(), &config.read_back_exceptions);
         registers.read(CHIP_ID)?;
         sequences::initialise(&mut registers, identity.fpga_version)?;
+        pattern::clear(&mut registers)?;
         let chunker = Chunker::new(camera, config.max_time_step_us);
         Ok(Self {
             camera,
@@ -116,6 +120,7 @@ impl Evk1 {
             transport,
             clock,
             settings: None,
+            pattern: false,
             stream: None,
             chunker,
             report: StreamReport::default(),
@@ -187,6 +192,9 @@ impl Evk1 {
             Registers::new(self.transport.as_mut(), &self.config.read_back_exceptions);
         if streaming {
             done.after(sequences::stop(&mut registers));
+        }
+        if self.pattern {
+            done.after(pattern::off(&mut registers));
         }
         done.after(sequences::close(&mut registers, self.clock.as_ref()));
         done.outcome()
@@ -262,11 +270,32 @@ impl Evk1 {
     fn try_configure(&mut self, settings: &CameraSettings) -> Result<Vec<Setting>, Evk1Error> {
         self.expect_stopped()?;
         let checked = Checked::new(settings)?;
+        self.give_pixels_back()?;
         let mut registers = self.registers();
         checked.write(&mut registers)?;
         let read = checked.read_back(&mut registers)?;
         self.settings = Some(checked);
         Ok(read)
+    }
+
+    fn give_pixels_back(&mut self) -> Result<(), Evk1Error> {
+        if self.pattern {
+            pattern::off(&mut self.registers())?;
+            self.pattern = false;
+        }
+        Ok(())
+    }
+
+    fn try_pattern(
+        &mut self,
+        wanted: Option<TestPattern>,
+    ) -> Result<Option<PatternScan>, Evk1Error> {
+        self.expect_stopped()?;
+        let Some(wanted) = wanted else {
+            return self.give_pixels_back().map(|()| None);
+        };
+        self.pattern = true;
+        pattern::on(&mut self.registers(), wanted).map(Some)
     }
 
     fn try_start(&mut self) -> Result<(), Evk1Error> {
@@ -473,6 +502,13 @@ impl EventCamera for Evk1 {
 
     fn stop(&mut self, chunks: &mut Vec<RawChunk>) -> Result<(), DeviceError> {
         self.try_stop(chunks).map_err(|e| self.fault(e))
+    }
+
+    fn test_pattern(
+        &mut self,
+        pattern: Option<TestPattern>,
+    ) -> Result<Option<PatternScan>, DeviceError> {
+        self.try_pattern(pattern).map_err(|e| self.fault(e))
     }
 
     fn take_notes(&mut self, notes: &mut Vec<String>) {

@@ -18,6 +18,7 @@ pub mod error;
 pub mod identify;
 pub mod inbox;
 pub mod noise_filter;
+pub mod pattern;
 pub mod registers;
 pub mod report;
 pub mod requests;

@@ -357,6 +357,33 @@ pub const ROI_X_END: Register = register("td_roi_x20", 0x0450, 0);
 /// The four bits beyond the map of rows; they stay 0.
 pub const ROI_Y_END: Register = register("td_roi_y15", 0x053c, 0);
 
+/// The FPGA's pattern generator, which takes the sensor's place.
+pub const TEST_PATTERN_CONTROL: Register = register("IF/TEST_PATTERN_CONTROL", 0x0740, 0);
+/// It makes events.
+pub const PATTERN_ENABLE: Field = bit(TEST_PATTERN_CONTROL, "ENABLE", 0);
+/// 0: column after column; 1: the diagonal.
+pub const PATTERN_TYPE: Field = bit(TEST_PATTERN_CONTROL, "TYPE", 4);
+/// 0: change detection; 1: exposure measurement.
+pub const PATTERN_PIXEL_TYPE: Field = bit(TEST_PATTERN_CONTROL, "PIXEL_TYPE", 8);
+/// The events' polarity.
+pub const PATTERN_PIXEL_POLARITY: Field = bit(TEST_PATTERN_CONTROL, "PIXEL_POLARITY", 12);
+/// The first of two periods that take turns.
+pub const TEST_PATTERN_N_PERIOD: Register = register("IF/TEST_PATTERN_N_PERIOD", 0x0744, 0);
+/// The second.
+pub const TEST_PATTERN_P_PERIOD: Register = register("IF/TEST_PATTERN_P_PERIOD", 0x0748, 0);
+
+/// `VALID_RATIO` of [`TEST_PATTERN_N_PERIOD`] or [`TEST_PATTERN_P_PERIOD`]: clock cycles of 10 ns with an event, of 1024.
+#[must_use]
+pub const fn pattern_valid_ratio(of: Register) -> Field {
+    field(of, "VALID_RATIO", 0, 10)
+}
+
+/// `LENGTH` of [`TEST_PATTERN_N_PERIOD`] or [`TEST_PATTERN_P_PERIOD`].
+#[must_use]
+pub const fn pattern_length(of: Register) -> Field {
+    field(of, "LENGTH", 16, 16)
+}
+
 /// The FPGA's interface to the sensor.
 pub const IF_CONTROL: Register = register("IF/CONTROL", 0x074c, 0x0000_0002);
 /// The sensor's clock.
@@ -411,6 +438,9 @@ const SINGLE: &[Register] = &[
     NFL_THRESH,
     ROI_X_END,
     ROI_Y_END,
+    TEST_PATTERN_CONTROL,
+    TEST_PATTERN_N_PERIOD,
+    TEST_PATTERN_P_PERIOD,
     IF_CONTROL,
     SYSTEM_ID,
     FPGA_VERSION,

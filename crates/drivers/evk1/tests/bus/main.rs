@@ -5,6 +5,7 @@
 mod bench;
 mod devices;
 mod faults;
+mod pattern;
 mod settings;
 mod stream;
 mod time;

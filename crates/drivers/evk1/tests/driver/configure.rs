@@ -235,3 +235,15 @@ fn interlocks_hold_after_every_single_write() {
         }
     }
 }
+
+#[test]
+fn a_pattern_that_was_left_on_is_switched_off_before_anything_streams() {
+    let bench = Bench::new();
+    bench
+        .model()
+        .registers
+        .insert(r::TEST_PATTERN_CONTROL.address, 0x1001);
+    let _camera = bench.open().unwrap();
+    let found = bench.model().registers[&r::TEST_PATTERN_CONTROL.address];
+    assert_eq!(found, 0x1000);
+}

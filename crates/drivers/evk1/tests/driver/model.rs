@@ -200,7 +200,9 @@ impl Model {
         let stands = slave && !self.sync_clock;
         let from = self.camera_us;
         let to = from + PACKET.0.unsigned_abs() / 1000;
-        let live = self.get(r::ROI_TD_RSTN) == 1 && self.get(r::NFL_EN) == 0;
+        let pixels = self.get(r::ROI_TD_RSTN) == 1 && self.get(r::NFL_EN) == 0;
+        // The pattern comes behind the sensor and its filter.
+        let live = pixels || self.get(r::PATTERN_ENABLE) == 1;
         let mut bytes = Vec::new();
         if stands {
             bytes.extend(0x8000_0000_u32.to_le_bytes());

@@ -5,6 +5,7 @@
 
 mod camera;
 mod clock;
+mod pattern;
 mod producer;
 mod registers;
 mod requests;

@@ -7,6 +7,7 @@ use skinrig_formats::evt2::{Encoder, TIME_HIGH_CADENCE_US};
 use skinrig_model::{CdEvent, Polarity, TriggerEdge};
 
 use super::camera::{Evk1, Run};
+use super::pattern::Scan;
 use super::sensor::Gates;
 use crate::config::Pacing;
 use crate::content::{PixelEvent, Source, Splitmix};
@@ -42,6 +43,8 @@ struct Producer<'a> {
     /// Edges that jitter has moved into the next packet.
     edges: Vec<Edge>,
     random: Splitmix,
+    /// Of the pattern generator.
+    scan: Scan,
     events: Vec<PixelEvent>,
 }
 
@@ -62,6 +65,7 @@ impl<'a> Producer<'a> {
             reached_us: first_us,
             pulses_from_ns: None,
             edges: Vec::new(),
+            scan: Scan::default(),
             events: Vec::new(),
         }
     }
@@ -94,7 +98,11 @@ impl<'a> Producer<'a> {
         let garbage = self.camera.garbage();
         let mut bytes: Vec<u8> = garbage.into_iter().flat_map(u32::to_le_bytes).collect();
         let dense = self.source.dense().filter(|_| {
-            gates.pixels && gates.filter.is_none() && gates.roi.is_full() && !gates.no_off
+            gates.pixels
+                && gates.pattern.is_none()
+                && gates.filter.is_none()
+                && gates.roi.is_full()
+                && !gates.no_off
         });
         let stands_still = end_us == self.reached_us;
         if let Some(dense) = dense
@@ -116,6 +124,12 @@ impl<'a> Producer<'a> {
             }
         } else {
             self.pixel_events(until_ns, gates);
+            if let Some(pattern) = &gates.pattern {
+                self.events.clear();
+                let span_us = end_us - self.reached_us;
+                self.scan
+                    .events(pattern, span_us, self.made_ns, until_ns, &mut self.events);
+            }
             self.encode(until_ns, end_us, &edges, &mut bytes);
         }
         let triggers = edges.len() as u64;

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::pattern::Pattern;
 use super::registers as r;
 use super::registers::Registers;
 
@@ -61,6 +62,8 @@ impl Sync {
 pub struct Gates {
     /// Pixels send events.
     pub pixels: bool,
+    /// The pattern generator sends events in their place.
+    pub pattern: Option<Pattern>,
     /// OFF events are disabled by the bias (seen on an EVK1 at code 0, section 2.9).
     pub no_off: bool,
     pub roi: Arc<Roi>,
@@ -106,6 +109,7 @@ impl Gates {
         };
         Self {
             pixels: powered && clocked && released,
+            pattern: Pattern::read(registers),
             no_off: registers.get(r::BIAS_DIFF_OFF) & 0x0800_00ff == 0x0800_0000,
             roi: Arc::clone(roi),
             filter,

@@ -1,0 +1,373 @@
+//! The cameras of a bench, and its trigger box, while they stream for a check: started in order, looked at, stopped whatever
+//! happens. Every wait ends.
+
+use skinrig_device::{CameraSettings, DeviceError, EventCamera, SyncMode};
+use skinrig_model::{
+    BoxReport, CameraId, DeviceRole, HostDuration, HostTime, Mark, RawChunk, SentMark,
+};
+use skinrig_nightly::{Evidence, EvidenceKind};
+
+use crate::bench::{Bench, Devices, Trouble};
+use crate::findings::Findings;
+use crate::trouble::{self, COMPUTER};
+
+/// From one look at the devices to the next.
+const STEP: HostDuration = HostDuration::from_millis(10);
+/// Bytes that do not fill a chunk are fetched this often.
+const FLUSH_EVERY: HostDuration = HostDuration::from_millis(200);
+/// A camera whose time has not moved for so long sends no more: every format repeats its time base within milliseconds.
+const STALLED_AFTER: HostDuration = HostDuration::from_millis(2_000);
+/// A box that sends a train of its own is free again within this.
+const LINE_WITHIN: HostDuration = HostDuration::from_millis(1_000);
+/// A look that comes this much later than asked for is evidence of a computer that was held up.
+const HELD_UP: HostDuration = HostDuration::from_millis(1_000);
+
+/// What a camera delivered since [`Streams::begin`].
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Seen {
+    /// Bytes that came.
+    pub bytes: u64,
+    /// Bytes known to be lost.
+    pub lost_bytes: u64,
+    /// How often bytes were lost.
+    pub losses: u64,
+    /// The camera's time at the beginning and at the end, µs.
+    pub span_us: Option<(u64, u64)>,
+    /// What the camera has to say about its stream.
+    pub notes: Vec<String>,
+}
+
+impl Seen {
+    /// Length of the stream on the camera's own clock, s; `None` when its time did not move.
+    #[must_use]
+    pub fn span_s(&self) -> Option<f64> {
+        let (from, to) = self.span_us?;
+        (to > from).then(|| (to - from) as f64 * 1e-6)
+    }
+}
+
+/// One camera while it streams.
+#[derive(Default)]
+struct Live {
+    seen: Seen,
+    /// Why it streams no more.
+    trouble: Option<Trouble>,
+    /// Its last time, µs, and when it was seen to move.
+    reached: Option<u64>,
+    moved_at: HostTime,
+}
+
+/// The streaming devices of a bench. The cameras stop with this value.
+pub struct Streams<'a> {
+    devices: &'a mut Devices,
+    cameras: [Live; 2],
+    box_trouble: Option<Trouble>,
+    box_noise: Option<Trouble>,
+    reports: Vec<BoxReport>,
+    chunks: Vec<RawChunk>,
+    flushed_at: HostTime,
+    patience: HostDuration,
+    held_up: Option<Trouble>,
+    measuring: bool,
+}
+
+impl<'a> Streams<'a> {
+    /// Configures both cameras as for a run, lets `prepare` do the rest, and starts them, slaves before their master.
+    pub fn start(
+        bench: &'a mut dyn Bench,
+        prepare: &mut dyn FnMut(CameraId, &mut dyn EventCamera) -> Result<(), DeviceError>,
+    ) -> Self {
+        let patience = bench.patience();
+        let settings = CameraId::ALL.map(|camera| bench.camera_settings(camera));
+        let devices = bench.devices();
+        let now = devices.clock.now();
+        let mut streams = Self {
+            cameras: [Live::default(), Live::default()],
+            box_trouble: match &devices.trigger_box {
+                Some(Err(trouble)) => Some(trouble.clone()),
+                _ => None,
+            },
+            devices,
+            box_noise: None,
+            reports: Vec::new(),
+            chunks: Vec::new(),
+            flushed_at: now,
+            patience,
+            held_up: None,
+            measuring: false,
+        };
+        let is_slave = |c: &CameraId| {
+            settings[c.index()]
+                .as_ref()
+                .is_ok_and(|s| s.sync == SyncMode::Slave)
+        };
+        let (slaves, others): (Vec<_>, Vec<_>) = CameraId::ALL.into_iter().partition(is_slave);
+        for camera in slaves.iter().chain(&others).copied() {
+            let started = match &settings[camera.index()] {
+                Ok(settings) => streams.start_one(camera, settings, prepare),
+                Err(trouble) => Err(trouble.clone()),
+            };
+            streams.cameras[camera.index()].trouble = started.err();
+        }
+        let now = streams.now();
+        for live in &mut streams.cameras {
+            live.moved_at = now;
+        }
+        streams.listen();
+        streams.reports.clear();
+        streams
+    }
+
+    fn start_one(
+        &mut self,
+        id: CameraId,
+        settings: &CameraSettings,
+        prepare: &mut dyn FnMut(CameraId, &mut dyn EventCamera) -> Result<(), DeviceError>,
+    ) -> Result<(), Trouble> {
+        let camera = match &mut self.devices.cameras[id.index()] {
+            Ok(camera) => camera.as_mut(),
+            Err(trouble) => return Err(trouble.clone()),
+        };
+        // An earlier check may have been cut off.
+        let stopped = camera.stop(&mut self.chunks);
+        self.chunks.clear();
+        let told = stopped
+            .and_then(|()| camera.configure(settings).map(drop))
+            .and_then(|()| prepare(id, camera))
+            .and_then(|()| camera.start());
+        // What was noticed before says nothing about this stream.
+        camera.take_notes(&mut Vec::new());
+        told.map_err(|e| trouble::of(&e))
+    }
+
+    /// The present.
+    #[must_use]
+    pub fn now(&self) -> HostTime {
+        self.devices.clock.now()
+    }
+
+    /// Whether this camera still streams.
+    #[must_use]
+    pub fn is_live(&self, camera: CameraId) -> bool {
+        self.cameras[camera.index()].trouble.is_none()
+    }
+
+    /// What became of the trigger box, when it is of no more use.
+    #[must_use]
+    pub fn box_trouble(&self) -> Option<&Trouble> {
+        self.box_trouble.as_ref()
+    }
+
+    /// What the box reported so far.
+    #[must_use]
+    pub fn reports(&self) -> &[BoxReport] {
+        &self.reports
+    }
+
+    /// From now on what comes counts.
+    pub fn begin(&mut self, see: &mut dyn FnMut(&RawChunk)) {
+        self.look(true, see);
+        self.measuring = true;
+        for live in &mut self.cameras {
+            live.seen = Seen {
+                span_us: live.reached.map(|us| (us, us)),
+                ..Seen::default()
+            };
+        }
+    }
+
+    /// Looks at the devices for `span`, and hands each chunk to `see`.
+    pub fn pass(&mut self, span: HostDuration, see: &mut dyn FnMut(&RawChunk)) {
+        let end = self.now() + span;
+        while self.now() < end {
+            self.step(end, see);
+        }
+    }
+
+    /// Sends a mark as soon as the line is free, and looks at the devices meanwhile until its train is over.
+    ///
+    /// # Errors
+    /// [`Trouble`] with the box, which is then of no more use.
+    pub fn send(
+        &mut self,
+        mark: Mark,
+        see: &mut dyn FnMut(&RawChunk),
+    ) -> Result<SentMark, Trouble> {
+        let until = self.now() + LINE_WITHIN + self.patience;
+        loop {
+            if let Some(trouble) = &self.box_trouble {
+                return Err(trouble.clone());
+            }
+            let Some(Ok(trigger)) = &mut self.devices.trigger_box else {
+                let role = DeviceRole::TriggerBox;
+                return Err(trouble::silent(role, "expected a trigger box, found none"));
+            };
+            match trigger.send(mark) {
+                Ok(sent) => {
+                    let over = sent.t + trigger.capabilities().train_duration;
+                    while self.now() < over {
+                        self.step(over, see);
+                    }
+                    return Ok(sent);
+                }
+                Err(DeviceError::State { .. }) if self.now() < until => self.step(until, see),
+                Err(e) => {
+                    self.box_trouble = Some(trouble::of(&e));
+                }
+            }
+        }
+    }
+
+    /// Waits until both cameras' streams go beyond the present, or are known to stand still; then stops the cameras. Everything
+    /// that came in the end is counted too. Troubles go to `found`, with `metrics` unmeasured on the camera that had them.
+    pub fn finish(
+        mut self,
+        found: &mut Findings,
+        metrics: &[&'static str],
+        see: &mut dyn FnMut(&RawChunk),
+    ) -> [Option<Seen>; 2] {
+        let end = self.now();
+        while CameraId::ALL
+            .iter()
+            .any(|c| self.is_live(*c) && self.cameras[c.index()].moved_at <= end)
+        {
+            self.flushed_at = self.flushed_at.min(end - FLUSH_EVERY);
+            self.step(self.now() + STEP, see);
+        }
+        for camera in CameraId::ALL {
+            if let Ok(device) = &mut self.devices.cameras[camera.index()] {
+                let stopped = device.stop(&mut self.chunks);
+                let live = &mut self.cameras[camera.index()];
+                device.take_notes(&mut live.seen.notes);
+                if let Err(e) = stopped {
+                    live.trouble.get_or_insert_with(|| trouble::of(&e));
+                }
+            }
+            self.take(see);
+        }
+        let others = [self.box_noise.take(), self.held_up.take()];
+        found
+            .evidence
+            .extend(others.into_iter().flatten().map(|t| *t));
+        CameraId::ALL.map(|camera| {
+            let live = std::mem::take(&mut self.cameras[camera.index()]);
+            match live.trouble {
+                None => Some(live.seen),
+                Some(trouble) => {
+                    if trouble.kind == EvidenceKind::DeviceLost {
+                        // Only opening it again helps, and the bench does so for whoever asks next.
+                        self.devices.cameras[camera.index()] = Err(trouble.clone());
+                    }
+                    found.trouble(*trouble, trouble::of_camera(camera), metrics);
+                    None
+                }
+            }
+        })
+    }
+
+    /// Waits for the next look, not beyond `end`, and looks.
+    fn step(&mut self, end: HostTime, see: &mut dyn FnMut(&RawChunk)) {
+        let due = (self.now() + STEP).min(end);
+        self.devices.clock.wait_until(due);
+        let now = self.now();
+        let late = now - due;
+        if late > HELD_UP + self.patience {
+            let what = format!(
+                "expected to look at the devices every {} ms, found {:.1} s without a look",
+                STEP.0 / 1_000_000,
+                late.as_secs_f64()
+            );
+            let evidence = Evidence::new(EvidenceKind::HostLate, COMPUTER, what)
+                .next("see what else ran at that time (`journalctl`, backups, sleep)");
+            self.held_up = Some(Box::new(evidence));
+        }
+        self.look(now - self.flushed_at >= FLUSH_EVERY, see);
+    }
+
+    /// Fetches what the devices have; `all` of it, or full chunks only.
+    fn look(&mut self, all: bool, see: &mut dyn FnMut(&RawChunk)) {
+        let now = self.now();
+        if all {
+            self.flushed_at = now;
+        }
+        for camera in CameraId::ALL {
+            let i = camera.index();
+            if self.cameras[i].trouble.is_some() {
+                continue;
+            }
+            let Ok(device) = &mut self.devices.cameras[i] else {
+                continue;
+            };
+            let fetched = match all {
+                true => device.flush(&mut self.chunks),
+                false => device.poll(&mut self.chunks),
+            };
+            self.take(see);
+            let live = &mut self.cameras[i];
+            if let Err(e) = fetched {
+                live.trouble = Some(trouble::of(&e));
+            } else if all && now - live.moved_at > STALLED_AFTER + self.patience {
+                let role = DeviceRole::of_camera(camera);
+                let what = match live.reached {
+                    Some(us) => format!(
+                        "{camera}: expected its time to go on, found it standing at {:.6} s",
+                        us as f64 * 1e-6
+                    ),
+                    None => format!("{camera}: expected a stream, found nothing"),
+                };
+                live.trouble = Some(trouble::silent(role, what));
+            }
+        }
+        self.listen();
+    }
+
+    /// Counts the chunks that came, and hands them over.
+    fn take(&mut self, see: &mut dyn FnMut(&RawChunk)) {
+        let now = self.devices.clock.now();
+        for chunk in self.chunks.drain(..) {
+            let live = &mut self.cameras[chunk.camera.index()];
+            if let Some(us) = chunk.facts.last_us {
+                if live.reached != Some(us) {
+                    live.moved_at = now;
+                }
+                live.reached = Some(us);
+                if self.measuring {
+                    let first = chunk.facts.first_us.unwrap_or(us);
+                    live.seen.span_us.get_or_insert((first, first)).1 = us;
+                }
+            }
+            if self.measuring {
+                live.seen.bytes += chunk.bytes.len() as u64;
+                live.seen.lost_bytes += chunk.lost_before;
+                live.seen.losses += u64::from(chunk.lost_before > 0);
+            }
+            see(&chunk);
+        }
+    }
+
+    /// Fetches the box's reports.
+    fn listen(&mut self) {
+        let Some(Ok(trigger)) = &mut self.devices.trigger_box else {
+            return;
+        };
+        match trigger.poll(&mut self.reports) {
+            Ok(()) => {}
+            Err(e @ DeviceError::Lost { .. }) => {
+                self.box_trouble.get_or_insert_with(|| trouble::of(&e));
+            }
+            // Something unreadable on its line: it goes on.
+            Err(e) => {
+                self.box_noise.get_or_insert_with(|| trouble::of(&e));
+            }
+        }
+    }
+}
+
+impl Drop for Streams<'_> {
+    fn drop(&mut self) {
+        for camera in self.devices.cameras.iter_mut().flatten() {
+            // After `finish` they are stopped; before, somebody gave up and has said why.
+            let _ = camera.stop(&mut self.chunks);
+        }
+    }
+}

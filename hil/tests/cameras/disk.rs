@@ -1,0 +1,72 @@
+//! The disk.
+
+use std::fs;
+use std::path::Path;
+
+use skinrig_model::SimLevel;
+use skinrig_nightly::EvidenceKind;
+
+use crate::bench::{SimBench, number, seen, value};
+
+const DISK: &str = "disk: {amount: 10 MB, write_rate: {at_least: 1 MB/s}}";
+const TOO_MUCH: &str = "disk: {amount: 100 GB, write_rate: {at_least: 1 MB/s}}";
+
+fn bench(folder: &Path) -> SimBench {
+    let mut bench = SimBench::new(SimLevel::Kinematic, Vec::new());
+    bench.folder = folder.to_owned();
+    bench
+}
+
+/// A folder of this test's own, which is gone with it.
+struct Folder(std::path::PathBuf);
+
+impl Folder {
+    fn new(name: &str) -> Self {
+        let path = std::env::temp_dir().join(format!("skinrig-{name}-{}", std::process::id()));
+        fs::create_dir_all(&path).unwrap();
+        Self(path)
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(&self.0);
+    }
+}
+
+#[test]
+fn what_is_written_comes_back_and_nothing_stays() {
+    let folder = Folder::new("disk-well");
+    let inner = folder.0.join("sessions"); // to be made first
+    let found = bench(&inner).make(DISK);
+    assert_eq!(found.evidence, []);
+    assert!(number(&found, "computer", "write_rate") > 0.0);
+    assert!(number(&found, "computer", "free") > 10e6);
+    assert_eq!(fs::read_dir(&inner).unwrap().count(), 0);
+}
+
+#[test]
+fn a_disk_that_is_too_small_is_left_alone() {
+    let folder = Folder::new("disk-small");
+    let free = number(&bench(&folder.0).make(DISK), "computer", "free");
+    if free > 100e9 {
+        return; // there is room: nothing to see, and nothing that a test should write
+    }
+    let found = bench(&folder.0).make(TOO_MUCH);
+    assert_eq!(value(&found, "computer", "write_rate").value, None);
+    assert_eq!(seen(&found), [(EvidenceKind::Disk, "computer")]);
+    assert!(found.evidence[0].next.is_some());
+}
+
+#[test]
+fn a_folder_that_cannot_be_one_is_told_with_the_next_step() {
+    let folder = Folder::new("disk-file");
+    let file = folder.0.join("file");
+    fs::write(&file, "").unwrap();
+    let found = bench(&file.join("sessions")).make(DISK);
+    assert_eq!(value(&found, "computer", "write_rate").value, None);
+    assert_eq!(value(&found, "computer", "free").value, None);
+    assert_eq!(seen(&found), [(EvidenceKind::Disk, "computer")]);
+    let next = found.evidence[0].next.clone().unwrap();
+    assert!(next.contains("--sessions"), "{next}");
+}

@@ -1,0 +1,62 @@
+//! Who the devices are, and whether they keep what they are told.
+
+use skinrig_model::{CameraId, SimLevel};
+use skinrig_nightly::EvidenceKind;
+use skinrig_sim::Fault;
+
+use crate::bench::{SimBench, number, seen, value};
+
+const IDENTITY: &str = "identity: {differences: {at_most: 0}}";
+const SETTINGS: &str = "settings: {differences: {at_most: 0}}";
+
+/// A rig file that knows the simulated devices.
+fn known(faults: Vec<Fault>) -> SimBench {
+    use skinrig_hil::Bench as _;
+    let mut bench = SimBench::new(SimLevel::Kinematic, faults);
+    let devices = bench.devices();
+    let serials = devices
+        .cameras
+        .each_ref()
+        .map(|c| c.as_ref().unwrap().identity().serial);
+    for (setup, serial) in bench.rig.cameras.iter_mut().zip(serials) {
+        setup.serial = serial;
+    }
+    bench
+}
+
+#[test]
+fn everybody_is_named_and_compared_with_the_rig_file() {
+    let mut bench = known(Vec::new());
+    let found = bench.make(IDENTITY);
+    for device in ["camera1", "camera2", "trigger box"] {
+        assert_eq!(number(&found, device, "differences"), 0.0, "{found:#?}");
+        let note = value(&found, device, "differences").note.clone().unwrap();
+        assert!(
+            note.contains("simulated") && note.contains("sim-"),
+            "{note}"
+        );
+    }
+    // The simulated robot is not number 4711.
+    assert_eq!(number(&found, "robot", "differences"), 1.0);
+    assert_eq!(seen(&found), [(EvidenceKind::OtherDevice, "robot")]);
+    bench.rig.cameras[1].fpga = Some("3.0.1".to_owned());
+    bench.rig.cameras.swap(0, 1);
+    let swapped = bench.make(IDENTITY);
+    assert_eq!(number(&swapped, "camera1", "differences"), 2.0);
+    assert_eq!(number(&swapped, "camera2", "differences"), 1.0);
+}
+
+#[test]
+fn settings_that_keep_are_noted_and_those_that_do_not_are_differences() {
+    let found = known(Vec::new()).make(SETTINGS);
+    assert_eq!(found.evidence, []);
+    for camera in ["camera1", "camera2"] {
+        assert_eq!(number(&found, camera, "differences"), 0.0);
+        let note = value(&found, camera, "differences").note.clone().unwrap();
+        assert!(note.contains("bias_fo 1477"), "{note}");
+    }
+    let found = known(vec![Fault::CameraReadBack(CameraId::Two)]).make(SETTINGS);
+    assert_eq!(number(&found, "camera1", "differences"), 0.0);
+    assert_eq!(number(&found, "camera2", "differences"), 1.0);
+    assert_eq!(seen(&found), [(EvidenceKind::ReadBack, "camera2")]);
+}
