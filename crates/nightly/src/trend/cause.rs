@@ -6,7 +6,7 @@ use super::history::NightHead;
 use crate::rules::Cause;
 
 /// What is said of an alarm.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
 pub struct Attribution {
     /// Where to look; `None`: the rules do not tell.
     pub cause: Option<Cause>,

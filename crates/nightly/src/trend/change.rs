@@ -5,7 +5,9 @@ use serde::Serialize;
 use super::chart::{Charted, Way};
 
 /// How far back a change is sought, nights with a score.
-const BACK: usize = 60;
+const BACK: usize = 120;
+/// A score counts for no more than this: one odd night is no change.
+const MOST: f64 = 4.0;
 /// Half the 95 % point of chi-squared with one degree of freedom: what the likelihood may fall short of its largest.
 const SHORT: f64 = 1.92;
 
@@ -27,7 +29,7 @@ pub(super) fn locate(nights: &[Charted], way: Way) -> Between {
     let (mut sum, mut n) = (0.0, 0.0);
     for night in nights.iter().rev().take(BACK) {
         let Some(score) = night.score else { break };
-        sum += sign * score;
+        sum += sign * score.clamp(-MOST, MOST);
         n += 1.0;
         let gained = if sum > 0.0 {
             sum * sum / (2.0 * n)

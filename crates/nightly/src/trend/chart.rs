@@ -1,14 +1,16 @@
-//! The control chart of one series: every night scored against the reference stretch, two sums that gather what stays off.
+//! The control chart of one series: every night scored against the reference stretch, and runs of nights that are off.
 
 use serde::Serialize;
 
 use super::change::{self, Between};
 use super::history::{Acceptance, NightHead, Point, Series};
 use super::reference::{FEWEST, MOST, Reference, Sample};
-use super::run_length::{ALLOWANCE, clip};
+use super::run_length::Rule;
 
 /// Nights that a value waits before it may join the reference: when it began a change, that is known by then.
 const JOINS_AFTER: usize = 5;
+/// So many nights in a row that are not off end an excursion.
+const BACK: usize = 5;
 
 /// A series with its chart.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -32,10 +34,8 @@ pub struct Charted {
     pub night: usize,
     /// The value.
     pub value: f64,
-    /// Standard deviations from the centre, clipped; `None`: learnt from.
+    /// Standard deviations of a new night from the centre; `None`: learnt from.
     pub score: Option<f64>,
-    /// The sum of what was too high, then of what was too low, over the decision interval: an alarm is raised above 1.
-    pub sums: [f64; 2],
 }
 
 /// Which way a series went.
@@ -46,6 +46,24 @@ pub enum Way {
     Up,
     /// Lower.
     Down,
+}
+
+impl Way {
+    /// 1 for up, -1 for down.
+    #[must_use]
+    pub const fn sign(self) -> f64 {
+        match self {
+            Self::Up => 1.0,
+            Self::Down => -1.0,
+        }
+    }
+
+    const fn other(self) -> Self {
+        match self {
+            Self::Up => Self::Down,
+            Self::Down => Self::Up,
+        }
+    }
 }
 
 /// A time at which a series was off.
@@ -68,32 +86,33 @@ pub struct Excursion {
 /// What a chart knows while it goes through the nights.
 struct Walk {
     counts: bool,
-    interval: f64,
+    rules: [Rule; 2],
     learnt: Vec<Sample>,
     waiting: Vec<Sample>,
     reference: Option<Reference>,
-    sums: [f64; 2],
+    /// Scores against the present reference, oldest first.
+    scores: Vec<f64>,
     open: Option<usize>,
     /// Where the nights of the present reference begin.
     from: usize,
 }
 
-/// The chart of `series` over `nights` at this decision interval.
+/// The chart of `series` over `nights` under these rules.
 #[must_use]
 pub fn chart(
     series: &Series,
     nights: &[NightHead],
     accepted: &[Acceptance],
-    interval: f64,
+    rules: [Rule; 2],
 ) -> Chart {
     let whole = |p: &Point| p.value.is_none_or(|v| v >= 0.0 && v.fract() == 0.0);
     let mut walk = Walk {
         counts: series.unit.is_empty() && series.points.iter().all(whole),
-        interval,
+        rules,
         learnt: Vec::new(),
         waiting: Vec::new(),
         reference: None,
-        sums: [0.0; 2],
+        scores: Vec::new(),
         open: None,
         from: 0,
     };
@@ -134,7 +153,7 @@ impl Walk {
         self.learnt.clear();
         self.waiting.clear();
         self.reference = None;
-        self.sums = [0.0; 2];
+        self.scores.clear();
         self.from = chart.nights.len();
     }
 
@@ -144,22 +163,12 @@ impl Walk {
             half_interval: point.interval.map(|[low, high]| (high - low) / 2.0),
             of: point.n.filter(|_| chart.series.unit == "%"),
         };
-        let score = self.reference.map(|reference| {
-            let most = clip(self.interval);
-            reference.score(value).clamp(-most, most)
-        });
-        if let Some(score) = score {
-            for (sum, score) in self.sums.iter_mut().zip([score, -score]) {
-                // Not far above the alarm, so that it comes down within a week when the series is back.
-                let most = self.interval * 1.5;
-                *sum = (*sum + score - ALLOWANCE).clamp(0.0, most);
-            }
-        }
+        let score = self.reference.map(|reference| reference.score(value));
+        self.scores.extend(score);
         chart.nights.push(Charted {
             night: point.night,
             value,
             score,
-            sums: self.sums.map(|sum| sum / self.interval),
         });
         self.judge(chart);
         self.learn(sample);
@@ -170,24 +179,27 @@ impl Walk {
         let Some(reference) = self.reference else {
             return;
         };
-        // Two clipped nights end on the interval, up to rounding.
-        let above = self.sums.map(|sum| sum > self.interval * (1.0 + 1e-9));
+        let rules = self.rules;
+        let speaks = |scores: &[f64], way: Way| rules.iter().any(|r| r.speaks(scores, way.sign()));
         if let Some(at) = self.open {
-            let side = usize::from(chart.excursions[at].way == Way::Down);
+            let way = chart.excursions[at].way;
+            let limit = rules[0].limit.min(rules[1].limit);
+            let mut recent = self.scores.iter().rev().take(BACK);
+            let back = recent.all(|z| way.sign() * z <= limit);
             // Back, or gone over to the other side.
-            if self.sums[side] > 0.0 && !above[1 - side] {
+            if !back && !speaks(&self.scores, way.other()) {
                 return;
             }
             self.close(chart);
         }
-        let way = match above {
-            [true, _] => Way::Up,
-            [_, true] => Way::Down,
-            _ => return,
+        let Some(way) = [Way::Up, Way::Down]
+            .into_iter()
+            .find(|way| speaks(&self.scores, *way))
+        else {
+            return;
         };
         let last = chart.nights.len() - 1;
         self.open = Some(chart.excursions.len());
-        self.waiting.clear();
         chart.excursions.push(Excursion {
             way,
             raised: chart.nights[last].night,

@@ -5,13 +5,14 @@ use serde::Serialize;
 /// A reference of fewer nights says nothing: the series is being learnt.
 pub const FEWEST: usize = 12;
 /// A reference of so many nights takes no more: what comes later is judged by it, however slowly it creeps.
-pub const MOST: usize = 40;
+pub const MOST: usize = 100;
 
 /// A spread below this share of the centre is no spread worth an alarm: metrics that hardly vary would call for changes that matter
 /// to nobody.
 const LEAST_SHARE: f64 = 0.005;
-/// Of a spread: beyond the 90th percentile lie those of a normal variable that are more than 1.2816 standard deviations off.
-const NINE_TENTHS: f64 = 1.281_551_565_5;
+/// The share of a normal variable that lies below [`TAIL_AT`] standard deviations.
+const TAIL: f64 = 0.95;
+const TAIL_AT: f64 = 1.644_853_627;
 /// Standard deviation of a normal variable over its median absolute deviation.
 const PER_MAD: f64 = 1.482_602_218_5;
 /// The correlation from night to night that is reckoned with, at most.
@@ -59,9 +60,9 @@ impl Reference {
         distances.sort_by(f64::total_cmp);
         let middle = PER_MAD * quantile(&distances, 0.5);
         let floor = floor(samples, centre, counts);
-        let side = |tail: f64| middle.max(tail / NINE_TENTHS).max(floor);
-        let below = side(centre - quantile(&sorted, 0.1));
-        let above = side(quantile(&sorted, 0.9) - centre);
+        let side = |tail: f64| middle.max(tail / TAIL_AT).max(floor);
+        let below = side(centre - quantile(&sorted, 1.0 - TAIL));
+        let above = side(quantile(&sorted, TAIL) - centre);
         let plain = Self {
             nights,
             centre,
@@ -84,8 +85,9 @@ impl Reference {
         // Three nights in a row decide: the variance of their mean, over that of nights that know nothing of each other.
         let r = self.correlation;
         let alike = (3.0 + 4.0 * r + 2.0 * r * r) / 3.0;
-        // The centre is a median of few, and the spread is estimated: both are worse the fewer there are.
-        let estimated = 1.0 + 1.57 / n + 4.0 / n;
+        // Centre and spread are estimated, and the worse the fewer nights there are. Of the variance of a new night's score, 1.6/n is
+        // the median's; the rest makes up for spreads that came out too small (simulated: `docs/trends.md`).
+        let estimated = 1.0 + 8.0 / n;
         self.raw(value) / (alike * estimated).sqrt()
     }
 

@@ -7,12 +7,12 @@ use super::chart::{Chart, Excursion, Way, chart};
 use super::derived::ratios;
 use super::history::{History, NightHead};
 use super::reference::FEWEST;
-use super::run_length::interval_for;
+use super::run_length::{Rule, rules};
 use crate::rules::Cause;
 
-/// Nights between two false alarms of all series together that the charts are made for, were all scores normal. Real ones are
-/// not, and come to one in more than 100; see `docs/trends.md`.
-pub const NIGHTS_PER_FALSE_ALARM: f64 = 2000.0;
+/// Nights between two false alarms of all series together, were references known, scores normal and nights strangers to each other.
+/// None of it holds: what comes out is one in more than 100 nights (`docs/trends.md`).
+pub const NIGHTS_PER_FALSE_ALARM: f64 = 1200.0;
 
 /// Metrics without a level to stay at: free space falls from night to night by design, and has its limit.
 const NOT_CHARTED: &[&str] = &["free"];
@@ -24,12 +24,14 @@ pub struct Report {
     pub headline: String,
     /// What moved and is still off, the most series first.
     pub alarms: Vec<Alarm>,
+    /// What was off once and is back, or was accepted; the newest first.
+    pub past: Vec<Alarm>,
     /// One per series, those of the alarms first.
     pub charts: Vec<Chart>,
     /// The nights, oldest first.
     pub nights: Vec<NightHead>,
-    /// The sum above which an alarm is raised, standard deviations.
-    pub interval: f64,
+    /// What raises an alarm.
+    pub rules: [Rule; 2],
 }
 
 /// Series that moved in the same night, as far as can be told.
@@ -39,6 +41,8 @@ pub struct Alarm {
     pub id: String,
     /// Which of the charts.
     pub charts: Vec<usize>,
+    /// The night after which all were back; `None`: one is still off.
+    pub ended: Option<usize>,
     /// The night that raised it first.
     pub raised: usize,
     /// The first night that was off: the earliest and the latest that it may have been.
@@ -61,10 +65,10 @@ pub fn judge(history: &History) -> Report {
         .cloned()
         .collect();
     series.extend(ratios(history));
-    let interval = interval_for(series.len(), NIGHTS_PER_FALSE_ALARM);
+    let rules = rules(series.len(), NIGHTS_PER_FALSE_ALARM);
     let mut charts: Vec<Chart> = series
         .iter()
-        .map(|s| chart(s, &history.nights, &history.accepted, interval))
+        .map(|s| chart(s, &history.nights, &history.accepted, rules))
         .collect();
     // What is off first, the farthest first; the others by name.
     charts.sort_by(|a, b| {
@@ -79,63 +83,57 @@ pub fn judge(history: &History) -> Report {
         both.then(farther)
             .then_with(|| a.series.name.cmp(&b.series.name))
     });
-    let alarms = alarms(&charts, &history.nights);
+    let (alarms, past) = alarms(&charts, &history.nights);
     Report {
         headline: headline(&charts, &alarms, &history.nights),
         alarms,
+        past,
         charts,
         nights: history.nights.clone(),
-        interval,
+        rules,
     }
 }
 
-/// Excursions whose changes may have been in the same night, together.
-fn alarms(charts: &[Chart], nights: &[NightHead]) -> Vec<Alarm> {
-    let mut open: Vec<(usize, &Excursion)> = charts
-        .iter()
-        .enumerate()
-        .filter_map(|(at, c)| Some((at, c.off()?)))
+/// Excursions whose changes may have been in the same night, together: those that are not over, and those that are.
+fn alarms(charts: &[Chart], nights: &[NightHead]) -> (Vec<Alarm>, Vec<Alarm>) {
+    let each = charts.iter().enumerate();
+    let mut all: Vec<(usize, &Excursion)> = each
+        .flat_map(|(at, c)| c.excursions.iter().map(move |e| (at, e)))
         .collect();
-    open.sort_by_key(|(_, e)| (e.change.nights[0], e.change.nights[1]));
+    all.sort_by_key(|(at, e)| (e.change.nights, *at));
     let mut found: Vec<Alarm> = Vec::new();
-    for (at, excursion) in open {
+    for (at, excursion) in all {
         let [first, last] = excursion.change.nights;
-        match found
-            .iter_mut()
-            .find(|a| first <= a.since[1] && last >= a.since[0])
-        {
+        let meets = |a: &&mut Alarm| first <= a.since[1] && last >= a.since[0];
+        match found.iter_mut().find(meets) {
             Some(alarm) => {
                 alarm.charts.push(at);
                 alarm.raised = alarm.raised.min(excursion.raised);
+                alarm.ended = alarm.ended.zip(excursion.ended).map(|(a, b)| a.max(b));
                 alarm.since = [alarm.since[0].max(first), alarm.since[1].min(last)];
             }
             None => found.push(Alarm {
                 id: String::new(),
                 charts: vec![at],
+                ended: excursion.ended,
                 raised: excursion.raised,
                 since: [first, last],
-                attribution: Attribution {
-                    cause: None,
-                    rule: "",
-                    reason: String::new(),
-                    changed: Vec::new(),
-                },
+                attribution: Attribution::default(),
             }),
         }
     }
     for alarm in &mut found {
         alarm.charts.sort_unstable();
         alarm.id.clone_from(&nights[alarm.raised].id);
-        let names: Vec<&str> = alarm
-            .charts
-            .iter()
-            .map(|c| charts[*c].series.name.as_str())
-            .collect();
-        let before = alarm.since[0].saturating_sub(1);
-        alarm.attribution = cause::attribute(&nights[before], &nights[alarm.since[1]], &names);
+        let name = |c: &usize| charts[*c].series.name.as_str();
+        let names: Vec<&str> = alarm.charts.iter().map(name).collect();
+        let before = &nights[alarm.since[0].saturating_sub(1)];
+        alarm.attribution = cause::attribute(before, &nights[alarm.since[1]], &names);
     }
-    found.sort_by_key(|a| (std::cmp::Reverse(a.charts.len()), a.raised));
-    found
+    let (mut open, mut past): (Vec<_>, Vec<_>) = found.into_iter().partition(|a| a.ended.is_none());
+    open.sort_by_key(|a| (std::cmp::Reverse(a.charts.len()), a.raised));
+    past.sort_by_key(|a| std::cmp::Reverse(a.raised));
+    (open, past)
 }
 
 /// The change relative to the level before; `None` when that was zero.

@@ -1,91 +1,75 @@
-//! How long a chart runs before it raises an alarm: the Markov chain of a CUSUM, and the decision interval for a wanted run length.
+//! The test behind the charts: so many nights in a row on one side of a limit, and how long it runs before it raises a false alarm.
 //!
-//! D. Brook and D. A. Evans, "An approach to the probability distribution of cusum run length", Biometrika 59 (1972) 539-549: the
-//! sum is cut into cells, the mean run length from each solves a system of linear equations.
+//! The run is what makes it hold: however heavy the tail of a metric, one odd night or two raise nothing. Its mean run length has a
+//! closed form: W. Feller, An Introduction to Probability Theory and Its Applications, volume 1, third edition, section XIII.7.
 
-/// What a night adds to a sum beyond its score, in standard deviations: shifts of more than this are sought.
-pub const ALLOWANCE: f64 = 1.0;
+use serde::Serialize;
 
-/// Cells of the sum: one more than a multiple of four, so that two clipped nights end in the last one and not beyond.
-const CELLS: usize = 81;
+/// Nights in a row that make a large change: it is found in as many.
+pub const QUICK: usize = 3;
+/// Nights in a row that make a smaller one.
+pub const SLOW: usize = 9;
 
-/// Where scores are cut for a decision interval: two nights, however far off, end on the interval and not beyond it.
-#[must_use]
-pub fn clip(interval: f64) -> f64 {
-    ALLOWANCE + interval / 2.0
+/// So many nights in a row beyond a limit raise an alarm.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Rule {
+    /// In a row.
+    pub nights: usize,
+    /// Scores beyond this count, on one side.
+    pub limit: f64,
 }
 
-/// Mean number of nights until a one-sided sum of normal scores with this mean exceeds `interval`, from a sum of zero.
-#[must_use]
-pub fn mean_run_length(interval: f64, shift: f64) -> f64 {
-    let width = 2.0 * interval / (2 * CELLS - 1) as f64;
-    let most = clip(interval);
-    // Probability that a night adds at most `step`.
-    let adds = |step: f64| {
-        let score = step + ALLOWANCE;
-        if score >= most {
-            1.0
-        } else {
-            normal_below(score - shift)
-        }
-    };
-    // Rows of (I - P) L = 1.
-    let mut rows: Vec<Vec<f64>> = (0..CELLS)
-        .map(|from| {
-            let mut row: Vec<f64> = (0..CELLS)
-                .map(|to| {
-                    let step = (to as f64 - from as f64) * width;
-                    let below = if to == 0 {
-                        0.0
-                    } else {
-                        adds(step - width / 2.0)
-                    };
-                    let stay = if to == from { 1.0 } else { 0.0 };
-                    stay - (adds(step + width / 2.0) - below)
-                })
-                .collect();
-            row.push(1.0);
-            row
-        })
-        .collect();
-    // The matrix is an M-matrix with a dominant diagonal: elimination needs no pivots.
-    for at in 0..CELLS {
-        let (above, below) = rows.split_at_mut(at + 1);
-        let pivot = &above[at];
-        for row in below {
-            let factor = row[at] / pivot[at];
-            for (value, p) in row[at..].iter_mut().zip(&pivot[at..]) {
-                *value -= factor * p;
+impl Rule {
+    /// The rule that raises one false alarm in `every` nights when `series` charts with two sides each follow it, all together.
+    #[must_use]
+    pub fn of(nights: usize, series: usize, every: f64) -> Self {
+        let wanted = every * 2.0 * series.max(1) as f64;
+        let (mut low, mut high) = (0.0, 8.0);
+        for _ in 0..60 {
+            let limit = f64::midpoint(low, high);
+            if (Self { nights, limit }).mean_run_length(0.0) < wanted {
+                low = limit;
+            } else {
+                high = limit;
             }
         }
-    }
-    let mut lengths = vec![0.0; CELLS];
-    for at in (0..CELLS).rev() {
-        let known: f64 = (at + 1..CELLS).map(|j| rows[at][j] * lengths[j]).sum();
-        lengths[at] = (rows[at][CELLS] - known) / rows[at][at];
-    }
-    lengths[0]
-}
-
-/// The decision interval at which `series` charts, each with two sides, raise one false alarm in `nights` nights all together.
-#[must_use]
-pub fn interval_for(series: usize, nights: f64) -> f64 {
-    let wanted = nights * 2.0 * series.max(1) as f64;
-    let (mut low, mut high) = (1.0, 12.0);
-    for _ in 0..40 {
-        let middle = (low + high) / 2.0;
-        if mean_run_length(middle, 0.0) < wanted {
-            low = middle;
-        } else {
-            high = middle;
+        Self {
+            nights,
+            limit: high,
         }
     }
-    high
+
+    /// Mean number of nights until it raises an alarm on one side, when scores are normal about `shift` and know nothing of each
+    /// other.
+    #[must_use]
+    pub fn mean_run_length(self, shift: f64) -> f64 {
+        let beyond = 0.5 * libm::erfc((self.limit - shift) / std::f64::consts::SQRT_2);
+        let all = beyond.powf(self.nights as f64);
+        if beyond >= 1.0 {
+            return self.nights as f64;
+        }
+        (1.0 - all) / ((1.0 - beyond) * all)
+    }
+
+    /// Whether the last of `scores` make an alarm above the centre (`sign` 1) or below it (-1).
+    #[must_use]
+    pub fn speaks(self, scores: &[f64], sign: f64) -> bool {
+        let last = scores
+            .len()
+            .checked_sub(self.nights)
+            .map(|at| &scores[at..]);
+        last.is_some_and(|last| last.iter().all(|z| sign * z > self.limit))
+    }
 }
 
-/// Probability that a standard normal variable lies below `z`.
-fn normal_below(z: f64) -> f64 {
-    0.5 * libm::erfc(-z / std::f64::consts::SQRT_2)
+/// The rules of a bench with so many series: the quick one raises one false alarm in `every` nights. The slow one has a hundredth of
+/// that, for nights resemble their neighbours, and what does so makes long runs by itself.
+#[must_use]
+pub fn rules(series: usize, every: f64) -> [Rule; 2] {
+    [
+        Rule::of(QUICK, series, every),
+        Rule::of(SLOW, series, 100.0 * every),
+    ]
 }
 
 #[cfg(test)]
@@ -93,22 +77,28 @@ mod tests {
     use super::*;
 
     #[test]
-    fn run_lengths_are_those_of_the_literature() {
-        // Page's CUSUM with k = 1 and h = 2.52 runs 740 nights on one side (370 on two) where nothing is clipped: D. C. Montgomery,
-        // Introduction to Statistical Quality Control, table 9.4. Clipped scores run longer, and alarms take three nights.
-        let run = mean_run_length(2.52, 0.0);
-        assert!(run > 740.0 && run < 3000.0, "{run}");
-        assert!(mean_run_length(5.0, 20.0) >= 2.999);
-        assert!(mean_run_length(5.0, 20.0) <= 3.001);
+    fn run_lengths_are_those_of_runs_of_heads() {
+        // A fair coin: three heads in a row take 14 throws in the mean, nine take 1022.
+        let coin = |nights| Rule { nights, limit: 0.0 };
+        assert!((coin(3).mean_run_length(0.0) - 14.0).abs() < 1e-9);
+        assert!((coin(9).mean_run_length(0.0) - 1022.0).abs() < 1e-6);
+        assert!((coin(3).mean_run_length(50.0) - 3.0).abs() < 1e-9);
     }
 
     #[test]
-    fn the_interval_gives_the_run_length_it_was_asked_for() {
+    fn a_rule_gives_the_run_length_it_was_asked_for_and_nothing_less_than_all_nights_speak() {
         for series in [1, 80] {
-            let interval = interval_for(series, 1000.0);
-            let run = mean_run_length(interval, 0.0) / (2 * series) as f64;
-            assert!((run / 1000.0 - 1.0).abs() < 1e-3, "{run}");
+            for (rule, every) in rules(series, 1000.0).into_iter().zip([1e3, 1e5]) {
+                let run = rule.mean_run_length(0.0) / (2 * series) as f64;
+                assert!((run / every - 1.0).abs() < 1e-6, "{run}");
+            }
         }
-        assert!(interval_for(80, 1000.0) > interval_for(8, 1000.0));
+        let rule = Rule {
+            nights: 3,
+            limit: 2.0,
+        };
+        assert!(rule.speaks(&[0.0, 2.1, 9.0, 2.1], 1.0));
+        assert!(!rule.speaks(&[0.0, 9.0, 9.0], 1.0) && !rule.speaks(&[9.0, 9.0], 1.0));
+        assert!(rule.speaks(&[-3.0; 3], -1.0) && !rule.speaks(&[-3.0; 3], 1.0));
     }
 }

@@ -1,0 +1,389 @@
+//! Nights of a bench that is well, and of one that is not: numbers as a suite gives them, from a seed.
+#![allow(dead_code)]
+
+use rand_xoshiro::Xoshiro256PlusPlus;
+use rand_xoshiro::rand_core::{Rng, SeedableRng};
+use skinrig_nightly::trend::{History, NightHead, Point};
+use skinrig_nightly::{Verdict, Versions};
+
+/// How a metric of a bench that is well spreads from night to night.
+#[derive(Debug, Clone, Copy)]
+pub enum Kind {
+    /// Always this value.
+    Always(f64),
+    /// Counts of events that come one by one, with this mean.
+    Count(f64),
+    /// Normal: mean, spread over the mean, correlation from night to night, how much of the spread is the temperature's.
+    Normal(f64, f64, f64, f64),
+    /// Student's t with three degrees of freedom: mean, scale over the mean, correlation from night to night.
+    Heavy(f64, f64, f64),
+    /// The logarithm is normal: median, its spread.
+    Skewed(f64, f64),
+    /// Percent of so many.
+    Share(f64, u32),
+}
+
+use Kind::{Always, Count, Heavy, Normal, Share, Skewed};
+
+/// The metrics of both cameras.
+const CAMERAS: &[(&str, &str, &str, Kind)] = &[
+    ("identity", "differences", "", Always(0.0)),
+    ("settings", "differences", "", Always(0.0)),
+    ("trigger_loopback", "lost_pulses", "", Count(0.005)),
+    ("trigger_loopback", "extra_pulses", "", Count(0.005)),
+    ("trigger_loopback", "unread_trains", "", Count(0.005)),
+    ("trigger_loopback", "jitter", "s", Skewed(4e-6, 0.15)),
+    ("clocks", "drift", "ppm", Normal(12.0, 0.08, 0.3, 0.7)),
+    ("clocks", "residual", "s", Skewed(6e-6, 0.25)),
+    ("idle", "data_rate", "B/s", Normal(2.1e6, 0.04, 0.3, 0.5)),
+    ("idle", "lost", "B", Always(0.0)),
+    ("idle", "gaps", "", Count(0.01)),
+    ("noise_dark", "rate", "ev/s", Normal(6.0e4, 0.05, 0.2, 0.8)),
+    ("noise_dark", "hot_pixels", "", Count(6.0)),
+    ("noise_dark", "hottest", "ev/s", Heavy(900.0, 0.1, 0.3)),
+    ("noise_lit", "rate", "ev/s", Normal(1.1e5, 0.04, 0.2, 0.6)),
+    ("noise_lit", "hot_pixels", "", Count(9.0)),
+    ("noise_lit", "hottest", "ev/s", Heavy(1200.0, 0.1, 0.3)),
+    (
+        "test_pattern",
+        "received",
+        "%",
+        Normal(99.9, 3e-4, 0.0, 0.0),
+    ),
+    ("test_pattern", "lost", "B", Always(0.0)),
+    ("test_pattern", "gaps", "", Count(0.01)),
+];
+
+/// All others.
+const OTHERS: &[(&str, &str, &str, &str, Kind)] = &[
+    ("identity", "robot", "differences", "", Always(0.0)),
+    ("identity", "trigger box", "differences", "", Always(0.0)),
+    (
+        "disk",
+        "computer",
+        "write_rate",
+        "B/s",
+        Heavy(4.2e8, 0.05, 0.2),
+    ),
+    (
+        "clocks",
+        "cameras",
+        "offset",
+        "s",
+        Normal(0.02, 0.6, 0.0, 0.0),
+    ),
+    ("robot_state", "robot", "faults", "", Always(0.0)),
+    ("robot_state", "robot", "creep", "mm", Skewed(0.004, 0.4)),
+    (
+        "repeatability",
+        "robot",
+        "spread",
+        "mm",
+        Skewed(0.011, 0.12),
+    ),
+    (
+        "repeatability",
+        "robot",
+        "error",
+        "mm",
+        Heavy(0.05, 0.06, 0.2),
+    ),
+    (
+        "step_response",
+        "robot",
+        "settling",
+        "s",
+        Heavy(0.12, 0.05, 0.0),
+    ),
+    (
+        "step_response",
+        "robot",
+        "overshoot",
+        "mm",
+        Skewed(0.03, 0.3),
+    ),
+    (
+        "step_response",
+        "robot",
+        "error",
+        "mm",
+        Heavy(0.02, 0.15, 0.0),
+    ),
+    (
+        "depth",
+        "robot",
+        "surface",
+        "mm",
+        Normal(0.1, 0.2, 0.5, 0.3),
+    ),
+    ("depth", "robot", "error", "mm", Normal(0.06, 0.1, 0.4, 0.3)),
+    (
+        "force_ceiling",
+        "robot",
+        "peak",
+        "N",
+        Normal(1.05, 0.02, 0.2, 0.0),
+    ),
+    ("force_ceiling", "robot", "trips", "", Always(0.0)),
+    ("golden", "skin", "rmse", "mm", Normal(1.8, 0.05, 0.3, 0.3)),
+    ("golden", "skin", "repeat_std", "mm", Skewed(0.6, 0.08)),
+    ("golden", "skin", "latency", "s", Heavy(0.009, 0.04, 0.2)),
+    (
+        "golden",
+        "skin",
+        "press_events",
+        "ev/s",
+        Normal(2.4e5, 0.03, 0.3, 0.5),
+    ),
+    (
+        "golden",
+        "skin",
+        "idle_events",
+        "ev/s",
+        Normal(2.0e4, 0.05, 0.3, 0.7),
+    ),
+    ("golden", "skin", "located", "%", Share(97.0, 60)),
+    ("golden", "skin", "valid", "%", Share(99.5, 60)),
+    ("golden", "skin", "reference_shift", "mm", Skewed(0.25, 0.5)),
+    (
+        "golden",
+        "skin",
+        "reference_events",
+        "%",
+        Heavy(99.0, 0.02, 0.2),
+    ),
+    ("golden", "skin", "lost", "B", Always(0.0)),
+    (
+        "watchdog_drill",
+        "robot",
+        "braked_within",
+        "s",
+        Normal(0.21, 0.05, 0.0, 0.0),
+    ),
+    ("watchdog_drill", "robot", "drop", "mm", Skewed(0.4, 0.3)),
+    (
+        "stop_drill",
+        "robot",
+        "stopped_within",
+        "s",
+        Heavy(0.08, 0.06, 0.0),
+    ),
+    ("stop_drill", "robot", "distance", "mm", Skewed(1.2, 0.1)),
+];
+
+/// Something that happens to a bench.
+#[derive(Debug, Clone)]
+pub struct Planted {
+    /// Series that begin so.
+    pub series: &'static str,
+    /// From this night on.
+    pub from: usize,
+    /// Their values times this.
+    pub factor: f64,
+}
+
+/// A bench whose nights are drawn one after the other.
+pub struct Bench {
+    random: Xoshiro256PlusPlus,
+    metrics: Vec<Metric>,
+    temperature: f64,
+    /// What happens to it.
+    pub planted: Vec<Planted>,
+    /// One night in so many is not made; one in so many is INVALID, with odd values. 0: never.
+    pub gaps: [u64; 2],
+}
+
+struct Metric {
+    name: String,
+    unit: &'static str,
+    kind: Kind,
+    memory: f64,
+}
+
+/// A value of a night.
+pub struct Drawn<'a> {
+    pub name: &'a str,
+    pub unit: &'static str,
+    pub value: f64,
+    pub n: Option<u64>,
+    pub verdict: Verdict,
+}
+
+impl Bench {
+    /// A bench that is well.
+    pub fn new(seed: u64) -> Self {
+        let mut metrics = Vec::new();
+        for camera in ["camera1", "camera2"] {
+            for (check, metric, unit, kind) in CAMERAS {
+                metrics.push((format!("{check}/{camera}/{metric}"), *unit, *kind));
+            }
+        }
+        for (check, subject, metric, unit, kind) in OTHERS {
+            metrics.push((format!("{check}/{subject}/{metric}"), *unit, *kind));
+        }
+        let metric = |(name, unit, kind)| Metric {
+            name,
+            unit,
+            kind,
+            memory: 0.0,
+        };
+        Self {
+            random: Xoshiro256PlusPlus::seed_from_u64(seed),
+            metrics: metrics.into_iter().map(metric).collect(),
+            temperature: 0.0,
+            planted: Vec::new(),
+            gaps: [25, 50],
+        }
+    }
+
+    /// With another spread of one metric, over its mean.
+    pub fn spread(mut self, series: &str, spread: f64) -> Self {
+        for metric in self.metrics.iter_mut().filter(|m| m.name == series) {
+            if let Normal(mean, _, r, t) = metric.kind {
+                metric.kind = Normal(mean, spread, r, t);
+            }
+        }
+        self
+    }
+
+    /// The values of night number `at`; `None`: it was not made.
+    pub fn night(&mut self, at: usize) -> Option<Vec<Drawn<'_>>> {
+        let Self {
+            random,
+            metrics,
+            temperature,
+            planted,
+            gaps,
+        } = self;
+        *temperature = 0.6 * *temperature + 0.8 * normal(random);
+        let mut one_in = |n: u64| n > 0 && random.next_u64() % n == 0;
+        let (missing, invalid) = (one_in(gaps[0]), one_in(gaps[1]));
+        let drawn = metrics.iter_mut().map(|metric| {
+            let mut value = metric.draw(random, *temperature);
+            let hit = |p: &&Planted| metric.name.starts_with(p.series) && at >= p.from;
+            for p in planted.iter().filter(hit) {
+                value *= p.factor;
+            }
+            // The lamps were off: what was measured says nothing.
+            let odd = invalid && metric.name.starts_with("golden");
+            Drawn {
+                name: &metric.name,
+                unit: metric.unit,
+                value: if odd { value * 0.2 } else { value },
+                n: match metric.kind {
+                    Share(_, of) => Some(of.into()),
+                    _ => None,
+                },
+                verdict: if odd { Verdict::Invalid } else { Verdict::Pass },
+            }
+        });
+        let drawn: Vec<_> = drawn.collect();
+        (!missing).then_some(drawn)
+    }
+
+    /// `nights` nights.
+    pub fn history(mut self, nights: usize) -> History {
+        let mut history = History::default();
+        for at in 0..nights {
+            let night = history.nights.len();
+            let Some(drawn) = self.night(at) else {
+                continue;
+            };
+            for d in drawn {
+                let point = Point {
+                    night,
+                    value: Some(d.value),
+                    interval: None,
+                    n: d.n,
+                    limit: None,
+                    verdict: d.verdict,
+                    part: d.verdict,
+                    attempts: 1,
+                };
+                history.add(d.name, d.unit, point);
+            }
+            history.nights.push(head(at));
+        }
+        history
+    }
+}
+
+/// The head of night number `at`: its place in the calendar is in its name.
+pub fn head(at: usize) -> NightHead {
+    NightHead {
+        id: format!("night-{at:04}"),
+        started: date(at),
+        suite: "nightly".to_owned(),
+        suite_sha256: "5".repeat(64),
+        rig: "simulated".to_owned(),
+        rig_kind: "emulated".to_owned(),
+        rig_sha256: "6".repeat(64),
+        versions: Versions {
+            software: "0.1.0 (aaaaaaa)".to_owned(),
+            analysis: 1,
+            firmware: vec![("camera1".to_owned(), "3.9".to_owned())],
+            skin: Some("golden".to_owned()),
+        },
+        verdict: Verdict::Pass,
+        folder: format!("night-{at:04}"),
+        golden: None,
+    }
+}
+
+/// Two in the morning of day number `at` of months of 30 days.
+pub fn date(at: usize) -> String {
+    let (year, month, day) = (2026 + at / 360, at / 30 % 12 + 1, at % 30 + 1);
+    let day = if month == 2 { day.min(28) } else { day };
+    format!("{year}-{month:02}-{day:02}T02:00:00Z")
+}
+
+impl Metric {
+    fn draw(&mut self, random: &mut Xoshiro256PlusPlus, temperature: f64) -> f64 {
+        match self.kind {
+            Always(value) => value,
+            Count(mean) => f64::from(poisson(random, mean)),
+            Normal(mean, spread, r, warm) => {
+                let own = self.remember(r, normal(random));
+                let z = warm * temperature + (1.0 - warm * warm).sqrt() * own;
+                mean * (1.0 + spread * z)
+            }
+            Heavy(mean, scale, r) => {
+                let z = normal(random);
+                let chi: f64 = (0..3).map(|_| normal(random).powi(2)).sum();
+                mean * (1.0 + scale * self.remember(r, z / (chi / 3.0).sqrt()))
+            }
+            Skewed(median, spread) => median * (spread * normal(random)).exp(),
+            Share(percent, of) => {
+                let hit = (0..of)
+                    .filter(|_| 100.0 * uniform(random) < percent)
+                    .count();
+                100.0 * hit as f64 / f64::from(of)
+            }
+        }
+    }
+
+    /// An autoregressive series of order one with the variance of its steps' draws.
+    fn remember(&mut self, r: f64, step: f64) -> f64 {
+        self.memory = r * self.memory + (1.0 - r * r).sqrt() * step;
+        self.memory
+    }
+}
+
+fn uniform(random: &mut Xoshiro256PlusPlus) -> f64 {
+    (random.next_u64() >> 11) as f64 / (1u64 << 53) as f64
+}
+
+fn normal(random: &mut Xoshiro256PlusPlus) -> f64 {
+    let radius = (-2.0 * (1.0 - uniform(random)).ln()).sqrt();
+    radius * (std::f64::consts::TAU * uniform(random)).cos()
+}
+
+/// Knuth's product of uniform variables; means here are small.
+fn poisson(random: &mut Xoshiro256PlusPlus, mean: f64) -> u32 {
+    let (mut product, least, mut count) = (uniform(random), (-mean).exp(), 0);
+    while product > least {
+        product *= uniform(random);
+        count += 1;
+    }
+    count
+}
