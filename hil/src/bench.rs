@@ -111,6 +111,11 @@ pub trait Bench {
         ControlHandle::new()
     }
 
+    /// Whether somebody else took the bench: everything ends, and the night says so.
+    fn lease_is_lost(&self) -> bool {
+        false
+    }
+
     /// How late stand-ins that share this computer's processors may be; zero on a bench of hardware.
     fn patience(&self) -> HostDuration;
 }

@@ -8,6 +8,7 @@ pub mod bench;
 pub mod checks;
 pub mod findings;
 pub mod history;
+pub mod lease;
 pub mod room;
 pub mod runner;
 mod streams;

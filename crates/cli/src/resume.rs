@@ -6,6 +6,7 @@ use chrono::{SecondsFormat, Utc};
 use sha2::{Digest, Sha256};
 use skinrig_controller::{Preflight, Resume, Run, RunReport};
 use skinrig_device::Rig;
+use skinrig_hil::lease::Lease;
 use skinrig_model::{
     DeviceRole, HostTime, PlannedPress, PressHistory, PressRole, PressVerdict, Record,
     ResumeHeader, RunEnd, RunHeader, SimLevel,
@@ -17,6 +18,7 @@ use skinrig_recorder::{DeviceRow, RecorderError, SessionReader, SessionWriter};
 use crate::args::ResumeArgs;
 use crate::exit::{Exit, Failure, Outcome};
 use crate::fault::Saboteur;
+use crate::hil::lease;
 use crate::paths;
 use crate::progress::ProgressView;
 use crate::results::RigDocument;
@@ -210,7 +212,13 @@ fn go_on(
 ) -> Result<RunReport, Failure> {
     let protocol = protocol_of(found)?;
     let rest = rest_of(&protocol, &found.plan, wanted)?;
-    let (rig, preflight, notes) = open_rig(args, found, protocol, &rest)?;
+    let Opened {
+        rig,
+        preflight,
+        notes,
+        // Until the session is closed.
+        lease: _lease,
+    } = open_rig(args, found, protocol, &rest)?;
     let expected = skinrig_model::HostDuration::from_secs_f64(rest.summary().duration_s);
     let view = ProgressView::resumed(&found.plan.presses, &found.histories, wanted, expected);
     let folder = paths::folder_of(&args.session);
@@ -265,13 +273,23 @@ fn rest_of(protocol: &Protocol, plan: &Plan, wanted: &[bool]) -> Result<Plan, Fa
     Ok(planned)
 }
 
-/// The rig of the session, opened; its preflight; and what is to be remarked about it.
+/// The rig of a session.
+struct Opened {
+    rig: Rig,
+    preflight: Preflight,
+    /// What is to be remarked about it.
+    notes: Vec<String>,
+    /// Of a bench.
+    lease: Option<Lease>,
+}
+
+/// The rig of the session, opened.
 fn open_rig(
     args: &ResumeArgs,
     found: &Unfinished,
     protocol: Protocol,
     rest: &Plan,
-) -> Result<(Rig, Preflight, Vec<String>), Failure> {
+) -> Result<Opened, Failure> {
     let folder = paths::folder_of(&args.session);
     let header = &found.header;
     let summary = rest.summary();
@@ -292,7 +310,12 @@ fn open_rig(
         let mut preflight = gates::of_simulated(&rig, folder, summary.expected_bytes);
         preflight.made.insert(0, gates::recorder(&args.session));
         let notes = planted::told(faults).into_iter().collect();
-        return Ok((rig, preflight, notes));
+        return Ok(Opened {
+            rig,
+            preflight,
+            notes,
+            lease: None,
+        });
     }
     let path = match (&args.rig, found.document.rig["file_name"].as_str()) {
         (Some(file), _) => file.clone(),
@@ -307,11 +330,17 @@ fn open_rig(
     let file = bench::load(&path)?;
     planted::refuse(&args.faults, &bench::display_name(&file))?;
     same_bench(&file, found)?;
+    let lease = lease::take(&file, &format!("resume {}", args.session.display()))?;
     let rig = bench::open(&file, &protocol)?;
     let notes = same_devices(&rig, &found.devices, args.allow_other_device)?;
     let mut preflight = gates::of_bench(&file, &rig, folder, summary.duration_s);
     preflight.made.insert(0, gates::recorder(&args.session));
-    Ok((rig, preflight, notes))
+    Ok(Opened {
+        rig,
+        preflight,
+        notes,
+        lease: Some(lease),
+    })
 }
 
 /// The rig file must be of the session's bench: its kind, its place of the skin, and limits that bear the plan.

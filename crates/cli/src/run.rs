@@ -16,6 +16,7 @@ use crate::args::RunArgs;
 use crate::check;
 use crate::exit::{Exit, Failure, Outcome};
 use crate::fault::Saboteur;
+use crate::hil::lease;
 use crate::paths;
 use crate::progress::ProgressView;
 use crate::results::{self, RigDocument};
@@ -364,6 +365,8 @@ fn on_bench(
         outln!("{summary}");
         outln!("rig       {}\n", bench::display_name(&file));
     }
+    // Until the session is closed.
+    let _lease = lease::take(&file, &format!("run {}", protocol.name))?;
     let rig = bench::open(&file, &protocol)?;
     let preflight = gates::of_bench(&file, &rig, &args.sessions, summary.duration_s);
     let intent = intent_of(&protocol, seed, summary.duration_s, command_line);

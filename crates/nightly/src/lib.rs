@@ -7,6 +7,7 @@
 
 pub mod evidence;
 pub mod judge;
+pub mod junit;
 pub mod night;
 pub mod rules;
 pub mod trend;

@@ -84,9 +84,9 @@ impl Verdict {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[repr(u8)]
 pub enum NightExit {
-    /// Every check passed, was marginal, or was skipped for a stated reason.
+    /// Every check passed, was marginal, or was skipped for a stated reason; and one at least was made.
     Pass = 0,
-    /// A limit was broken, or too little was measured.
+    /// A limit was broken, too little was measured, or nothing was checked at all.
     Fail = 1,
     /// Nothing but the computer, its disk, its cables or its permissions is at fault.
     Infrastructure = 3,
@@ -98,8 +98,13 @@ impl NightExit {
     /// The code for a night of which each check ended with this verdict and cause.
     #[must_use]
     pub fn of(checks: impl IntoIterator<Item = (Verdict, Option<Cause>)>) -> Self {
-        let bad: Vec<_> = checks.into_iter().filter(|(v, _)| !v.is_good()).collect();
-        if bad.is_empty() {
+        let made = checks.into_iter().filter(|(v, _)| *v != Verdict::Skipped);
+        let made: Vec<_> = made.collect();
+        let bad: Vec<_> = made.iter().filter(|(v, _)| !v.is_good()).collect();
+        if made.is_empty() {
+            // Whoever looks at the code alone must not take a night for good in which nothing was looked at.
+            Self::Fail
+        } else if bad.is_empty() {
             Self::Pass
         } else if bad.iter().any(|(v, _)| *v == Verdict::Invalid) {
             Self::Invalid
@@ -148,6 +153,8 @@ mod tests {
             NightExit::of([(Pass, None), (Skipped, None)]),
             NightExit::Pass
         );
+        assert_eq!(NightExit::of([(Skipped, None)]), NightExit::Fail);
+        assert_eq!(NightExit::of([]), NightExit::Fail);
         assert_eq!(NightExit::of([(Pass, None), (Fail, skin)]), NightExit::Fail);
         assert_eq!(
             NightExit::of([(Fail, infra), (Fail, skin)]),

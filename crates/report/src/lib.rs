@@ -16,6 +16,7 @@ pub mod comparison;
 mod course;
 pub mod derive;
 pub mod figures;
+pub mod night;
 pub mod page;
 pub mod provenance;
 pub mod published;

@@ -240,9 +240,17 @@ impl Run<'_, '_> {
     /// An attempt, from what was found.
     fn judge(&mut self, check: &Check, mut found: Findings, began_s: f64) -> Attempt {
         if self.bench.stop_asked() {
-            let what = "the suite was ended during this check, or before it";
-            found.saw(EvidenceKind::Stopped, "computer", what);
-            let whole = || format!("stopped at {}", check.name);
+            let (kind, what) = if self.bench.lease_is_lost() {
+                (EvidenceKind::Lease, "somebody else took the bench")
+            } else {
+                (EvidenceKind::Stopped, "the suite was ended")
+            };
+            found.saw(
+                kind,
+                "computer",
+                format!("{what} during this check, or before it"),
+            );
+            let whole = || format!("{what}, at {}", check.name);
             self.night.ended_early.get_or_insert_with(whole);
         }
         let has_box = self.bench.rig().trigger_box.is_some();

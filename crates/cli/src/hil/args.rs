@@ -28,6 +28,20 @@ pub enum HilCommand {
         ctrl-C ends the suite with the check under way; what was not measured is INCONCLUSIVE. docs/nightly.md has the rules."
     )]
     Run(HilRunArgs),
+
+    /// Show who holds a bench: a suite, a run or a jog, each alone.
+    #[command(
+        after_help = "Examples:\n  skinrig hil lease\n  skinrig hil lease --rig hil/rigs/NAME.yaml"
+    )]
+    Lease(HilLeaseArgs),
+}
+
+/// Arguments of `hil lease`.
+#[derive(Debug, Args)]
+pub struct HilLeaseArgs {
+    /// The rig file of the bench; all leases of this computer when absent.
+    #[arg(long, value_name = "FILE")]
+    pub rig: Option<PathBuf>,
 }
 
 /// Arguments of `hil run`.

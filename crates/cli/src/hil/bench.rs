@@ -4,7 +4,9 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
+use skinrig_controller::ControlHandle;
 use skinrig_device::{CameraSettings, EventCamera, RealClock};
+use skinrig_hil::lease::Lease;
 use skinrig_hil::{Bench, Devices, Drilled, GoldenRun, Slot, Trouble};
 use skinrig_model::{CameraId, HostDuration};
 use skinrig_nightly::{Evidence, EvidenceKind};
@@ -31,6 +33,8 @@ pub struct RealBench {
     clock: RealClock,
     devices: Option<Devices>,
     firmware: Vec<(String, String)>,
+    // Last, so that it is released when every device is closed.
+    lease: Option<Lease>,
 }
 
 impl RealBench {
@@ -45,6 +49,16 @@ impl RealBench {
             clock: RealClock::start(),
             devices: None,
             firmware: Vec::new(),
+            lease: None,
+        }
+    }
+
+    /// The same, which is ours as long as this lease is.
+    #[must_use]
+    pub fn holding(self, lease: Lease) -> Self {
+        Self {
+            lease: Some(lease),
+            ..self
         }
     }
 
@@ -208,7 +222,15 @@ impl Bench for RealBench {
     }
 
     fn stop_asked(&self) -> bool {
-        self.operator.asked()
+        self.operator.asked() || self.lease_is_lost()
+    }
+
+    fn control(&self) -> ControlHandle {
+        self.operator.control().clone()
+    }
+
+    fn lease_is_lost(&self) -> bool {
+        self.lease.as_ref().is_some_and(Lease::is_lost)
     }
 
     fn patience(&self) -> HostDuration {

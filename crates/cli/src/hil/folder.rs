@@ -11,6 +11,10 @@ use crate::exit::Failure;
 
 /// The results for programs.
 pub const JSON: &str = "night.json";
+/// The page for people.
+pub const PAGE: &str = "night.html";
+/// The results for programs that collect those of tests.
+pub const JUNIT: &str = "junit.xml";
 /// Nights of one second, at most.
 const MOST: usize = 100;
 

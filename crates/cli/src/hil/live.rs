@@ -1,39 +1,101 @@
 //! What a terminal shows while a suite runs, and the night kept after every check.
 
+use std::io::IsTerminal;
 use std::path::PathBuf;
+use std::time::Duration;
 
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use skinrig_hil::Onlooker;
 use skinrig_nightly::Night;
-use skinrig_protocol::suite::Check;
+use skinrig_protocol::suite::{Check, Suite};
+use skinrig_report::night::{self, Colour};
 
 use super::folder;
 
 /// Shows the night as it grows, and writes it down.
 pub struct Live {
     folder: PathBuf,
+    display: Display,
+    colour: Colour,
     total: usize,
     told: usize,
-    /// The first fault in writing the night down.
-    pub unwritten: Option<String>,
+    unwritten: Option<String>,
+}
+
+enum Display {
+    /// A live line on standard error.
+    Bar(ProgressBar),
+    /// A line on standard error for each check.
+    Lines,
 }
 
 impl Live {
-    /// For a suite of so many checks.
+    /// For a night of `suite` that is kept in `folder`.
     #[must_use]
-    pub const fn new(folder: PathBuf, total: usize) -> Self {
+    pub fn new(folder: PathBuf, suite: &Suite) -> Self {
+        let terminal = std::io::stderr().is_terminal();
+        let display = if terminal {
+            let bar = ProgressBar::with_draw_target(
+                Some(suite.checks.len() as u64),
+                ProgressDrawTarget::stderr_with_hz(10),
+            );
+            // The template is a constant; should it ever be wrong, the default style still counts checks.
+            if let Ok(style) =
+                ProgressStyle::with_template("{bar:20.cyan/blue} {pos}/{len} {elapsed}  {wide_msg}")
+            {
+                bar.set_style(style.progress_chars("━━╌"));
+            }
+            bar.enable_steady_tick(Duration::from_secs(1));
+            Display::Bar(bar)
+        } else {
+            Display::Lines
+        };
         Self {
             folder,
-            total,
+            display,
+            colour: colour(terminal),
+            total: suite.checks.len(),
             told: 0,
             unwritten: None,
         }
+    }
+
+    /// Takes the live line away, and tells the first fault in writing the night down.
+    pub fn finish(self) -> Option<String> {
+        if let Display::Bar(bar) = &self.display {
+            bar.finish_and_clear();
+        }
+        self.unwritten
+    }
+
+    fn say(&self, text: &str) {
+        match &self.display {
+            Display::Bar(bar) => bar.suspend(|| errln!("{text}")),
+            Display::Lines => errln!("{text}"),
+        }
+    }
+}
+
+/// Colours on a terminal, unless `NO_COLOR` asks for none (<https://no-color.org>).
+pub fn colour(terminal: bool) -> Colour {
+    let unwanted = std::env::var_os("NO_COLOR").is_some_and(|v| !v.is_empty());
+    if terminal && !unwanted {
+        Colour::On
+    } else {
+        Colour::Off
     }
 }
 
 impl Onlooker for Live {
     fn begins(&mut self, _night: &Night, check: &Check, attempt: usize) {
-        if attempt > 1 {
-            errln!("{}: again, attempt {attempt}", check.title);
+        let again = match attempt {
+            1 => String::new(),
+            n => format!(", attempt {n}"),
+        };
+        match &self.display {
+            Display::Bar(bar) => bar.set_message(format!("{}{again}", check.title)),
+            Display::Lines if attempt > 1 => errln!("{}{again}", check.title),
+            Display::Lines => {}
         }
     }
 
@@ -41,16 +103,14 @@ impl Onlooker for Live {
         if let Err(e) = folder::write_json(&self.folder, night) {
             self.unwritten.get_or_insert_with(|| e.to_string());
         }
+        let width = self.total.to_string().len();
         for check in night.checks.iter().skip(self.told) {
             self.told += 1;
-            let took_s: f64 = check.attempts.iter().map(|a| a.took_s).sum();
-            errln!(
-                "{:>2}/{}  {:<12}  {:<30}{took_s:7.1} s",
-                self.told,
-                self.total,
-                check.verdict.name(),
-                check.title
-            );
+            let line = night::line(check, self.colour);
+            self.say(&format!("{:>width$}/{}  {line}", self.told, self.total));
+        }
+        if let Display::Bar(bar) = &self.display {
+            bar.set_position(self.told as u64);
         }
     }
 }

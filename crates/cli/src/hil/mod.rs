@@ -5,6 +5,7 @@ pub mod bench;
 mod drill;
 mod folder;
 mod golden;
+pub mod lease;
 mod live;
 pub mod run;
 mod trouble;
@@ -18,6 +19,7 @@ use args::{HilArgs, HilCommand};
 /// [`crate::exit::Failure`] with the code that says what kind.
 pub fn hil(args: &HilArgs, command_line: &str, json: bool) -> Outcome {
     match &args.command {
+        HilCommand::Lease(a) => lease::lease(a, json),
         HilCommand::Run(a) => run::run(a, command_line, json),
     }
 }

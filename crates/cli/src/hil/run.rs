@@ -1,5 +1,6 @@
 //! `skinrig hil run`: a suite on a bench, from its plan to its results.
 
+use std::io::IsTerminal;
 use std::path::Path;
 
 use chrono::{SecondsFormat, Utc};
@@ -11,14 +12,16 @@ use skinrig_nightly::night::NIGHT_VERSION;
 use skinrig_nightly::{Night, NightExit, Verdict, Versions};
 use skinrig_protocol::rig::RigFile;
 use skinrig_protocol::suite::{Measure, Suite};
+use skinrig_report::night::{self, span};
 
 use super::args::HilRunArgs;
 use super::bench::RealBench;
-use super::folder;
-use super::live::Live;
+use super::live::{self, Live};
+use super::{folder, lease};
 use crate::check;
 use crate::exit::{Exit, Failure, Outcome};
 use crate::rig::bench;
+use crate::run::host_name;
 use crate::signals::Operator;
 
 /// `skinrig hil run`.
@@ -44,60 +47,61 @@ pub fn run(args: &HilRunArgs, command_line: &str, json: bool) -> Outcome {
             "{}: budget: expected a plan of at most {}, found one of about {}\n  \
              next: raise the budget, shorten or `skip` a check, or choose checks with --only",
             suite.file_name,
-            minutes(suite.budget),
-            minutes(planned)
+            span(suite.budget.as_secs_f64()),
+            span(planned.as_secs_f64())
         )));
     }
-    if !json {
-        outln!(
-            "{} on {}: about {} of {}",
-            suite.name,
-            bench::display_name(&rig),
-            minutes(planned),
-            minutes(suite.budget)
-        );
-    }
-    if args.history.is_some() {
-        errln!("warning: --history: nothing is kept yet");
-    }
+    let lease = lease::take(&rig, &format!("hil run {}", suite.name))?;
     let started = Utc::now();
     let (id, folder) = folder::make(&args.out, started, &suite.name)?;
-    let night = blank(
-        id,
-        &suite,
-        &rig,
-        started.to_rfc3339_opts(SecondsFormat::Secs, true),
-    );
-    let mut live = Live::new(folder.clone(), suite.checks.len());
-    let mut bench = RealBench::new(rig, folder.clone(), operator, command_line);
+    if !json {
+        outln!(
+            "{} on {}: about {} of {}\n{}\n",
+            suite.name,
+            bench::display_name(&rig),
+            span(planned.as_secs_f64()),
+            span(suite.budget.as_secs_f64()),
+            folder.display()
+        );
+    }
+    let started = started.to_rfc3339_opts(SecondsFormat::Secs, true);
+    let mut night = blank(id, &suite, &rig, started);
+    night.lease_note = lease.note().map(str::to_owned);
+    let mut live = Live::new(folder.clone(), &suite);
+    let mut bench = RealBench::new(rig, folder.clone(), operator, command_line).holding(lease);
     let night = tonight.run(night, &mut bench, &mut live);
+    let unwritten = live.finish();
+    // Nothing is open any more.
+    drop(bench);
+    let kept = keep(&night, &folder, args.history.as_deref());
     if json {
         crate::print_json(&serde_json::to_value(&night).map_err(Failure::internal)?);
     } else {
-        outln!(
-            "{}: {}, took {} of {}\n{}",
-            suite.name,
-            night.verdict.name(),
-            minutes(HostDuration::from_secs_f64(night.took_s)),
-            minutes(suite.budget),
-            folder.display()
-        );
+        let colour = live::colour(std::io::stdout().is_terminal());
+        outln!("{}", night::tree(&night, colour).trim_end());
+        outln!("{}", folder.join(folder::PAGE).display());
     }
-    if let Some(why) = live.unwritten {
-        return Err(Failure::rig(format!(
-            "{}: the night could not be written: {why}",
+    match unwritten.map_or(kept, Err) {
+        Ok(()) => Ok(Exit::Night(night.exit)),
+        Err(why) => Err(Failure::rig(format!(
+            "{}: {why}\n  next: make room or choose another folder with --out; what was measured is above",
             folder.display()
-        )));
+        ))),
     }
-    Ok(Exit::Night(night.exit))
 }
 
-/// `6 min`, `40 s`.
-fn minutes(d: HostDuration) -> String {
-    match d.as_secs_f64() {
-        s if s < 90.0 => format!("{s:.0} s"),
-        s => format!("{:.1} min", s / 60.0),
+/// Writes the finished night in its other forms, and adds it to the history.
+fn keep(night: &Night, folder: &Path, history: Option<&Path>) -> Result<(), String> {
+    let page = night::html(night).map_err(|e| e.to_string())?;
+    let xml = skinrig_nightly::junit::junit(night, &host_name());
+    for (name, text) in [(folder::PAGE, page), (folder::JUNIT, xml)] {
+        folder::write(folder, name, &text).map_err(|e| format!("{name}: {e}"))?;
     }
+    if let Some(history) = history {
+        skinrig_hil::history::append(history, night, folder)
+            .map_err(|e| format!("--history: {e}"))?;
+    }
+    Ok(())
 }
 
 fn load(path: &Path) -> Result<Suite, Failure> {

@@ -16,6 +16,7 @@ use skinrig_controller::{
     ControlHandle, ControllerError, ControllerSettings, Floor, GuardError, Jog, Moved, Touched,
 };
 use skinrig_device::{Clock, Indenter, MotionLimits, RealClock};
+use skinrig_hil::lease::Lease;
 use skinrig_model::{HostDuration, Point3, PoseSample, RigidTransform, Robot, SimLevel, Skin};
 use skinrig_protocol::plan::{OnTrip, RunLimits};
 use skinrig_protocol::{Surface, TouchSearch};
@@ -23,6 +24,7 @@ use skinrig_sim::{SimConfig, in_real_time, simulated_rig};
 
 use crate::args::JogArgs;
 use crate::exit::{Exit, Failure, Outcome};
+use crate::hil::lease;
 use crate::rig::bench;
 use crate::signals;
 use log::Log;
@@ -61,18 +63,19 @@ struct Bench {
     search: TouchSearch,
 }
 
-fn open(args: &JogArgs) -> Result<Bench, Failure> {
+fn open(args: &JogArgs) -> Result<(Bench, Option<Lease>), Failure> {
     let Some(path) = &args.rig else {
-        return Ok(simulated());
+        return Ok((simulated(), None));
     };
     let file = bench::load(path)?;
+    let lease = lease::take(&file, "jog")?;
     let clock = RealClock::start();
     let search = match file.surface {
         Some(Surface::Touch(search)) => search,
         _ => SEARCH,
     };
     let indenter = bench::open_robot(&file, clock)?;
-    Ok(Bench {
+    let bench = Bench {
         name: bench::display_name(&file),
         max_acceleration_mm_s2: indenter.capabilities().max_acceleration_mm_s2,
         indenter,
@@ -84,7 +87,8 @@ fn open(args: &JogArgs) -> Result<Bench, Failure> {
         max_depth_mm: file.limits.max_depth_mm,
         robot_from_skin: file.frame.robot_from_skin,
         search,
-    })
+    };
+    Ok((bench, Some(lease)))
 }
 
 /// The simulated rig at the speed of a real one where somebody types, at full speed where a file is piped in.
@@ -165,7 +169,7 @@ pub fn jog(args: &JogArgs) -> Outcome {
     .map_err(Failure::internal)?;
 
     // Opened with the hand on ctrl-C: from here on the arm may be live.
-    let bench = open(args)?;
+    let (bench, _lease) = open(args)?;
     let (run, robot) = limits(&bench);
     let skin_from_robot = bench.robot_from_skin.inverse();
     let floor = Floor {

@@ -1,0 +1,124 @@
+//! The lease of a bench, taken by everything here that moves its robot; and `skinrig hil lease`, which shows it.
+
+use std::path::PathBuf;
+
+use sha2::{Digest, Sha256};
+use skinrig_hil::lease::{self, Lease, Owner, Pace, Standing};
+use skinrig_protocol::rig::{RigFile, RigKind};
+
+use super::args::HilLeaseArgs;
+use crate::exit::{Exit, Failure, Outcome};
+use crate::rig::bench;
+use crate::run::host_name;
+
+/// Takes the bench of `rig`, to do `what` on it. Hold on to it until every device is closed.
+///
+/// # Errors
+/// [`Failure::rig`] (3) when somebody else holds it: who, since when, and what to do.
+pub fn take(rig: &RigFile, what: &str) -> Result<Lease, Failure> {
+    let owner = Owner::this_process(user(), host_name(), what.to_owned());
+    let lease = Lease::take(&path(rig), owner, Pace::default()).map_err(Failure::rig)?;
+    if let Some(note) = lease.note() {
+        errln!("note: the bench was {note}");
+    }
+    Ok(lease)
+}
+
+/// The file of the lease. The robot names it: two rig files for one robot share it. Stand-ins all have one serial number; what
+/// tells them apart is the library that each is reached through.
+fn path(rig: &RigFile) -> PathBuf {
+    let robot = &rig.robot;
+    let name = format!("{}-{}", robot.model, robot.serial);
+    let name = match (rig.kind, &robot.library) {
+        (RigKind::Emulated, Some(library)) => {
+            let digest = Sha256::digest(library.as_os_str().as_encoded_bytes());
+            let short: String = digest[..4].iter().map(|b| format!("{b:02x}")).collect();
+            format!("{name}-emulated-{short}")
+        }
+        _ => name,
+    };
+    lease::path_of(&lease::folder(), &name)
+}
+
+/// The login name, as far as the environment tells it.
+fn user() -> String {
+    ["USER", "LOGNAME", "USERNAME"]
+        .iter()
+        .find_map(|name| std::env::var(name).ok().filter(|v| !v.is_empty()))
+        .unwrap_or_else(|| "unknown".to_owned())
+}
+
+/// `skinrig hil lease`.
+///
+/// # Errors
+/// [`Failure`] when rig file or lease cannot be read.
+pub fn lease(args: &HilLeaseArgs, json: bool) -> Outcome {
+    let paths = match &args.rig {
+        Some(file) => vec![path(&bench::load(file)?)],
+        None => all()?,
+    };
+    let mut shown = Vec::new();
+    for path in &paths {
+        let standing = lease::look(path)
+            .map_err(|e| Failure::rig(format!("{}: cannot be read: {e}", path.display())))?;
+        if json {
+            shown.push(described(path, &standing));
+        } else {
+            outln!("{}\n  {}", path.display(), words(&standing));
+        }
+    }
+    if json {
+        crate::print_json(&serde_json::json!({ "leases": shown }));
+    } else if paths.is_empty() {
+        outln!("no lease was ever taken in {}", lease::folder().display());
+    }
+    Ok(Exit::Ok)
+}
+
+/// Every lease of this computer.
+fn all() -> Result<Vec<PathBuf>, Failure> {
+    let folder = lease::folder();
+    let listed = std::fs::read_dir(&folder)
+        .map_err(|e| Failure::rig(format!("{}: cannot be read: {e}", folder.display())))?;
+    let mut paths: Vec<PathBuf> = listed
+        .filter_map(|entry| Some(entry.ok()?.path()))
+        .filter(|p| {
+            let name = p.file_name().and_then(|n| n.to_str()).unwrap_or_default();
+            name.starts_with("skinrig-") && name.ends_with(".lease")
+        })
+        .collect();
+    paths.sort();
+    Ok(paths)
+}
+
+fn words(standing: &Standing) -> String {
+    match standing {
+        Standing::Free { last: None } => "free; nobody ever took it".to_owned(),
+        Standing::Free { last: Some(last) } => format!("free; last: {last}"),
+        Standing::Held { owner, beat_at } => {
+            let who = owner.as_ref().map_or_else(
+                || "somebody who is just taking it".to_owned(),
+                ToString::to_string,
+            );
+            let beat = beat_at.as_ref();
+            let beat = beat.map_or(String::new(), |b| format!("; last sign of life {b}"));
+            format!("held by {who}{beat}")
+        }
+        Standing::Left { owner, beat_at } => {
+            let end = match owner.lives(&host_name()) {
+                Some(false) => "which died without releasing it",
+                _ => "whose lock is not seen here; who takes it watches for a sign of life first",
+            };
+            format!("left by {owner}, {end}; last sign of life {beat_at}")
+        }
+    }
+}
+
+fn described(path: &std::path::Path, standing: &Standing) -> serde_json::Value {
+    let (state, owner, beat_at) = match standing {
+        Standing::Free { last } => ("free", last.as_ref(), None),
+        Standing::Held { owner, beat_at } => ("held", owner.as_ref(), beat_at.as_ref()),
+        Standing::Left { owner, beat_at } => ("left", Some(owner), Some(beat_at)),
+    };
+    serde_json::json!({ "path": path, "state": state, "owner": owner, "beat_at": beat_at })
+}

@@ -1,0 +1,10 @@
+//! Owns the presentation of a night of checks: the tree on a terminal, and the page for the morning.
+
+mod bars;
+mod page;
+mod tree;
+mod words;
+
+pub use page::html;
+pub use tree::{Colour, line, tree};
+pub use words::span;

@@ -1,0 +1,259 @@
+//! Owns the page of a night: what its template receives.
+
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
+use minijinja::value::Serde;
+use minijinja::{AutoEscape, Environment, Value, context};
+use serde::Serialize;
+use sha2::{Digest, Sha256};
+use skinrig_nightly::{Attempt, Cause, CheckResult, Measurement, Night, Verdict};
+
+use super::{bars, words};
+use crate::ReportError;
+use crate::page::PAGE_CSS;
+
+const TEMPLATE: &str = include_str!("../../assets/night/page.html");
+const CSS: &str = include_str!("../../assets/night/page.css");
+const SCRIPT: &str = include_str!("../../assets/night/page.js");
+
+/// One of the four places to look at.
+#[derive(Serialize)]
+struct Place {
+    name: &'static str,
+    state: &'static str,
+    words: String,
+    checks: Vec<Named>,
+}
+
+/// A check by its title, with a link.
+#[derive(Serialize)]
+struct Named {
+    id: String,
+    title: String,
+}
+
+#[derive(Serialize)]
+struct Check {
+    id: String,
+    title: String,
+    verdict: &'static str,
+    open: bool,
+    why: Option<String>,
+    repeats: Option<String>,
+    skipped: Option<String>,
+    took: String,
+    planned: String,
+    share: f64,
+    attempts: Vec<Tried>,
+}
+
+#[derive(Serialize)]
+struct Tried {
+    number: usize,
+    verdict: &'static str,
+    took: String,
+    rows: Vec<Row>,
+    seen: Vec<Seen>,
+}
+
+#[derive(Serialize)]
+struct Row {
+    subject: String,
+    metric: String,
+    value: String,
+    interval: String,
+    limit: String,
+    bar: Option<String>,
+    verdict: &'static str,
+    note: String,
+}
+
+#[derive(Serialize)]
+struct Seen {
+    subject: String,
+    kind: &'static str,
+    what: String,
+    next: Option<String>,
+}
+
+/// The night as one HTML page that needs no network; only the golden session's report is another file, and linked.
+///
+/// # Errors
+/// [`ReportError`] when the template cannot be written; no input is known to cause it.
+pub fn html(night: &Night) -> Result<String, ReportError> {
+    let mut env = Environment::new();
+    env.set_auto_escape_callback(|_| AutoEscape::Html);
+    env.add_template("night.html", TEMPLATE)?;
+    let safe = |text: &str| Value::from_safe_string(text.to_owned());
+    let longest = night.checks.iter().map(words::took_s).fold(0.0, f64::max);
+    let checks: Vec<Check> = night.checks.iter().map(|c| check(c, longest)).collect();
+    let share = |seconds: f64| (100.0 * seconds / night.budget_s.max(1e-9)).clamp(0.0, 100.0);
+    Ok(env.get_template("night.html")?.render(context! {
+        page_css => safe(PAGE_CSS),
+        own_css => safe(CSS),
+        script => safe(SCRIPT),
+        script_hash => format!("sha256-{}", STANDARD.encode(Sha256::digest(SCRIPT))),
+        headline => words::headline(night),
+        id => night.id.clone(),
+        suite => night.suite.clone(),
+        rig => night.rig.clone(),
+        started => night.started.clone(),
+        emulated => night.rig_kind == "emulated",
+        verdict => night.verdict.name(),
+        exit => night.exit as u8,
+        good => night.verdict.is_good() && night.exit as u8 == 0,
+        finished => night.finished,
+        ended_early => night.ended_early.clone(),
+        lease_note => night.lease_note.clone(),
+        tally => words::tally(night),
+        places => Value::from(Serde(places(night))),
+        took => words::span(night.took_s),
+        planned => words::span(night.planned_s),
+        budget => words::span(night.budget_s),
+        took_share => share(night.took_s),
+        planned_share => share(night.planned_s),
+        checks => Value::from(Serde(checks)),
+        golden => night.golden.as_ref().map(|g| context! {
+            session => g.session.clone(), report => g.report.clone(), results => g.results_sha256.clone(),
+        }),
+        software => night.versions.software.clone(),
+        analysis => night.versions.analysis,
+        firmware => night.versions.firmware.clone(),
+        skin => night.versions.skin.clone(),
+        suite_sha256 => night.suite_sha256.clone(),
+        rig_sha256 => night.rig_sha256.clone(),
+    })?)
+}
+
+/// The four places that may have to be looked at, and what the night says of each.
+fn places(night: &Night) -> Vec<Place> {
+    let named = words::causes(night);
+    [
+        (Cause::Rig, "Rig"),
+        (Cause::Skin, "Skin"),
+        (Cause::Infrastructure, "Computer and cables"),
+        (Cause::Software, "Software"),
+    ]
+    .into_iter()
+    .map(|(cause, name)| {
+        let at_fault = named.iter().find(|(c, _)| *c == cause);
+        let checks: Vec<Named> = at_fault
+            .map(|(_, checks)| checks.iter().map(|c| name_of(c)).collect())
+            .unwrap_or_default();
+        let (state, words) = if !checks.is_empty() {
+            ("bad", "look here".to_owned())
+        } else if cause == Cause::Skin {
+            skin(night)
+        } else if cause == Cause::Rig && night.checks.iter().all(|c| c.attempts.is_empty()) {
+            ("unknown", "not checked".to_owned())
+        } else {
+            ("ok", "nothing found".to_owned())
+        };
+        Place {
+            name,
+            state,
+            words,
+            checks,
+        }
+    })
+    .collect()
+}
+
+/// What a night says of the skin when nothing names it.
+fn skin(night: &Night) -> (&'static str, String) {
+    let golden = night.checks.iter().find(|c| c.name == "golden");
+    match golden {
+        None => ("unknown", "not part of this suite".to_owned()),
+        Some(c) if c.verdict == Verdict::Skipped => ("unknown", "not checked".to_owned()),
+        Some(c) if c.verdict.is_good() => ("ok", "as it should be".to_owned()),
+        Some(_) => (
+            "unknown",
+            "not known: its campaign says nothing tonight".to_owned(),
+        ),
+    }
+}
+
+fn name_of(check: &CheckResult) -> Named {
+    Named {
+        id: check.name.clone(),
+        title: check.title.clone(),
+    }
+}
+
+fn check(c: &CheckResult, longest_s: f64) -> Check {
+    let took_s = words::took_s(c);
+    Check {
+        id: c.name.clone(),
+        title: c.title.clone(),
+        verdict: c.verdict.name(),
+        open: !matches!(c.verdict, Verdict::Pass | Verdict::Skipped),
+        why: words::why(c),
+        repeats: c.repeats.clone(),
+        skipped: c.skipped.clone(),
+        took: if c.attempts.is_empty() {
+            String::new()
+        } else {
+            words::span(took_s)
+        },
+        planned: words::span(c.planned_s),
+        share: 100.0 * took_s / longest_s.max(1e-9),
+        attempts: (1..).zip(&c.attempts).map(|(n, a)| tried(n, a)).collect(),
+    }
+}
+
+fn tried(number: usize, attempt: &Attempt) -> Tried {
+    let rows = attempt.parts.iter().flat_map(|part| {
+        let subject = part.subject.clone();
+        let of = move |m| row(&subject, m);
+        part.measurements.iter().map(of)
+    });
+    Tried {
+        number,
+        verdict: attempt.verdict.name(),
+        took: words::span(attempt.took_s),
+        rows: rows.collect(),
+        seen: attempt
+            .evidence
+            .iter()
+            .map(|e| Seen {
+                subject: e.subject.clone(),
+                kind: e.kind.name(),
+                what: e.what.clone(),
+                next: e.next.clone(),
+            })
+            .collect(),
+    }
+}
+
+fn row(subject: &str, m: &Measurement) -> Row {
+    let samples = match m.n {
+        Some(n) if n < m.needs => format!("{n} of {} samples", m.needs),
+        Some(n) => format!("n = {n}"),
+        None => String::new(),
+    };
+    let parts = [m.note.clone().unwrap_or_default(), samples];
+    let note: Vec<String> = parts.into_iter().filter(|p| !p.is_empty()).collect();
+    Row {
+        subject: subject.to_owned(),
+        metric: m.metric.replace('_', " "),
+        value: match m.value {
+            Some(_) => words::amount(m.value, &m.unit),
+            None => "not measured".to_owned(),
+        },
+        interval: m.interval.map_or(String::new(), |[low, high]| {
+            let of = |v| words::amount(Some(v), &m.unit);
+            format!("{} to {}", of(low), of(high))
+        }),
+        limit: m
+            .limit
+            .as_ref()
+            .map_or_else(|| "for the record".to_owned(), |l| words::limit(l, &m.unit)),
+        bar: bars::bar(m),
+        verdict: if m.limit.is_some() {
+            m.verdict.name()
+        } else {
+            ""
+        },
+        note: note.join("; "),
+    }
+}

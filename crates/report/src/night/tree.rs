@@ -1,0 +1,218 @@
+//! Owns the tree of a night on a terminal: every check with what was measured, and of those that are not good, why and what next.
+
+use skinrig_nightly::{Attempt, CheckResult, Measurement, Night, Part, Verdict};
+
+use super::words;
+
+const WIDTH: usize = 80;
+/// Where titles begin.
+const INDENT: usize = 15;
+/// Where the words about a device begin.
+const DEEP: usize = 28;
+
+/// Whether a terminal shows colours.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Colour {
+    /// It does.
+    On,
+    /// It does not.
+    Off,
+}
+
+/// The night as a tree.
+#[must_use]
+pub fn tree(night: &Night, colour: Colour) -> String {
+    let mut out = Lines {
+        text: String::new(),
+        colour,
+    };
+    out.wrapped(
+        0,
+        &format!("{} on {}, {}", night.suite, night.rig, night.started),
+    );
+    for check in &night.checks {
+        out.check(check);
+    }
+    out.text.push('\n');
+    let verdict = out.painted(night.verdict, night.verdict.name());
+    out.text.push_str(&format!(
+        "{verdict}  {} (exit {})\n",
+        words::headline(night),
+        night.exit as u8
+    ));
+    out.wrapped(0, &words::tally(night));
+    out.wrapped(
+        0,
+        &format!(
+            "took {} of {}, planned {} without repeats",
+            words::span(night.took_s),
+            words::span(night.budget_s),
+            words::span(night.planned_s)
+        ),
+    );
+    if let Some(why) = &night.ended_early {
+        out.wrapped(0, &format!("ended early: {why}"));
+    }
+    if !night.finished {
+        out.wrapped(0, "unfinished: it is under way, or its program died");
+    }
+    if let Some(note) = &night.lease_note {
+        out.wrapped(0, &format!("lease: {note}"));
+    }
+    out.text
+}
+
+/// The line of one check.
+#[must_use]
+pub fn line(check: &CheckResult, colour: Colour) -> String {
+    let lines = Lines {
+        text: String::new(),
+        colour,
+    };
+    lines.head(check)
+}
+
+struct Lines {
+    text: String,
+    colour: Colour,
+}
+
+impl Lines {
+    fn head(&self, check: &CheckResult) -> String {
+        let took = match check.attempts.len() {
+            0 => String::new(),
+            1 => words::span(words::took_s(check)),
+            n => format!("{n} attempts, {}", words::span(words::took_s(check))),
+        };
+        let name = format!("{:<12}", check.verdict.name());
+        let room = WIDTH - INDENT;
+        let title = check.title.chars().count();
+        let gap = room.saturating_sub(title + took.chars().count()).max(1);
+        format!(
+            "{}   {}{}{took}",
+            self.painted(check.verdict, &name),
+            check.title,
+            " ".repeat(if took.is_empty() { 0 } else { gap })
+        )
+    }
+
+    fn check(&mut self, check: &CheckResult) {
+        let head = self.head(check);
+        self.text.push_str(&head);
+        self.text.push('\n');
+        if let Some(reason) = &check.skipped {
+            self.wrapped(INDENT, reason);
+        }
+        if let Some(why) = words::why(check) {
+            self.wrapped(INDENT, &why);
+        }
+        if let Some(repeats) = &check.repeats {
+            self.wrapped(INDENT, repeats);
+        }
+        let several = check.attempts.len() > 1;
+        for (i, attempt) in check.attempts.iter().enumerate() {
+            if several {
+                let name = attempt.verdict.name();
+                self.wrapped(INDENT, &format!("attempt {}: {name}", i + 1));
+            }
+            self.attempt(attempt);
+        }
+    }
+
+    fn attempt(&mut self, attempt: &Attempt) {
+        for part in &attempt.parts {
+            self.part(part);
+        }
+        if attempt.verdict.is_good() {
+            return;
+        }
+        let mut last = None;
+        for e in &attempt.evidence {
+            let what = format!("{}: {}", e.kind.name(), e.what);
+            self.labelled(None, &e.subject, &what);
+            // One step for several of a kind is told once.
+            if let Some(next) = e.next.as_ref().filter(|n| last != Some(*n)) {
+                self.labelled(None, "next", next);
+                last = Some(next);
+            }
+        }
+    }
+
+    fn part(&mut self, part: &Part) {
+        let (good, bad): (Vec<&Measurement>, Vec<&Measurement>) = part
+            .measurements
+            .iter()
+            .partition(|m| m.verdict == Verdict::Pass);
+        let mut subject = part.subject.as_str();
+        for m in bad {
+            self.labelled(Some(m.verdict), subject, &words::against(m));
+            subject = "";
+        }
+        if !good.is_empty() {
+            let all: Vec<String> = good
+                .iter()
+                .map(|m| format!("{} {}", m.metric, words::amount(m.value, &m.unit)))
+                .collect();
+            self.labelled(None, subject, &all.join(", "));
+        }
+    }
+
+    /// A device's words behind its name, and the verdict before it.
+    fn labelled(&mut self, verdict: Option<Verdict>, label: &str, text: &str) {
+        let (first, rest) = fold(text, WIDTH - DEEP);
+        let name = verdict.map_or("", Verdict::name);
+        let before = format!("{name:>12}");
+        let before = match verdict {
+            Some(v) => self.painted(v, &before),
+            None => before,
+        };
+        let label_room = DEEP - INDENT;
+        self.text
+            .push_str(&format!("{before}   {label:<label_room$}{first}\n"));
+        for line in rest {
+            self.text.push_str(&format!("{:DEEP$}{line}\n", ""));
+        }
+    }
+
+    fn wrapped(&mut self, indent: usize, text: &str) {
+        let (first, rest) = fold(text, WIDTH - indent);
+        for line in std::iter::once(first).chain(rest) {
+            self.text.push_str(&format!("{:indent$}{line}\n", ""));
+        }
+    }
+
+    fn painted(&self, verdict: Verdict, text: &str) -> String {
+        if self.colour == Colour::Off {
+            return text.to_owned();
+        }
+        let code = match verdict {
+            Verdict::Skipped => "2",
+            Verdict::Pass => "32",
+            Verdict::Marginal => "33",
+            Verdict::Inconclusive => "36",
+            Verdict::Fail => "1;31",
+            Verdict::Invalid => "1;35",
+        };
+        format!("\u{1b}[{code}m{text}\u{1b}[0m")
+    }
+}
+
+/// `text` in lines of at most `width` characters; a longer word stands alone. What would move the cursor is left out.
+fn fold(text: &str, width: usize) -> (String, Vec<String>) {
+    let mut lines = vec![String::new()];
+    for word in text.split_whitespace() {
+        let word: String = word.chars().filter(|c| !c.is_control()).collect();
+        let last = lines.len() - 1;
+        let line = &mut lines[last];
+        if line.is_empty() {
+            line.push_str(&word);
+        } else if line.chars().count() + 1 + word.chars().count() <= width {
+            line.push(' ');
+            line.push_str(&word);
+        } else {
+            lines.push(word);
+        }
+    }
+    let first = lines.remove(0);
+    (first, lines)
+}
