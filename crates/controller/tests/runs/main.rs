@@ -1,5 +1,6 @@
 //! The controller on a scripted rig.
 
+mod broken_off;
 mod course;
 mod edges;
 mod escape;
@@ -12,6 +13,7 @@ mod progress;
 mod resumed;
 mod rig_faults;
 mod simulated;
+mod spoilt;
 mod suspend;
 mod touch;
 mod watchdog;

@@ -1,0 +1,306 @@
+//! The detector: its kernel, its path against a slow reference, its threshold, its false alarms.
+
+use super::*;
+
+/// The whole detector for one threshold, as one would write it down from the paper: index of the onset.
+fn slow_onset(detector: &Detector, counts: &[u32], rate_per_s: f64, h: f64) -> Option<usize> {
+    let path = slow_path(detector, counts, rate_per_s);
+    let run = detector.consecutive as usize;
+    (0..path.len()).find(|i| (*i..i + run).all(|k| path.get(k).is_some_and(|s| *s >= h)))
+}
+
+fn slow_path(detector: &Detector, counts: &[u32], rate_per_s: f64) -> Vec<f64> {
+    let half = (4.0 * 0.5f64 / detector.bin_ms).round() as i64;
+    let tap = |k: i64| (-0.5 * (k as f64 * detector.bin_ms / 0.5).powi(2)).exp();
+    let mut sum = 0.0f64;
+    (0..counts.len() as i64)
+        .map(|i| {
+            let inside = |k: &i64| (0..counts.len() as i64).contains(&(i + k));
+            let taps: f64 = match detector.edges {
+                Edges::Renormalised => (-half..=half).filter(inside).map(tap).sum(),
+                Edges::ZeroPadded => (-half..=half).map(tap).sum(),
+            };
+            let x: f64 = (-half..=half)
+                .filter(inside)
+                .map(|k| tap(k) / taps * f64::from(counts[(i + k) as usize]))
+                .sum();
+            let step = x * detector.alpha.ln() - (detector.alpha - 1.0) * rate_per_s * BIN_S;
+            sum = (sum + step).max(0.0);
+            sum
+        })
+        .collect()
+}
+
+#[test]
+fn the_kernel_is_the_published_one_and_keeps_a_constant() {
+    let kernel = Kernel::gaussian(0.5, 0.2);
+    let taps = kernel.taps();
+    assert_eq!(taps.len(), 11);
+    assert!((taps[0] - 0.159_580_679_327_215_23).abs() < 1e-15);
+    assert!((taps[10] - 5.353_335_404_957_566_5e-5).abs() < 1e-18);
+    assert!((taps[0] + 2.0 * taps[1..].iter().sum::<f64>() - 1.0).abs() < 1e-15);
+    // Also where there are fewer bins than taps.
+    for n in [1, 6, 20, 21, 100] {
+        let smoothed = kernel.smooth(&vec![7; n], Edges::Renormalised);
+        assert_eq!(smoothed.len(), n);
+        assert!(
+            smoothed.iter().all(|x| (x - 7.0).abs() < 1e-12),
+            "{n}: {smoothed:?}"
+        );
+    }
+    let padded = kernel.smooth(&[7; 100], Edges::ZeroPadded);
+    assert!((padded[50] - 7.0).abs() < 1e-12 && padded[0] < 4.1 && padded[99] < 4.1);
+    assert_eq!(
+        Kernel::gaussian(0.0, 0.2).smooth(&[3, 0, 5], Edges::ZeroPadded),
+        [3.0, 0.0, 5.0]
+    );
+}
+
+#[test]
+fn a_background_has_a_rate_whatever_is_in_it() {
+    // 0 and 1 events (public code: 0.001 per second), 2 events 1 µs apart (2e6), 2 at one instant (2e9): all over 0.9 s.
+    for (events, rate) in [
+        (0, 0.5 / 0.9),
+        (1, 1.0 / 0.9),
+        (2, 2.0 / 0.9),
+        (45_000_000, 5e7),
+    ] {
+        assert!((background_rate_per_s(events, 0.9) / rate - 1.0).abs() < 1e-12);
+    }
+    // A touch is found behind each of the four, and a single event is none.
+    let detector = detector();
+    let quiet = vec![0; 4500];
+    let mut touch = vec![0; 8500];
+    touch[4250..4350].fill(10);
+    for (bin, events) in [(0, 0), (2000, 1), (2000, 2), (4499, 2)] {
+        let mut background = quiet.clone();
+        background[bin] = events;
+        let trial = look(&detector, -4250, &touch, &background);
+        let onset = trial.onsets_ms[9].unwrap();
+        assert!((-2.0..=0.2).contains(&onset), "{events} events: {onset} ms");
+        let mut single = vec![0; 8500];
+        single[100] = 1;
+        let none = look(&detector, -4250, &single, &background);
+        assert!(none.onsets_ms[4..].iter().all(Option::is_none));
+    }
+}
+
+#[test]
+fn trials_without_an_answer_are_answered_with_none() {
+    let detector = detector();
+    // No event; fewer bins than taps; a single bin; no bin.
+    for counts in [vec![0; 8500], vec![0, 1, 0, 0, 1, 0], vec![1], vec![]] {
+        let trial = look(&detector, 0, &counts, &[1, 0, 0, 1, 0]);
+        assert!(
+            trial.onsets_ms.iter().all(Option::is_none),
+            "{} bins",
+            counts.len()
+        );
+    }
+    // All events at one instant: a burst like any other.
+    let mut instant = vec![0; 8500];
+    instant[4250] = 10_000_000;
+    let trial = look(&detector, -4250, &instant, &[0; 2000]);
+    assert!(
+        trial
+            .onsets_ms
+            .iter()
+            .all(|t| t.is_some_and(|t| (-2.0..=0.2).contains(&t)))
+    );
+    // 5e7 events per second throughout are background, four times as many are not.
+    let flood = vec![10_000; 8500];
+    let trial = look(&detector, -4250, &flood, &flood[..2000]);
+    assert!(trial.onsets_ms.iter().all(Option::is_none));
+    assert_eq!(trial.alarms(0, 1.0, 10), 0);
+    let more: Vec<u32> = (0..8500)
+        .map(|i| if i < 4250 { 10_000 } else { 40_000 })
+        .collect();
+    let trial = look(&detector, -4250, &more, &flood[..2000]);
+    assert!(
+        trial
+            .onsets_ms
+            .iter()
+            .all(|t| t.is_some_and(|t| (-2.0..=0.2).contains(&t)))
+    );
+}
+
+#[test]
+fn a_planted_step_is_found_in_its_bin() {
+    let mut random = Random(11);
+    let sharp = Detector {
+        kernel: Kernel::gaussian(0.0, 0.2),
+        ..detector()
+    };
+    let smooth = detector();
+    for planted in [-2000i64, -1, 0, 37, 3000] {
+        let rate = |bin: usize| {
+            if (bin as i64 - 4250) < planted {
+                500.0
+            } else {
+                100_000.0
+            }
+        };
+        let counts = random.counts(rate, 8500);
+        let background = random.counts(|_| 500.0, 2250);
+        // Twenty events per bin against a threshold of ten: the first bin decides.
+        let onset = |d: &Detector| look(d, -4250, &counts, &background).onsets_ms[9].unwrap();
+        let begins_ms = planted as f64 * 0.2;
+        assert!((onset(&sharp) - begins_ms - 0.1).abs() < 1e-9, "{planted}");
+        let early = onset(&smooth) - begins_ms;
+        assert!((-2.0..=0.2).contains(&early), "{planted}: {early}");
+    }
+}
+
+#[test]
+fn false_alarms_on_pure_background_are_as_rare_as_theory_says() {
+    // Lorden 1971: the mean time between false alarms of an unsmoothed CUSUM is at least exp(h) bins. For Poisson counts the
+    // sum jumps in steps of ln 4, so the true rate lies below, within the overshoot of about one such step and the share
+    // of excursions that a run of one bin asks for.
+    let (rate, seconds) = (2000.0, 200.0);
+    let counts = Random(5).counts(|_| rate, (seconds / BIN_S) as usize);
+    let smoothed: Vec<f64> = counts.iter().map(|c| f64::from(*c)).collect();
+    let cusum = Cusum::new(4.0, rate, BIN_S, 1);
+    for h in [3.0f64, 5.0, 7.0] {
+        let found = f64::from(cusum.alarms(&smoothed, h, 0)) / seconds;
+        let bound = (-h).exp() / BIN_S;
+        assert!(
+            found < bound && found > 0.02 * bound,
+            "h {h}: {found} alarms/s, bound {bound}"
+        );
+    }
+    // A cool-down leaves time in which nothing can alarm.
+    assert!(cusum.alarms(&smoothed, 3.0, 500) < cusum.alarms(&smoothed, 3.0, 0));
+}
+
+#[test]
+fn onsets_count_about_their_median() {
+    let hits = Hits::of(vec![10.0, 500.0, 12.0, 11.0, 111.0], 99.0);
+    assert_eq!(
+        (hits.onsets, hits.median_ms, hits.count),
+        (5, Some(12.0), 4)
+    );
+    // Linear between order statistics: 10 + 0.15 and 12 + 0.85 * 99.
+    assert!((hits.width_ms.unwrap() - (12.0 + 0.85 * 99.0 - 10.15)).abs() < 1e-9);
+    // Nothing detected; one; two that lie further apart than two windows.
+    let none = Hits {
+        onsets: 0,
+        median_ms: None,
+        count: 0,
+        width_ms: None,
+    };
+    assert_eq!(Hits::of(vec![], 100.0), none);
+    assert_eq!(Hits::of(vec![3.0], 100.0).width_ms, Some(0.0));
+    let apart = Hits {
+        onsets: 2,
+        median_ms: Some(150.0),
+        count: 0,
+        width_ms: None,
+    };
+    assert_eq!(Hits::of(vec![0.0, 300.0], 100.0), apart);
+}
+
+#[test]
+fn the_threshold_has_the_fewest_false_alarms_among_those_that_detect_enough() {
+    let rows = |list: &[(f64, f64)]| -> Vec<ThresholdRow> {
+        let row = |(i, &(detected_rate, false_alarms_per_s)): (usize, &(f64, f64))| ThresholdRow {
+            threshold: i as f64,
+            onsets: 0,
+            detected_rate,
+            median_ms: Some(20.0),
+            width_ms: None,
+            false_alarms_per_s,
+        };
+        list.iter().enumerate().map(row).collect()
+    };
+    // The share of detections need not fall with the threshold.
+    let all = rows(&[
+        (0.96, 9.0),
+        (0.2, 0.0),
+        (0.97, 1.0),
+        (0.95, 1.0),
+        (0.9, 0.5),
+    ]);
+    assert_eq!(choose(&all, 0.95, -100.0), Some(2));
+    assert_eq!(choose(&all, 0.99, -100.0), Some(2));
+    assert_eq!(choose(&all, 0.9, -100.0), Some(4));
+    assert_eq!(
+        choose(&rows(&[(0.5, 3.0), (0.5, 2.0)]), 0.95, -100.0),
+        Some(1)
+    );
+    assert_eq!(choose(&rows(&[(0.0, 3.0), (0.0, 2.0)]), 0.95, -100.0), None);
+    assert_eq!(choose(&rows(&[(0.0, 3.0)]), 0.0, -100.0), None);
+    assert_eq!(choose(&[], 0.95, -100.0), None);
+    // Onsets that agree well, on the background 0.8 s before the contact.
+    let mut early = all.clone();
+    early.extend(rows(&[(0.0, 0.0); 5]));
+    early.extend(rows(&[(0.0, 0.0); 5]).into_iter().map(|r| ThresholdRow {
+        median_ms: None,
+        ..r
+    }));
+    early.push(ThresholdRow {
+        median_ms: Some(-800.0),
+        detected_rate: 1.0,
+        ..all[1]
+    });
+    assert_eq!(choose(&early, 0.95, -100.0), Some(2));
+    assert_eq!(choose(&early, 0.95, -1000.0), Some(15));
+    // Trials in which nothing is found: a share of 0, no width, no choice.
+    let detector = detector();
+    let silent = vec![look(&detector, 0, &[0; 100], &[1; 100]); 3];
+    let found = sweep(&silent, &detector, 100.0);
+    assert!(
+        found
+            .iter()
+            .all(|r| r.detected_rate == 0.0 && r.width_ms.is_none())
+    );
+    assert_eq!((found.len(), choose(&found, 0.95, -100.0)), (20, None));
+    assert_eq!(sweep(&[], &detector, 100.0), []);
+    assert_eq!(thresholds((17.0, 19.0), 3), [17.0, 18.0, 19.0]);
+    assert_eq!(thresholds((5.0, 9.0), 1), [5.0]);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    /// One sweep for all thresholds finds what a search for each finds.
+    #[test]
+    fn onsets_are_those_of_straight_loops(
+        seed in 1u64.., rate in 0.0f64..50_000.0, step in 0.0f64..10.0, bins in 0usize..700, padded in any::<bool>(),
+        consecutive in 1u32..6,
+    ) {
+        let mut random = Random(seed);
+        let counts = random.counts(|bin| if bin < bins / 2 { rate } else { rate * step }, bins);
+        let background = random.counts(|_| rate, 500);
+        let detector = Detector {
+            edges: if padded { Edges::ZeroPadded } else { Edges::Renormalised },
+            consecutive,
+            // Never exactly on a value of the path, where the last digit would decide.
+            thresholds: (0..20).map(|i| 0.7 + 1.013 * f64::from(i)).collect(),
+            ..detector()
+        };
+        let trial = look(&detector, -300, &counts, &background);
+        let events: u32 = background.iter().sum();
+        let rate = f64::from(events).max(0.5) / 0.1;
+        for (h, onset) in detector.thresholds.iter().zip(&trial.onsets_ms) {
+            let slow = slow_onset(&detector, &counts, rate, *h);
+            let slow_ms = slow.map(|bin| (bin as f64 - 300.0 + 0.5) * 0.2);
+            prop_assert_eq!(*onset, slow_ms, "h {}", h);
+        }
+    }
+
+    /// Each alarm is the first onset since the detector was started anew.
+    #[test]
+    fn alarms_are_onsets_one_after_another(
+        seed in 1u64.., rate in 100.0f64..30_000.0, h in 0.5f64..6.0, cool_down in 0usize..200,
+    ) {
+        let counts = Random(seed).counts(|bin| if bin % 500 < 20 { 3.0 * rate } else { rate }, 3000);
+        let smoothed: Vec<f64> = counts.iter().map(|c| f64::from(*c)).collect();
+        let cusum = Cusum::new(4.0, rate, BIN_S, 3);
+        let (mut alarms, mut from) = (0, 0);
+        while let Some(onset) = smoothed.get(from..).and_then(|rest| cusum.onsets(rest, &[h])[0]) {
+            alarms += 1;
+            from += onset + 3 + cool_down;
+        }
+        prop_assert_eq!(cusum.alarms(&smoothed, h, cool_down), alarms);
+    }
+}

@@ -1,0 +1,96 @@
+//! The detection-latency study: its parts against slow references, planted onsets, inputs without an answer.
+
+#![expect(clippy::unwrap_used, reason = "tests")]
+
+mod binning;
+mod detecting;
+mod planted;
+
+#[path = "../session/support.rs"]
+mod support;
+
+use proptest::prelude::*;
+use skinrig_analysis::analyze;
+use skinrig_analysis::kept::{Kept, KeptEvent, KeptPress, KeptView};
+use skinrig_analysis::latency::bins::{Grid, Sight};
+use skinrig_analysis::latency::cusum::{Cusum, background_rate_per_s};
+use skinrig_analysis::latency::interval::{Outcome, Plan};
+use skinrig_analysis::latency::smooth::{Edges, Kernel};
+use skinrig_analysis::latency::study;
+use skinrig_analysis::latency::sweep::{Hits, choose, sweep, thresholds};
+use skinrig_analysis::latency::thin::chosen;
+use skinrig_analysis::latency::trial::{Detector, Label, Trial};
+use skinrig_analysis::result::{Analysis, ClockFit, ClockMethod, Latency, ThresholdRow};
+use skinrig_model::{
+    Background, CdEvent, HostDuration, LatencySettings, Polarity, PressId, PressRole,
+};
+use support::Random;
+
+const BIN_S: f64 = 2e-4;
+
+impl Random {
+    /// Poisson counts by the times between events: slow, and right for any rate.
+    fn counts(&mut self, per_s: impl Fn(usize) -> f64, bins: usize) -> Vec<u32> {
+        (0..bins)
+            .map(|bin| {
+                let (mut n, mut t) = (0, -(1.0 - self.unit()).ln());
+                while t < per_s(bin) * BIN_S {
+                    n += 1;
+                    t -= (1.0 - self.unit()).ln();
+                }
+                n
+            })
+            .collect()
+    }
+}
+
+fn detector() -> Detector {
+    let settings = LatencySettings::default();
+    Detector::new(&settings, Edges::Renormalised, thresholds((1.0, 20.0), 20))
+}
+
+fn label(press: u32) -> Label {
+    Label {
+        press: PressId(press),
+        location: press,
+    }
+}
+
+/// Bins from `first` to `first + counts.len()`.
+fn look(detector: &Detector, first: i64, counts: &[u32], background: &[u32]) -> Trial {
+    let grid = Grid {
+        first,
+        len: counts.len(),
+    };
+    detector.look(label(0), grid, counts, background)
+}
+
+/// A camera's view that begins 1 s before the contact, with events at these host times after the contact, µs.
+fn view(clock: &ClockFit, contact_us: f64, after_us: &[f64]) -> KeptView {
+    let rate = 1.0 + clock.drift_ppm * 1e-6;
+    let start_us = (contact_us - 1e6).floor().max(0.0) as u64;
+    let contact_us = contact_us - start_us as f64;
+    let mut events: Vec<KeptEvent> = after_us
+        .iter()
+        .map(|after| {
+            let t_us = start_us + (contact_us + after * rate).round() as u64;
+            let event = CdEvent {
+                t_us,
+                x: 3,
+                y: 200,
+                polarity: Polarity::On,
+            };
+            KeptEvent::pack(&event, start_us).unwrap()
+        })
+        .collect();
+    events.sort_unstable();
+    KeptView {
+        start_us,
+        length_us: 3_000_000,
+        window_us: ((contact_us - 5e4).ceil() as u32, (contact_us + 5e5) as u32),
+        idle_from_us: (contact_us - 5.5e5) as u32,
+        contact_us,
+        release_us: contact_us + 4.5e5,
+        events,
+    }
+}

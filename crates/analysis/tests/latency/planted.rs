@@ -1,0 +1,289 @@
+//! The study on planted sessions: latencies come back with their uncertainty, and what is no trial is counted apart.
+
+use super::*;
+
+/// The planted session's results with events of another kind: background at 400 per second and camera, and a burst
+/// of 20 000 per second and camera that begins `latency_us(press)` after the contact.
+fn planted(latency_us: impl Fn(usize) -> Option<f64>) -> (Analysis, Kept) {
+    let (input, memory) = support::session();
+    let analysis = analyze(&input, &memory).unwrap();
+    let mut random = Random(21);
+    let scored = analysis
+        .presses
+        .iter()
+        .enumerate()
+        .filter(|(_, p)| p.role == PressRole::Score);
+    let presses = scored
+        .enumerate()
+        .map(|(n, (row, press))| {
+            let contact = press.timing.unwrap().contact;
+            let views = [0, 1].map(|k| {
+                let clock = analysis.clocks[k].unwrap();
+                let mut after: Vec<f64> = (0..760).map(|_| 1.9e6 * random.unit() - 1e6).collect();
+                if let Some(begin) = latency_us(n) {
+                    after.extend((0..4000).map(|i| begin + 50.0 * f64::from(i)));
+                }
+                view(&clock, clock.camera_us_of_host(contact), &after)
+            });
+            KeptPress {
+                row,
+                press: press.press,
+                views,
+            }
+        })
+        .collect();
+    (
+        analysis,
+        Kept {
+            presses,
+            left_out: 0,
+        },
+    )
+}
+
+fn studied(analysis: &Analysis, kept: &Kept) -> Latency {
+    study(analysis, kept).unwrap()
+}
+
+#[test]
+fn planted_latencies_come_back_with_their_uncertainty() {
+    // 10, 11, ... 34 ms; camera clocks differ by hours and 63 ppm.
+    let (mut analysis, kept) = planted(|n| Some(1e4 + 1e3 * n as f64));
+    analysis.contact_timing.pose_interval_us = 1000.0;
+    let found = studied(&analysis, &kept);
+    assert_eq!((found.trials, found.unusable, found.shortened), (25, 0, 0));
+    assert_eq!(found.detected_rate.value, Some(1.0));
+    assert!((found.background_rate_per_s - 800.0).abs() < 60.0);
+    // 0.55 s to 0.05 s before each contact.
+    assert!(
+        (found.background_s - 25.0 * 0.5).abs() < 0.02,
+        "{}",
+        found.background_s
+    );
+    for (n, (press, onset)) in found.onsets.iter().enumerate() {
+        let late = onset.unwrap() - (10.0 + n as f64);
+        assert!((-2.0..=0.3).contains(&late), "{press}: {late} ms late");
+    }
+    let contact = found.from_contact.unwrap();
+    let close = |e: skinrig_analysis::result::Estimate, ms: f64| {
+        let v = e.value.unwrap();
+        (v - ms).abs() <= 2.0 && e.low.unwrap() <= v && v <= e.high.unwrap() && e.n == 25
+    };
+    assert!(
+        close(contact.p5_ms, 11.2) && close(contact.median_ms, 22.0) && close(contact.p95_ms, 32.8)
+    );
+    assert!((found.width_ms.value.unwrap() - 21.6).abs() < 1.0);
+    assert_eq!((contact.before_contact, contact.missed), (0, 0));
+    // 1000 µs between poses and 200 µs bins over the root of 12; marks are good to 0.5 µs, the clocks to a µs or so.
+    assert!((contact.from_contact_ms - 0.288_675).abs() < 1e-6);
+    assert!((contact.from_bins_ms - 0.057_735).abs() < 1e-6);
+    assert!(contact.from_clocks_ms > 0.000_288 && contact.from_clocks_ms < 0.005);
+    let parts = [
+        contact.from_contact_ms,
+        contact.from_bins_ms,
+        contact.from_clocks_ms,
+    ];
+    let sum: f64 = parts.iter().map(|p| p * p).sum();
+    assert!((contact.uncertainty_ms - sum.sqrt()).abs() < 1e-12);
+    assert!((found.decision_delay_ms - 2.5).abs() < 1e-12);
+    let reduced = found.reduced.unwrap();
+    assert_eq!((reduced.factor, reduced.detected_rate.n), (1024, 25));
+    // The course rises where the touches begin, and has one bin per 2 ms.
+    let course = &found.course;
+    assert_eq!((course.start_ms, course.bin_ms), (-850.0, 2.0));
+    assert!(course.press_per_s.iter().all(|c| c.len() == 850));
+    let at = |ms: f64| course.press_per_s[1][((ms - course.start_ms) / course.bin_ms) as usize];
+    assert!(at(5.0) < 2000.0 && at(40.0) > 38_000.0);
+    assert!(
+        course.background_per_s[0] <= course.background_per_s[1]
+            && course.background_per_s[2] < 4000.0
+    );
+}
+
+#[test]
+fn what_is_before_the_contact_or_never_comes_is_counted_apart() {
+    let (mut analysis, kept) = planted(|n| match n {
+        0 => None,
+        // Before the idle time that the background is taken from.
+        1 | 2 => Some(-7.8e5),
+        _ => Some(2e4),
+    });
+    // High enough that the background alone does not cross it near the contact by chance.
+    analysis.settings.latency.threshold_range = (16.0, 20.0);
+    let found = studied(&analysis, &kept);
+    assert_eq!(found.trials, 25);
+    let rate = found.detected_rate.value.unwrap();
+    assert!(
+        (rate - 22.0 / 25.0).abs() < 1e-12,
+        "{rate}: {:?}",
+        found.onsets
+    );
+    let contact = found.from_contact.unwrap();
+    assert_eq!((contact.before_contact, contact.missed), (2, 1));
+    assert_eq!(contact.median_ms.n, 22);
+    assert_eq!(contact.from_contact_ms, 0.0);
+    assert!((contact.p5_ms.value.unwrap() - 20.0).abs() < 2.1);
+}
+
+#[test]
+fn what_was_left_out_by_hand_is_no_trial_and_what_the_skin_missed_is() {
+    let (mut analysis, kept) = planted(|_| Some(2e4));
+    for (n, rule) in [
+        (3, "by hand"),
+        (4, "the operator's hand in view"),
+        (5, "no cluster (camera 1)"),
+    ] {
+        let press = &mut analysis.presses[kept.presses[n].row];
+        press.verdict = "excluded".to_owned();
+        press.rule = Some(rule.to_owned());
+    }
+    let found = studied(&analysis, &kept);
+    assert_eq!((found.trials, found.unusable), (23, 2));
+    let tried = |n: usize| {
+        let press = kept.presses[n].press;
+        found.onsets.iter().any(|o| o.0 == press)
+    };
+    assert_eq!([3, 4, 5].map(tried), [false, false, true]);
+}
+
+#[test]
+fn no_false_alarm_and_no_miss_is_not_certainty() {
+    let plan = Plan {
+        window_ms: 100.0,
+        earliest_ms: 0.0,
+        resamples: 100,
+        seed: 1,
+    };
+    // Two presses at each of six locations.
+    let one = |i: u32| Outcome {
+        location: i / 2,
+        onset_ms: Some(20.0),
+        alarms: 0,
+        background_s: 0.5,
+    };
+    let all: Vec<Outcome> = (0..12).map(one).collect();
+    let near = |found: Option<f64>, wanted: f64| (found.unwrap() - wanted).abs() < 1e-12;
+    let found = plan.estimate(&all);
+    let (detected, alarms) = (found.detected_rate, found.false_alarms_per_s);
+    assert!(near(detected.low, 0.025f64.powf(1.0 / 6.0)) && detected.high == Some(1.0));
+    assert!(alarms.low == Some(0.0) && near(alarms.high, -0.025f64.ln() / 6.0));
+    assert_eq!(
+        (found.width_ms.value, found.width_ms.high),
+        (Some(0.0), Some(0.0))
+    );
+    let none: Vec<Outcome> = all
+        .iter()
+        .map(|o| Outcome {
+            onset_ms: None,
+            ..*o
+        })
+        .collect();
+    let detected = plan.estimate(&none).detected_rate;
+    assert!(detected.low == Some(0.0) && near(detected.high, 1.0 - 0.025f64.powf(1.0 / 6.0)));
+}
+
+#[test]
+fn latency_from_the_contact_needs_a_contact_measured_apart_from_the_events() {
+    let (mut analysis, kept) = planted(|_| Some(2e4));
+    analysis.contact_timing.scheduled = true;
+    assert_eq!(studied(&analysis, &kept).from_contact, None);
+    analysis.contact_timing.scheduled = false;
+    let fit = analysis.clocks[1].as_mut().unwrap();
+    fit.method = ClockMethod::EventRates;
+    let found = studied(&analysis, &kept);
+    assert_eq!(found.from_contact, None);
+    assert!(found.median_ms.value.is_some());
+    analysis.clocks[0] = None;
+    assert_eq!(study(&analysis, &kept), None);
+}
+
+#[test]
+fn neighbours_cut_a_trial_and_the_study_says_so() {
+    let (mut analysis, mut kept) = planted(|_| Some(2e4));
+    // The press before the tenth is released 0.4 s before its contact.
+    let row = kept.presses[10].row;
+    let contact = analysis.presses[row].timing.unwrap().contact;
+    let before = analysis.presses[row - 1].timing.as_mut().unwrap();
+    before.release = contact - HostDuration::from_millis(400);
+    let found = studied(&analysis, &kept);
+    assert_eq!((found.trials, found.shortened), (25, 1));
+    assert!((found.covered_ms.0 - 350.0).abs() < 0.1 && (found.covered_ms.1 - 850.0).abs() < 0.1);
+    // 0.35 s to 0.05 s before that contact, 0.5 s before the others.
+    assert!(
+        (found.background_s - 24.0 * 0.5 - 0.3).abs() < 0.02,
+        "{}",
+        found.background_s
+    );
+    assert_eq!(found.detected_rate.value, Some(1.0));
+    // Without idle time there is no background, and without background no trial.
+    for press in &mut kept.presses {
+        for view in &mut press.views {
+            view.idle_from_us = view.window_us.0;
+        }
+    }
+    let none = studied(&analysis, &kept);
+    assert_eq!((none.trials, none.unusable, none.chosen), (0, 25, None));
+    assert_eq!(
+        (
+            none.sweep.len(),
+            none.detected_rate.value,
+            none.false_alarms_per_s.value
+        ),
+        (0, None, None)
+    );
+    let text = serde_json::to_string(&none).unwrap();
+    assert!(!text.contains("NaN"), "{text}");
+    assert_eq!(serde_json::from_str::<Latency>(&text).unwrap(), none);
+    // Views that end before the contact.
+    kept.presses.truncate(3);
+    for view in kept.presses.iter_mut().flat_map(|p| &mut p.views) {
+        view.length_us = 900_000;
+    }
+    assert_eq!(studied(&analysis, &kept).unusable, 3);
+    kept.presses.clear();
+    assert_eq!(study(&analysis, &kept), None);
+}
+
+#[test]
+fn the_published_choice_takes_its_background_after_the_press_and_pads_with_zeros() {
+    let (mut analysis, mut kept) = planted(|_| Some(2e4));
+    analysis.settings.latency.background = Background::After;
+    // It lasts to 2.4 s after the middle; presses come every 1.75 s and only the last has nothing after it.
+    let none = studied(&analysis, &kept);
+    assert_eq!((none.trials, none.unusable), (1, 24));
+    for press in &mut analysis.presses {
+        let shift = HostDuration::from_secs_f64(2.0 * f64::from(press.press.0));
+        let timing = press.timing.as_mut().unwrap();
+        timing.contact += shift;
+        timing.release += shift;
+    }
+    for view in kept.presses.iter_mut().flat_map(|p| &mut p.views) {
+        view.length_us = 4_000_000;
+    }
+    let found = studied(&analysis, &kept);
+    assert_eq!(
+        (found.trials, found.shortened, found.zero_padded),
+        (25, 0, true)
+    );
+    assert!((found.background_s - 25.0 * 0.9).abs() < 0.02);
+    assert_eq!(found.background_rate_per_s, 0.0);
+    // 1.5 s - 0.85 s from half a period before the middle, 225 ms after the contact.
+    let half = 868_000.0 / 289.0 / 2.0;
+    let (before, after) = (half - 1500.0 + 850.0 - 225.0, 1500.0 + 850.0 - half + 225.0);
+    assert!(
+        (found.covered_ms.0 - before).abs() < 0.01 && (found.covered_ms.1 - after).abs() < 0.01
+    );
+}
+
+#[test]
+fn the_study_is_the_same_whatever_the_number_of_threads() {
+    let (analysis, kept) = planted(|n| (n % 5 > 0).then_some(1e4 + 2e3 * n as f64));
+    let with = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .unwrap();
+        serde_json::to_string(&pool.install(|| studied(&analysis, &kept))).unwrap()
+    };
+    assert_eq!(with(1), with(3));
+}

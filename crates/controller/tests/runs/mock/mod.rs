@@ -1,0 +1,301 @@
+//! A small deterministic rig: ideal straight motions, numbered device calls that can be made to fail.
+
+mod devices;
+mod plan;
+
+use std::sync::{Arc, Mutex, MutexGuard};
+
+use skinrig_controller::{ControlHandle, RecordSink, SinkFault};
+use skinrig_device::{
+    CameraCapabilities, CameraSettings, Clock, DeviceError, EventCamera, Indenter,
+    IndenterCapabilities, MotionLimits, Rig, RobotSample, TriggerBox, TriggerCapabilities,
+};
+use skinrig_model::*;
+use skinrig_protocol::area::Surroundings;
+use skinrig_protocol::plan::{OnTrip, Plan, PressStep, RunLimits, Step};
+use skinrig_protocol::{Retakes, Surface, Suspend};
+
+pub use devices::*;
+pub use plan::*;
+
+pub const MS: i64 = 1_000_000;
+
+/// How a numbered call fails.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Failure {
+    /// That call alone answers with an error.
+    Once,
+    /// That call, and every later one to the same device.
+    Forever,
+    /// That call panics.
+    Panic,
+}
+
+/// What the operator remarks.
+pub const NOTE: &str = "Ann: the lamp flickers";
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Press {
+    Pause,
+    PauseNow,
+    Stop,
+    Abort,
+    Halt,
+    /// A remark.
+    Note,
+}
+
+/// What goes wrong with the feedback.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Strike {
+    /// A force of 9 N.
+    Force,
+    /// The tip sinks 0.05 mm every millisecond.
+    Sink,
+    /// The tip slides 0.3 mm every millisecond.
+    Slide,
+    /// A coordinate is no number.
+    Nan,
+    /// The same sample twice.
+    Twice,
+    /// No samples any more.
+    Silence,
+    /// The clock jumps by 1.5 s, and the samples come after it.
+    Late,
+}
+
+/// What is wrong with the world.
+#[derive(Debug, Clone, Default)]
+pub struct Faults {
+    pub at_call: Option<(u64, Failure)>,
+    /// The tip cannot go below this height from this time on, ms.
+    pub floor_mm: Option<(i64, f64, i64)>,
+    /// The pose stream ends at this time, ms.
+    pub poses_end_ms: Option<i64>,
+    /// Bytes lost by a camera before its chunk with this number.
+    pub loss: Option<(CameraId, u64, u64)>,
+    /// Cameras tell their time. From this time on, ms, what camera 2 sends takes so long, ms.
+    pub delay: Option<(i64, i64)>,
+    /// Camera 2 loses bytes at this time, ms, and tells so with the data that follow.
+    pub lost_at_ms: Option<i64>,
+    /// Camera 1 tells its temperature: 70 °C in this time, ms, 30 °C otherwise.
+    pub hot_ms: Option<std::ops::Range<i64>>,
+    /// A camera that has something to say about its stream, once.
+    pub remark: Option<(CameraId, String)>,
+    /// What the trigger box has to say about the run, once.
+    pub box_remark: Option<String>,
+    /// The tip stays where it is sideways from this time on, ms.
+    pub stuck_sideways_ms: Option<i64>,
+    /// What goes wrong once the tip is 1 mm deep.
+    pub strike: Option<Strike>,
+    /// The operator's hand at this tick.
+    pub operator: Option<(u64, Press)>,
+    /// A halt this many ticks after it.
+    pub halt_after: Option<u64>,
+    /// N per mm of indentation.
+    pub stiffness_n_mm: f64,
+    pub train_ms: i64,
+}
+
+pub struct World {
+    pub t: i64,
+    pub calls: u64,
+    pub ticks: u64,
+    pub faults: Faults,
+    pub control: ControlHandle,
+    pub armed: bool,
+    pub ever_armed: bool,
+    /// A disarm was answered since the last arm.
+    pub confirmed: bool,
+    pub dead: Option<DeviceRole>,
+    pub tip: [f64; 3],
+    pub set_point: [f64; 3],
+    pub target: [f64; 3],
+    pub speed: f64,
+    pub sampled_to: i64,
+    pub violations: Vec<String>,
+    pub commands: Vec<([f64; 3], f64, i64)>,
+    pub limits: Option<MotionLimits>,
+    pub streaming: [bool; 2],
+    /// Cameras in the order in which they were started.
+    pub started: Vec<CameraId>,
+    pub seq: [u64; 2],
+    /// How often each camera was asked for its temperature.
+    pub asked_heat: [u32; 2],
+    pub line_until: i64,
+    pub clearance_mm: f64,
+    /// When the strike began to break a limit.
+    pub broken_at: Option<i64>,
+    struck_for: i64,
+    /// What the robot was told besides motions: when, `hold` or `disarm`.
+    pub told: Vec<(i64, &'static str)>,
+    samples: Vec<RobotSample>,
+}
+
+pub type Shared = Arc<Mutex<World>>;
+
+pub fn lock(world: &Shared) -> MutexGuard<'_, World> {
+    world.lock().unwrap_or_else(|e| e.into_inner())
+}
+
+/// Where the mock's skin lies: a quarter turn and a shift, so that mixed-up frames are seen.
+pub fn robot_from_skin() -> RigidTransform<Robot, Skin> {
+    RigidTransform::new(
+        [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]],
+        [5.0, -3.0, 12.0],
+    )
+}
+
+impl World {
+    pub fn shared(faults: Faults, start: [f64; 3]) -> Shared {
+        Arc::new(Mutex::new(Self {
+            t: 0,
+            calls: 0,
+            ticks: 0,
+            faults,
+            control: ControlHandle::new(),
+            armed: false,
+            ever_armed: false,
+            confirmed: false,
+            dead: None,
+            tip: start,
+            set_point: start,
+            target: start,
+            speed: 1.0,
+            sampled_to: 0,
+            violations: vec![],
+            commands: vec![],
+            limits: None,
+            streaming: [false; 2],
+            started: vec![],
+            seq: [0; 2],
+            asked_heat: [0; 2],
+            line_until: 0,
+            clearance_mm: 5.0,
+            broken_at: None,
+            struck_for: 0,
+            told: vec![],
+            samples: vec![],
+        }))
+    }
+
+    /// Moves the robot, in the skin frame, up to the present in steps of 1 ms.
+    fn advance(&mut self) {
+        while self.sampled_to + MS <= self.t {
+            self.sampled_to += MS;
+            let ms = self.sampled_to / MS;
+            if self.armed {
+                let d: Vec<f64> = (0..3).map(|i| self.target[i] - self.set_point[i]).collect();
+                let left = d.iter().map(|v| v * v).sum::<f64>().sqrt();
+                let step = (self.speed * 1e-3).min(left);
+                if left > 0.0 {
+                    for (i, d) in d.iter().enumerate() {
+                        self.set_point[i] += d / left * step;
+                    }
+                }
+                if left <= self.speed * 1e-3 {
+                    self.set_point = self.target;
+                }
+            }
+            let mut tip = self.set_point;
+            if let Some((from, floor, to)) = self.faults.floor_mm
+                && (from..to).contains(&ms)
+            {
+                tip[2] = tip[2].max(floor);
+            }
+            if self.faults.stuck_sideways_ms.is_some_and(|from| ms >= from) {
+                (tip[0], tip[1]) = (self.tip[0], self.tip[1]);
+            }
+            let lateral = (tip[0] - self.tip[0]).hypot(tip[1] - self.tip[1]);
+            if lateral > 1e-6 && tip[2].min(self.tip[2]) < self.clearance_mm - 0.051 {
+                self.violations
+                    .push(format!("sideways at {:?} at {ms} ms", self.tip));
+            }
+            self.tip = tip;
+            if self.faults.poses_end_ms.is_none_or(|end| ms < end) {
+                let to_robot = |p: [f64; 3]| robot_from_skin().apply(Point3::new(p[0], p[1], p[2]));
+                let sample = RobotSample {
+                    t: HostTime(self.sampled_to),
+                    commanded: to_robot(self.set_point),
+                    measured: to_robot(tip),
+                    force_n: (-tip[2]).max(0.0) * self.faults.stiffness_n_mm,
+                };
+                self.deliver(sample, tip);
+            }
+        }
+    }
+
+    /// Keeps a sample, changed by the strike while the arm is low.
+    fn deliver(&mut self, mut sample: RobotSample, mut tip: [f64; 3]) {
+        let begins = self.armed && tip[2] < -1.0;
+        let Some(strike) = self.faults.strike.filter(|_| self.struck_for > 0 || begins) else {
+            self.samples.push(sample);
+            return;
+        };
+        self.struck_for += 1;
+        let n = self.struck_for as f64;
+        let mut broken = true;
+        match strike {
+            Strike::Force => sample.force_n = 9.0,
+            Strike::Sink => {
+                tip[2] -= 0.05 * n;
+                broken = tip[2] < -3.05;
+            }
+            Strike::Slide => tip[0] += 0.3 * n,
+            Strike::Nan => tip[1] = f64::NAN,
+            Strike::Twice => self.samples.push(sample),
+            Strike::Silence => {}
+            Strike::Late => broken = false, // the clock tells
+        }
+        sample.measured = robot_from_skin().apply(Point3::new(tip[0], tip[1], tip[2]));
+        if broken {
+            self.broken_at.get_or_insert(self.sampled_to);
+        }
+        if strike != Strike::Silence {
+            self.samples.push(sample);
+        }
+    }
+
+    fn lost(role: DeviceRole) -> DeviceError {
+        DeviceError::Lost {
+            role,
+            serial: "mock".into(),
+            detail: "no answer".into(),
+        }
+    }
+}
+
+pub fn rig(world: &Shared) -> Rig {
+    Rig {
+        kind: "simulated".into(),
+        name: "mock".into(),
+        indenter: Box::new(MockIndenter(world.clone())),
+        cameras: [
+            Box::new(MockCamera(world.clone(), CameraId::One)),
+            Box::new(MockCamera(world.clone(), CameraId::Two)),
+        ],
+        camera_settings: [CameraSettings::default(), CameraSettings::default()],
+        trigger_box: Some(Box::new(MockTriggerBox(world.clone()))),
+        clock: Box::new(MockClock(world.clone())),
+        robot_from_skin: robot_from_skin(),
+        geometry: RigGeometry {
+            outline: SkinOutline::PAPER,
+            nominal: StereoGeometry::PAPER,
+            trigger_channel: Some(0),
+        },
+        description_json: "{}".into(),
+    }
+}
+
+pub const LIMITS: RunLimits = RunLimits {
+    workspace_min_mm: [-40.0, -50.0, -3.0],
+    workspace_max_mm: [60.0, 55.0, 40.0],
+    clearance_mm: 5.0,
+    max_depth_mm: 3.0,
+    max_speed_mm_s: 100.0,
+    max_force_n: 8.0,
+    position_tolerance_mm: 0.05,
+    settle_time: HostDuration::from_millis(20),
+    max_acceleration_mm_s2: None,
+    on_trip: OnTrip::Retract,
+};
