@@ -8,10 +8,10 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use skinrig_analysis::SessionInput;
 use skinrig_model::{
-    AnalysisSettings, AttemptId, CdEvent, HostTime, Mark, MarkKind, PlannedPress, Point2, Polarity,
-    PressId, PressOutcome, PressRole, PressTiming, PressVerdict, PulseTrain, RigGeometry, SentMark,
-    SkinOutline, StereoGeometry, TriggerEdge,
+    AnalysisSettings, CdEvent, MarkKind, Point2, Polarity, PressId, PressRole, PressTiming,
+    RigGeometry, SkinOutline, StereoGeometry,
 };
+use skinrig_planted::{Touch, mark, press as add, timing};
 
 /// Presses of one repetition.
 pub const PRESSES: u32 = 289;
@@ -143,7 +143,6 @@ fn press(i: u32) -> (Point2, f64) {
 /// trigger marks, as in the published recordings, so that the clocks are aligned by event rates.
 #[must_use]
 pub fn input() -> SessionInput {
-    let h = HostTime::from_secs_f64;
     let sync = (0..3).map(|i| {
         (
             PressRole::Sync,
@@ -161,60 +160,22 @@ pub fn input() -> SessionInput {
         };
         (role, i, at, contact)
     });
-    let (planned, outcomes) = sync
-        .chain(grid)
-        .zip(0u32..)
-        .map(|((role, location, at, contact), i)| {
-            let id = PressId(i);
-            let planned = PlannedPress {
-                id,
-                role,
-                repetition: 0,
-                location,
-                at,
-                depth_mm: 2.0,
-            };
-            let outcome = PressOutcome {
-                attempt: AttemptId {
-                    press: id,
-                    number: 1,
-                },
-                verdict: PressVerdict::Valid,
-                timing: Some(PressTiming {
-                    approach: h(contact - 0.1),
-                    contact: h(contact),
-                    at_depth: h(contact + 0.2),
-                    retract: h(contact + 0.3),
-                    release: h(contact + TOUCH_S),
-                    clear: h(contact + 0.7),
-                }),
-                measured_at: Some(at),
-                measured_depth_mm: Some(2.0),
-                touched_mm: None,
-                peak_force_n: None,
-                scheduled: false,
-            };
-            (planned, Some(outcome))
-        })
-        .unzip();
-    SessionInput {
-        planned,
-        outcomes,
-        earlier: Vec::new(),
-        edges: [Vec::new(), Vec::new()],
-        marks: Vec::new(),
-        gaps: [Vec::new(), Vec::new()],
-        box_reports: Vec::new(),
-        pose_interval_us: None,
-        crossing_se_us: None,
-        legs: Vec::new(),
-        rig: RigGeometry {
+    let mut input = skinrig_planted::session(
+        RigGeometry {
             outline: SkinOutline::PAPER,
             nominal: StereoGeometry::PAPER,
             trigger_channel: None,
         },
-        settings: AnalysisSettings::default(),
+        AnalysisSettings::default(),
+    );
+    for (role, location, at, contact) in sync.chain(grid) {
+        let touch = Touch {
+            timing: timing(contact, [0.1, 0.2, 0.3, TOUCH_S, 0.7]),
+            ..Touch::new(role, 0, location, at)
+        };
+        add(&mut input, touch);
     }
+    input
 }
 
 /// The same with the trigger marks of a bench, as skinrig records them: the clocks are known without a look at the events.
@@ -233,26 +194,9 @@ pub fn marked_input() -> SessionInput {
             (MarkKind::Contact, timing.contact),
             (MarkKind::Release, timing.release),
         ] {
-            let mark = Mark { kind, press };
-            let uncertainty_ns = 500;
-            input.marks.push(SentMark {
-                mark,
-                t,
-                uncertainty_ns,
+            mark(&mut input, (kind, press), t, 500, |k| {
+                (t.0 as f64 * 1e-3 + 1e6 * CLOCK_LEADS_S[k]).round() as u64
             });
-            for (edges, lead_s) in input.edges.iter_mut().zip(CLOCK_LEADS_S) {
-                let begins_us = (t.0 as f64 * 1e-3 + 1e6 * lead_s).round() as u64;
-                let pulses = PulseTrain::new(mark).into_iter().flat_map(|p| p.pulses());
-                for (t_us, rising) in
-                    pulses.flat_map(|(rise, width)| [(rise, true), (rise + width, false)])
-                {
-                    edges.push(TriggerEdge {
-                        t_us: begins_us + t_us,
-                        channel: 0,
-                        rising,
-                    });
-                }
-            }
         }
     }
     input

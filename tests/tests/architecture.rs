@@ -120,6 +120,7 @@ const HARNESSES: &[&str] = &[
     "skinrig-bench",
     "skinrig-browser",
     "skinrig-fuzz",
+    "skinrig-planted",
     "skinrig-emulated-libdrd",
     "skinrig-emulated-bench",
     "skinrig-emulated-camera",

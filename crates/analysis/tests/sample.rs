@@ -8,9 +8,10 @@ use std::path::{Path, PathBuf};
 use skinrig_analysis::{EventSource, SessionInput, analyze, results_hash};
 use skinrig_formats::{Geometry, hdf5::Container};
 use skinrig_model::{
-    AnalysisSettings, AttemptId, CameraId, CdEvent, HostTime, PlannedPress, Point2, PressId,
-    PressOutcome, PressRole, PressTiming, PressVerdict, RigGeometry, SkinOutline, StereoGeometry,
+    AnalysisSettings, CameraId, CdEvent, Point2, PressRole, RigGeometry, SkinOutline,
+    StereoGeometry,
 };
+use skinrig_planted::{Touch, press, timing};
 
 struct Recording(PathBuf);
 
@@ -53,60 +54,23 @@ fn schedule(positions: &str) -> SessionInput {
         };
         (role, at, 5.0 + f64::from(i) * (3.0 + 1.0 / 289.0))
     }));
-    let h = HostTime::from_secs_f64;
-    let (planned, outcomes) = presses
-        .zip(0u32..)
-        .map(|((role, at, contact), i)| {
-            let id = PressId(i);
-            let planned = PlannedPress {
-                id,
-                role,
-                repetition: 0,
-                location: i.saturating_sub(3),
-                at,
-                depth_mm: 2.0,
-            };
-            let outcome = PressOutcome {
-                attempt: AttemptId {
-                    press: id,
-                    number: 1,
-                },
-                verdict: PressVerdict::Valid,
-                timing: Some(PressTiming {
-                    approach: h(contact - 0.3),
-                    contact: h(contact),
-                    at_depth: h(contact + 0.2),
-                    retract: h(contact + 0.35),
-                    release: h(contact + 0.55),
-                    clear: h(contact + 0.8),
-                }),
-                measured_at: Some(at),
-                measured_depth_mm: Some(2.0),
-                touched_mm: None,
-                peak_force_n: None,
-                scheduled: true,
-            };
-            (planned, Some(outcome))
-        })
-        .unzip();
-    SessionInput {
-        planned,
-        outcomes,
-        earlier: Vec::new(),
-        edges: [Vec::new(), Vec::new()],
-        marks: Vec::new(),
-        gaps: [Vec::new(), Vec::new()],
-        box_reports: Vec::new(),
-        pose_interval_us: None,
-        crossing_se_us: None,
-        legs: Vec::new(),
-        rig: RigGeometry {
+    let mut input = skinrig_planted::session(
+        RigGeometry {
             outline: SkinOutline::PAPER,
             nominal: StereoGeometry::PAPER,
             trigger_channel: None,
         },
-        settings: AnalysisSettings::default(),
+        AnalysisSettings::default(),
+    );
+    for ((role, at, contact), i) in presses.zip(0u32..) {
+        let touch = Touch {
+            timing: timing(contact, [0.3, 0.2, 0.35, 0.55, 0.8]),
+            scheduled: true,
+            ..Touch::new(role, 0, i.saturating_sub(3), at)
+        };
+        press(&mut input, touch);
     }
+    input
 }
 
 #[test]

@@ -2,10 +2,10 @@
 
 use skinrig_analysis::{Analysis, EventSource, SessionInput, analyze};
 use skinrig_model::{
-    AnalysisSettings, AttemptId, CalibrationModel, CameraId, CdEvent, HostTime, Mark, MarkKind,
-    PlannedPress, Point2, Polarity, PressId, PressOutcome, PressRole, PressTiming, PressVerdict,
-    PulseTrain, RigGeometry, SentMark, SkinOutline, StereoGeometry, TriggerEdge,
+    AnalysisSettings, CalibrationModel, CameraId, CdEvent, HostTime, MarkKind, Point2, Polarity,
+    PressRole, PressTiming, RigGeometry, SkinOutline, StereoGeometry,
 };
+use skinrig_planted::{Touch, mark, press};
 
 use crate::bounds::{self, UNIT, Watch};
 
@@ -54,23 +54,13 @@ impl EventSource for Flood {
 }
 
 fn session() -> SessionInput {
-    let mut input = SessionInput {
-        planned: Vec::new(),
-        outcomes: Vec::new(),
-        earlier: Vec::new(),
-        edges: [Vec::new(), Vec::new()],
-        marks: Vec::new(),
-        gaps: [Vec::new(), Vec::new()],
-        box_reports: Vec::new(),
-        pose_interval_us: None,
-        crossing_se_us: None,
-        legs: Vec::new(),
-        rig: RigGeometry {
+    let mut input = skinrig_planted::session(
+        RigGeometry {
             outline: SkinOutline::PAPER,
             nominal: StereoGeometry::PAPER,
             trigger_channel: Some(0),
         },
-        settings: AnalysisSettings {
+        AnalysisSettings {
             calibration: CalibrationModel::None,
             window_before_ms: SIDE_US as f64 * 1e-3,
             window_after_ms: SIDE_US as f64 * 1e-3,
@@ -79,56 +69,24 @@ fn session() -> SessionInput {
             bootstrap_resamples: 10,
             ..AnalysisSettings::default()
         },
-    };
+    );
     for k in 0..PRESSES {
-        let press = PressId(k as u32);
-        let t = |us: u64| HostTime(((FIRST_US + k * PERIOD_US + us) * 1000) as i64);
-        let at = Point2::new(10.0, 2.0);
-        input.planned.push(PlannedPress {
-            id: press,
-            role: PressRole::Score,
-            repetition: 0,
-            location: k as u32,
-            at,
-            depth_mm: 2.0,
-        });
-        input.outcomes.push(Some(PressOutcome {
-            attempt: AttemptId { press, number: 1 },
-            verdict: PressVerdict::Valid,
-            timing: Some(PressTiming {
+        let begins_us = FIRST_US + k * PERIOD_US;
+        let t = |us: u64| HostTime(((begins_us + us) * 1000) as i64);
+        let touch = Touch {
+            timing: PressTiming {
                 approach: t(0),
                 contact: t(0),
                 at_depth: t(1000),
                 retract: t(PRESS_US - 1000),
                 release: t(PRESS_US),
                 clear: t(PRESS_US),
-            }),
-            measured_at: Some(at),
+            },
             measured_depth_mm: None,
-            touched_mm: None,
-            peak_force_n: None,
-            scheduled: false,
-        }));
-        let mark = Mark {
-            kind: MarkKind::Contact,
-            press,
+            ..Touch::new(PressRole::Score, 0, k as u32, Point2::new(10.0, 2.0))
         };
-        input.marks.push(SentMark {
-            mark,
-            t: t(0),
-            uncertainty_ns: 0,
-        });
-        for (rise, width) in PulseTrain::new(mark).unwrap().pulses() {
-            for (after, rising) in [(rise, true), (rise + width, false)] {
-                for edges in &mut input.edges {
-                    edges.push(TriggerEdge {
-                        t_us: FIRST_US + k * PERIOD_US + after,
-                        channel: 0,
-                        rising,
-                    });
-                }
-            }
-        }
+        let id = press(&mut input, touch);
+        mark(&mut input, (MarkKind::Contact, id), t(0), 0, |_| begins_us);
     }
     input
 }

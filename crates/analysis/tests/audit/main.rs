@@ -77,7 +77,7 @@ fn sound_sessions_are_silent() {
 fn exchanged_cameras() {
     names(Fault::CamerasSwapped, |seed| {
         let mut s = sound(seed);
-        s.events.0.swap(0, 1);
+        s.events.events.swap(0, 1);
         s.input.edges.swap(0, 1);
         s
     });
@@ -93,7 +93,7 @@ fn exchanged_cameras_on_a_single_line() {
     };
     names(Fault::CamerasSwapped, |seed| {
         let mut s = session(seed, line);
-        s.events.0.swap(0, 1);
+        s.events.events.swap(0, 1);
         s.input.edges.swap(0, 1);
         s
     });
@@ -187,7 +187,7 @@ fn a_clock_that_is_no_crystals() {
 fn missing_data() {
     names(Fault::NoEvents, |seed| {
         let mut s = sound(seed);
-        s.events.0[(seed % 2) as usize].clear();
+        s.events.events[(seed % 2) as usize].clear();
         s
     });
     let line = Wishes {
@@ -232,7 +232,7 @@ fn a_camera_that_does_not_see_the_presses() {
     // Its events come at any time.
     names(Fault::CameraBlind, |seed| {
         let mut s = session(seed, line);
-        let events = &mut s.events.0[(seed % 2) as usize];
+        let events = &mut s.events.events[(seed % 2) as usize];
         let (from, to) = (events[0].t_us, events[events.len() - 1].t_us);
         let mut random = Random::new(seed);
         for e in events.iter_mut() {
@@ -252,7 +252,7 @@ fn a_camera_that_does_not_see_the_presses() {
     names(Fault::CameraBlind, |seed| {
         let mut s = sound(seed);
         s.events
-            .0
+            .events
             .iter_mut()
             .flatten()
             .for_each(|e| (e.x, e.y) = (320, 270));
@@ -372,7 +372,10 @@ fn sessions_too_small_to_judge_are_not_accused() {
 #[test]
 fn a_stream_out_of_order_is_named() {
     let mut s = sound(3);
-    s.events.0.iter_mut().for_each(|events| events.reverse());
+    s.events
+        .events
+        .iter_mut()
+        .for_each(|events| events.reverse());
     let analysis = run(&s);
     assert!(
         analysis.warnings.iter().any(|w| w.contains("out of order")),

@@ -1,25 +1,12 @@
 //! Small sound sessions of many rigs, drawn from a seed: geometry, path, repetitions, clocks, strength, noise.
 
-use skinrig_analysis::{EventSource, SessionInput};
+use skinrig_analysis::SessionInput;
 use skinrig_model::{
-    AnalysisSettings, AttemptId, CalibrationModel, CameraId, CdEvent, HostTime, LensModel, Mark,
-    MarkKind, PlannedPress, Point2, Polarity, PressId, PressOutcome, PressRole, PressTiming,
-    PressVerdict, PulseTrain, RigGeometry, SentMark, SkinOutline, StereoGeometry, TriggerEdge,
+    AnalysisSettings, CalibrationModel, CdEvent, LensModel, MarkKind, Point2, Polarity, PressRole,
+    RigGeometry, SkinOutline, StereoGeometry,
 };
-
-/// Events in memory.
-pub struct Memory(pub [Vec<CdEvent>; 2]);
-
-impl EventSource for Memory {
-    fn for_each_slice(
-        &self,
-        camera: CameraId,
-        each: &mut dyn FnMut(&[CdEvent]),
-    ) -> Result<(), String> {
-        self.0[camera.index()].chunks(4096).for_each(each);
-        Ok(())
-    }
-}
+pub use skinrig_planted::Memory;
+use skinrig_planted::{Touch, mark, press, timing};
 
 /// A session and what it was made of.
 pub struct Session {
@@ -201,54 +188,35 @@ pub fn session(seed: u64, wishes: Wishes) -> Session {
         begin_s += 1.0;
     }
     let end_s = begin_s + 1.0;
-    let mut input = SessionInput {
-        planned: Vec::new(),
-        outcomes: Vec::new(),
-        earlier: Vec::new(),
-        edges: [Vec::new(), Vec::new()],
-        marks: Vec::new(),
-        gaps: [Vec::new(), Vec::new()],
-        box_reports: Vec::new(),
-        pose_interval_us: None,
-        crossing_se_us: None,
-        legs: Vec::new(),
-        rig: RigGeometry {
+    let mut input = skinrig_planted::session(
+        RigGeometry {
             outline: SkinOutline::PAPER,
             nominal,
             trigger_channel: line.then_some(0),
         },
-        settings: AnalysisSettings {
+        AnalysisSettings {
             bootstrap_resamples: 0,
             calibration: CalibrationModel::None,
             study_presses: 0,
             ..AnalysisSettings::default()
         },
-    };
+    );
     let mut events = [Vec::new(), Vec::new()];
-    for (i, (role, repetition, location, at, contact)) in planned.into_iter().enumerate() {
-        let id = PressId(i as u32);
-        input.planned.push(PlannedPress {
-            id,
-            role,
-            repetition,
-            location,
-            at,
-            depth_mm: 2.0,
-        });
-        let (outcome, timing) = outcome(id, at, contact, &mut random);
-        input.outcomes.push(Some(outcome));
+    for (role, repetition, location, at, contact) in planned {
+        let touch = touch(
+            Touch::new(role, repetition, location, at),
+            contact,
+            &mut random,
+        );
+        let id = press(&mut input, touch);
         if line {
             for (kind, t) in [
-                (MarkKind::Contact, timing.contact),
-                (MarkKind::Release, timing.release),
+                (MarkKind::Contact, touch.timing.contact),
+                (MarkKind::Release, touch.timing.release),
             ] {
-                send(
-                    &mut input,
-                    Mark { kind, press: id },
-                    t,
-                    &camera_us,
-                    &mut random,
-                );
+                mark(&mut input, (kind, id), t, 500, |k| {
+                    (camera_us(k, t.as_secs_f64()) + 5.0 * random.unit()).round() as u64
+                });
             }
         }
         for (k, events) in events.iter_mut().enumerate() {
@@ -307,64 +275,27 @@ pub fn session(seed: u64, wishes: Wishes) -> Session {
     }
     Session {
         input,
-        events: Memory(events),
+        events: Memory {
+            events,
+            slice: 4096,
+        },
     }
 }
 
-fn outcome(
-    press: PressId,
-    at: Point2,
-    contact: f64,
-    random: &mut Random,
-) -> (PressOutcome, PressTiming) {
-    let h = HostTime::from_secs_f64;
+/// The press as it came out: a little late, a little beside its place.
+fn touch(planned: Touch, contact: f64, random: &mut Random) -> Touch {
     let late = 0.005 * random.unit();
-    let timing = PressTiming {
-        approach: h(contact - 0.1),
-        contact: h(contact),
-        at_depth: h(contact + 0.1 + late),
-        retract: h(contact + 0.3 + late),
-        release: h(contact + 0.45 + late),
-        clear: h(contact + 0.6 + late),
-    };
-    let outcome = PressOutcome {
-        attempt: AttemptId { press, number: 1 },
-        verdict: PressVerdict::Valid,
-        timing: Some(timing),
-        measured_at: Some(Point2::new(
+    let at = planned.at;
+    Touch {
+        timing: timing(
+            contact,
+            [0.1, 0.1 + late, 0.3 + late, 0.45 + late, 0.6 + late],
+        ),
+        measured_at: Point2::new(
             at.x_mm + 0.02 * random.normal(),
             at.y_mm + 0.02 * random.normal(),
-        )),
+        ),
         measured_depth_mm: Some(2.0 + 0.02 * random.normal()),
-        touched_mm: None,
-        peak_force_n: None,
-        scheduled: false,
-    };
-    (outcome, timing)
-}
-
-fn send(
-    input: &mut SessionInput,
-    mark: Mark,
-    t: HostTime,
-    camera_us: &dyn Fn(usize, f64) -> f64,
-    random: &mut Random,
-) {
-    input.marks.push(SentMark {
-        mark,
-        t,
-        uncertainty_ns: 500,
-    });
-    for (k, edges) in input.edges.iter_mut().enumerate() {
-        let seen = camera_us(k, t.as_secs_f64()) + 5.0 * random.unit();
-        for (rise, width) in PulseTrain::new(mark).unwrap().pulses() {
-            for (after, rising) in [(rise, true), (rise + width, false)] {
-                edges.push(TriggerEdge {
-                    t_us: seen.round() as u64 + after,
-                    channel: 0,
-                    rising,
-                });
-            }
-        }
+        ..planned
     }
 }

@@ -1,33 +1,16 @@
 //! A planted session: its plan, its clocks, its geometry and its events.
 
-use skinrig_analysis::{EventSource, SessionInput};
+use skinrig_analysis::SessionInput;
 use skinrig_model::{
-    AnalysisSettings, AttemptId, CameraId, CdEvent, HostTime, Mark, MarkKind, PlannedPress, Point2,
-    Polarity, PressId, PressOutcome, PressRole, PressTiming, PressVerdict, PulseTrain, RigGeometry,
-    SentMark, SkinOutline, StereoGeometry, TriggerEdge,
+    AnalysisSettings, CdEvent, HostTime, MarkKind, Point2, Polarity, PressRole, RigGeometry,
+    SkinOutline, StereoGeometry,
 };
+pub use skinrig_planted::Memory;
+use skinrig_planted::{Touch, mark, press, timing};
 
 pub const PLANTED: [f64; 8] = [43.0, -33.0, 47.5, 38.0, -1.2, 0.4, -0.11, 0.03];
 /// Camera clocks: offset (µs) and drift (ppm).
 pub const CLOCKS: [(f64, f64); 2] = [(4.2e6, 28.0), (17_592_186_044_416.0, -35.0)];
-
-pub struct Memory {
-    pub events: [Vec<CdEvent>; 2],
-    pub slice: usize,
-}
-
-impl EventSource for Memory {
-    fn for_each_slice(
-        &self,
-        camera: CameraId,
-        each: &mut dyn FnMut(&[CdEvent]),
-    ) -> Result<(), String> {
-        self.events[camera.index()]
-            .chunks(self.slice)
-            .for_each(each);
-        Ok(())
-    }
-}
 
 pub struct Random(pub u64);
 
@@ -73,84 +56,34 @@ pub fn plan() -> Vec<(PressRole, u32, u32, Point2, f64)> {
 }
 
 pub fn session() -> (SessionInput, Memory) {
-    let h = HostTime::from_secs_f64;
     let mut random = Random(7);
     let planted = StereoGeometry::paper_like(PLANTED);
-    let mut input = SessionInput {
-        planned: Vec::new(),
-        outcomes: Vec::new(),
-        earlier: Vec::new(),
-        edges: [Vec::new(), Vec::new()],
-        marks: Vec::new(),
-        gaps: [Vec::new(), Vec::new()],
-        box_reports: Vec::new(),
-        pose_interval_us: None,
-        crossing_se_us: None,
-        legs: Vec::new(),
-        rig: RigGeometry {
+    let mut input = skinrig_planted::session(
+        RigGeometry {
             outline: SkinOutline::PAPER,
             nominal: StereoGeometry::PAPER,
             trigger_channel: Some(0),
         },
-        settings: AnalysisSettings {
+        AnalysisSettings {
             bootstrap_resamples: 200,
             ..AnalysisSettings::default()
         },
-    };
+    );
     let mut events = [Vec::new(), Vec::new()];
-    for (i, (role, repetition, location, at, contact)) in plan().into_iter().enumerate() {
-        let id = PressId(i as u32);
-        input.planned.push(PlannedPress {
-            id,
-            role,
-            repetition,
-            location,
-            at,
-            depth_mm: 2.0,
-        });
-        let timing = PressTiming {
-            approach: h(contact - 0.1),
-            contact: h(contact),
-            at_depth: h(contact + 0.1),
-            retract: h(contact + 0.3),
-            release: h(contact + 0.45),
-            clear: h(contact + 0.6),
+    for (role, repetition, location, at, contact) in plan() {
+        let touch = Touch {
+            timing: timing(contact, [0.1, 0.1, 0.3, 0.45, 0.6]),
+            ..Touch::new(role, repetition, location, at)
         };
-        input.outcomes.push(Some(PressOutcome {
-            attempt: AttemptId {
-                press: id,
-                number: 1,
-            },
-            verdict: PressVerdict::Valid,
-            timing: Some(timing),
-            measured_at: Some(at),
-            measured_depth_mm: Some(2.0),
-            touched_mm: None,
-            peak_force_n: None,
-            scheduled: false,
-        }));
+        let id = press(&mut input, touch);
         for (kind, t) in [
             (MarkKind::Contact, contact),
             (MarkKind::Release, contact + 0.45),
         ] {
-            let mark = Mark { kind, press: id };
-            input.marks.push(SentMark {
-                mark,
-                t: h(t),
-                uncertainty_ns: 500,
+            let sent = HostTime::from_secs_f64(t);
+            mark(&mut input, (kind, id), sent, 500, |k| {
+                camera_us(k, t).round() as u64
             });
-            for (k, edges) in input.edges.iter_mut().enumerate() {
-                for (rise, width) in PulseTrain::new(mark).unwrap().pulses() {
-                    for (after, rising) in [(rise, true), (rise + width, false)] {
-                        let t_us = camera_us(k, t).round() as u64 + after;
-                        edges.push(TriggerEdge {
-                            t_us,
-                            channel: 0,
-                            rising,
-                        });
-                    }
-                }
-            }
         }
         for (k, events) in events.iter_mut().enumerate() {
             let u = planted.cameras[k].column_of_point(at).unwrap();

@@ -1,12 +1,12 @@
 //! A simulated session with one planted cause: plan, clocks and events of the geometric level, without devices.
 
-use skinrig_analysis::{Analysis, EventSource, SessionInput, analyze};
+use skinrig_analysis::{Analysis, SessionInput, analyze};
 use skinrig_compare::{Facts, Session, Subject};
 use skinrig_model::{
-    AnalysisSettings, AttemptId, CalibrationModel, CameraId, CdEvent, HostTime, Mark, MarkKind,
-    PlannedPress, Point2, Point3, PressId, PressOutcome, PressRole, PressTiming, PressVerdict,
-    PulseTrain, RigGeometry, SentMark, SimLevel, Skin, StereoGeometry, TriggerEdge,
+    AnalysisSettings, CalibrationModel, CameraId, CdEvent, HostTime, MarkKind, Point2, Point3,
+    PressRole, PressTiming, RigGeometry, SimLevel, Skin, StereoGeometry,
 };
+use skinrig_planted::{Memory, Touch, mark, press};
 use skinrig_sim::SimConfig;
 use skinrig_sim::geometric::GeometricModel;
 use skinrig_sim::scene::{GRID_NS, PixelModel, TipSample};
@@ -37,19 +37,6 @@ pub enum Plant {
     Settings(u32),
 }
 
-struct Events([Vec<CdEvent>; 2]);
-
-impl EventSource for Events {
-    fn for_each_slice(
-        &self,
-        camera: CameraId,
-        each: &mut dyn FnMut(&[CdEvent]),
-    ) -> Result<(), String> {
-        each(&self.0[camera.index()]);
-        Ok(())
-    }
-}
-
 /// Seeded and roughly normal.
 pub struct Dice(pub u64);
 
@@ -70,7 +57,7 @@ impl Dice {
 /// What a session is made from, so that it can be analysed again.
 pub struct Recorded {
     input: SessionInput,
-    events: Events,
+    events: Memory,
     facts: Facts,
 }
 
@@ -127,7 +114,10 @@ pub fn record(seed: u64, plant: Plant) -> Recorded {
     let events = [0, 1].map(|k| events(&config, [&truth, &moved], &pressed, k));
     Recorded {
         input,
-        events: Events(events),
+        events: Memory {
+            events,
+            slice: usize::MAX,
+        },
         facts: Facts {
             file: format!("{seed}.session.sqlite"),
             session_id: format!("{seed:032x}"),
@@ -158,30 +148,19 @@ impl Recorded {
 }
 
 fn input(config: &SimConfig, plant: Plant) -> SessionInput {
-    SessionInput {
-        planned: Vec::new(),
-        outcomes: Vec::new(),
-        earlier: Vec::new(),
-        edges: [Vec::new(), Vec::new()],
-        marks: Vec::new(),
-        gaps: [Vec::new(), Vec::new()],
-        box_reports: Vec::new(),
-        pose_interval_us: None,
-        crossing_se_us: None,
-        legs: Vec::new(),
-        rig: RigGeometry {
-            outline: config.outline,
-            nominal: config.nominal,
-            trigger_channel: Some(0),
-        },
-        settings: AnalysisSettings {
-            bootstrap_resamples: 2,
-            study_presses: 0,
-            calibration: CalibrationModel::Full,
-            thinning: if let Plant::Settings(n) = plant { n } else { 1 },
-            ..AnalysisSettings::default()
-        },
-    }
+    let rig = RigGeometry {
+        outline: config.outline,
+        nominal: config.nominal,
+        trigger_channel: Some(0),
+    };
+    let settings = AnalysisSettings {
+        bootstrap_resamples: 2,
+        study_presses: 0,
+        calibration: CalibrationModel::Full,
+        thinning: if let Plant::Settings(n) = plant { n } else { 1 },
+        ..AnalysisSettings::default()
+    };
+    skinrig_planted::session(rig, settings)
 }
 
 fn contact_ms(press: u32) -> i64 {
@@ -189,21 +168,12 @@ fn contact_ms(press: u32) -> i64 {
 }
 
 fn add(input: &mut SessionInput, number: u32, at: Point2, measured: Point2) {
-    let id = PressId(number);
     let (repetition, location) = (number / (SIDE * SIDE), number % (SIDE * SIDE));
     let role = if repetition == 0 {
         PressRole::Calibrate
     } else {
         PressRole::Score
     };
-    input.planned.push(PlannedPress {
-        id,
-        role,
-        repetition,
-        location,
-        at,
-        depth_mm: DEPTH_MM,
-    });
     let t = |ms: i64| HostTime((contact_ms(number) + ms) * 1_000_000);
     let timing = PressTiming {
         approach: t(-50),
@@ -213,40 +183,19 @@ fn add(input: &mut SessionInput, number: u32, at: Point2, measured: Point2) {
         release: t(300),
         clear: t(350),
     };
-    input.outcomes.push(Some(PressOutcome {
-        attempt: AttemptId {
-            press: id,
-            number: 1,
-        },
-        verdict: PressVerdict::Valid,
-        timing: Some(timing),
-        measured_at: Some(measured),
+    let touch = Touch {
+        depth_mm: DEPTH_MM,
+        timing,
+        measured_at: measured,
         measured_depth_mm: Some(DEPTH_MM),
-        touched_mm: None,
-        peak_force_n: None,
-        scheduled: false,
-    }));
+        ..Touch::new(role, repetition, location, at)
+    };
+    let id = press(input, touch);
     for (kind, t) in [
         (MarkKind::Contact, timing.contact),
         (MarkKind::Release, timing.release),
     ] {
-        let mark = Mark { kind, press: id };
-        input.marks.push(SentMark {
-            mark,
-            t,
-            uncertainty_ns: 500,
-        });
-        for edges in &mut input.edges {
-            for (rise, width) in PulseTrain::new(mark).unwrap().pulses() {
-                for (after, rising) in [(rise, true), (rise + width, false)] {
-                    edges.push(TriggerEdge {
-                        t_us: (t.0 / 1_000) as u64 + after,
-                        channel: 0,
-                        rising,
-                    });
-                }
-            }
-        }
+        mark(input, (kind, id), t, 500, |_| (t.0 / 1_000) as u64);
     }
 }
 

@@ -1,0 +1,160 @@
+//! Sessions made in memory, press by press: what is known of them besides their events, and the events themselves.
+
+use skinrig_analysis::{EventSource, SessionInput};
+use skinrig_model::{
+    AnalysisSettings, AttemptId, CameraId, CdEvent, HostTime, Mark, MarkKind, PlannedPress, Point2,
+    PressId, PressOutcome, PressRole, PressTiming, PressVerdict, PulseTrain, RigGeometry, SentMark,
+    TriggerEdge,
+};
+
+/// Events in memory.
+pub struct Memory {
+    /// Of each camera.
+    pub events: [Vec<CdEvent>; 2],
+    /// How many are handed out at once.
+    pub slice: usize,
+}
+
+impl EventSource for Memory {
+    fn for_each_slice(
+        &self,
+        camera: CameraId,
+        each: &mut dyn FnMut(&[CdEvent]),
+    ) -> Result<(), String> {
+        self.events[camera.index()]
+            .chunks(self.slice)
+            .for_each(each);
+        Ok(())
+    }
+}
+
+/// A session without presses.
+#[must_use]
+pub fn session(rig: RigGeometry, settings: AnalysisSettings) -> SessionInput {
+    SessionInput {
+        planned: Vec::new(),
+        outcomes: Vec::new(),
+        earlier: Vec::new(),
+        edges: [Vec::new(), Vec::new()],
+        marks: Vec::new(),
+        gaps: [Vec::new(), Vec::new()],
+        box_reports: Vec::new(),
+        pose_interval_us: None,
+        crossing_se_us: None,
+        legs: Vec::new(),
+        rig,
+        settings,
+    }
+}
+
+/// A valid press as it was planned and measured.
+#[derive(Debug, Clone, Copy)]
+pub struct Touch {
+    /// What it is for.
+    pub role: PressRole,
+    /// Which repetition, from 0.
+    pub repetition: u32,
+    /// Which place.
+    pub location: u32,
+    /// Where it was planned.
+    pub at: Point2,
+    /// How deep it was planned, mm.
+    pub depth_mm: f64,
+    /// When.
+    pub timing: PressTiming,
+    /// Where the tip was.
+    pub measured_at: Point2,
+    /// How deep, mm; `None`: not measured.
+    pub measured_depth_mm: Option<f64>,
+    /// Its times come from a schedule.
+    pub scheduled: bool,
+}
+
+impl Touch {
+    /// A press that went where it was sent, 2 mm deep.
+    #[must_use]
+    pub fn new(role: PressRole, repetition: u32, location: u32, at: Point2) -> Self {
+        Self {
+            role,
+            repetition,
+            location,
+            at,
+            depth_mm: 2.0,
+            timing: timing(0.0, [0.0; 5]),
+            measured_at: at,
+            measured_depth_mm: Some(2.0),
+            scheduled: false,
+        }
+    }
+}
+
+/// The times of a press that touches at `contact_s` on the host's clock: its approach begins so many seconds before, and the tip is at
+/// depth, retracts, releases and is clear so many after.
+#[must_use]
+pub fn timing(
+    contact_s: f64,
+    [before, at_depth, retract, release, clear]: [f64; 5],
+) -> PressTiming {
+    let after = |s: f64| HostTime::from_secs_f64(contact_s + s);
+    PressTiming {
+        approach: HostTime::from_secs_f64(contact_s - before),
+        contact: after(0.0),
+        at_depth: after(at_depth),
+        retract: after(retract),
+        release: after(release),
+        clear: after(clear),
+    }
+}
+
+/// Adds a press to `input`; the answer is its number.
+pub fn press(input: &mut SessionInput, touch: Touch) -> PressId {
+    let id = PressId(input.planned.len() as u32);
+    input.planned.push(PlannedPress {
+        id,
+        role: touch.role,
+        repetition: touch.repetition,
+        location: touch.location,
+        at: touch.at,
+        depth_mm: touch.depth_mm,
+    });
+    input.outcomes.push(Some(PressOutcome {
+        attempt: AttemptId {
+            press: id,
+            number: 1,
+        },
+        verdict: PressVerdict::Valid,
+        timing: Some(touch.timing),
+        measured_at: Some(touch.measured_at),
+        measured_depth_mm: touch.measured_depth_mm,
+        touched_mm: None,
+        peak_force_n: None,
+        scheduled: touch.scheduled,
+    }));
+    id
+}
+
+/// Sends a mark of `press` at `t`; camera `k` sees its first edge when its own clock reads `seen_us(k)`.
+pub fn mark(
+    input: &mut SessionInput,
+    (kind, press): (MarkKind, PressId),
+    t: HostTime,
+    uncertainty_ns: i64,
+    mut seen_us: impl FnMut(usize) -> u64,
+) {
+    let mark = Mark { kind, press };
+    input.marks.push(SentMark {
+        mark,
+        t,
+        uncertainty_ns,
+    });
+    for (k, edges) in input.edges.iter_mut().enumerate() {
+        let begins_us = seen_us(k);
+        let pulses = PulseTrain::new(mark).into_iter().flat_map(|p| p.pulses());
+        let levels = pulses.flat_map(|(rise, width)| [(rise, true), (rise + width, false)]);
+        edges.extend(levels.map(|(after_us, rising)| TriggerEdge {
+            t_us: begins_us + after_us,
+            channel: 0,
+            rising,
+        }));
+    }
+}
