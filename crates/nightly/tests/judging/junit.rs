@@ -1,0 +1,184 @@
+//! The JUnit document of a night: whole as XML, in the order that its readers want, with counts that add up.
+
+use skinrig_model::Limit;
+use skinrig_nightly::junit::{Outcome, junit};
+use skinrig_nightly::{Cause, Evidence, EvidenceKind, Night, Verdict};
+
+use super::support::{attempts, check, measured, night, part};
+
+/// A night with one of everything, and with text that XML must not take as its own.
+fn one_of_everything() -> Night {
+    let mut checks = vec![
+        check("identity", Verdict::Pass, None),
+        check("settings", Verdict::Marginal, None),
+        check("disk", Verdict::Fail, Some(Cause::Infrastructure)),
+        check("idle", Verdict::Fail, Some(Cause::Software)),
+        check("clocks", Verdict::Inconclusive, Some(Cause::Rig)),
+        check("trigger_loopback", Verdict::Invalid, Some(Cause::Rig)),
+        check("golden", Verdict::Fail, Some(Cause::Skin)),
+        check("stop_drill", Verdict::Skipped, None),
+    ];
+    checks[7].skipped = Some("not \"here\" & <now>".to_owned());
+    checks[1].repeats = Some("FAIL at first".to_owned());
+    checks[5].rule = Some("device-at-fault".to_owned());
+    for c in &mut checks[..7] {
+        c.attempts = attempts(&[c.verdict]);
+        let value = (c.name != "clocks").then_some(0.000_012);
+        c.attempts[0].parts = vec![part(
+            "camera1",
+            vec![measured("jitter", value, Limit::at_most(1.0))],
+        )];
+        c.attempts[0].evidence = vec![
+            Evidence::new(
+                EvidenceKind::ReadBack,
+                "camera1",
+                "<bias> ]]> \u{1}\u{fffe} & more",
+            )
+            .next("power-cycle it"),
+        ];
+    }
+    night(checks)
+}
+
+/// One element as it is met, or its end.
+#[derive(Debug, PartialEq)]
+enum Tag {
+    Open(String, Vec<(String, String)>),
+    Close(String),
+}
+
+/// The elements of a document. Panics where it is not well-formed.
+fn elements(text: &str) -> Vec<Tag> {
+    let mut rest = text
+        .strip_prefix("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n")
+        .expect("a declaration");
+    let mut tags = Vec::new();
+    let mut open: Vec<String> = Vec::new();
+    while let Some(at) = rest.find('<') {
+        plain(&rest[..at]);
+        let end = rest[at..].find('>').expect("an end of a tag") + at;
+        let tag = &rest[at + 1..end];
+        rest = &rest[end + 1..];
+        if let Some(name) = tag.strip_prefix('/') {
+            assert_eq!(open.pop().as_deref(), Some(name));
+            tags.push(Tag::Close(name.to_owned()));
+            continue;
+        }
+        let (tag, alone) = tag.strip_suffix('/').map_or((tag, false), |t| (t, true));
+        let (name, mut list) = tag.split_once(' ').unwrap_or((tag, ""));
+        let mut attributes = Vec::new();
+        while let Some((key, after)) = list.trim_start().split_once("=\"") {
+            let (value, after) = after.split_once('"').expect("an end of an attribute");
+            plain(value);
+            attributes.push((key.to_owned(), value.to_owned()));
+            list = after;
+        }
+        assert_eq!(list.trim(), "", "{tag}");
+        tags.push(Tag::Open(name.to_owned(), attributes));
+        if alone {
+            tags.push(Tag::Close(name.to_owned()));
+        } else {
+            open.push(name.to_owned());
+        }
+    }
+    assert_eq!(rest.trim(), "");
+    assert!(open.is_empty(), "{open:?}");
+    tags
+}
+
+/// Text without anything that XML takes as its own, or forbids.
+fn plain(text: &str) {
+    for (at, _) in text.match_indices('&') {
+        let entity = text[at + 1..].split(';').next().unwrap_or_default();
+        assert!(["amp", "lt", "gt", "quot"].contains(&entity), "{text}");
+    }
+    let allowed = |c: char| matches!(c, '\n' | '\t') || !(c.is_control() || c == '\u{fffe}');
+    assert!(!text.contains('>') && text.chars().all(allowed), "{text:?}");
+}
+
+#[test]
+fn the_document_is_whole_and_its_counts_add_up() {
+    let text = junit(&one_of_everything(), "bench-1");
+    let tags = elements(&text);
+    let named = |name: &str| -> Vec<&Vec<(String, String)>> {
+        let of = |t| match t {
+            &Tag::Open(ref n, ref a) if n == name => Some(a),
+            _ => None,
+        };
+        tags.iter().filter_map(of).collect()
+    };
+    let value = |attributes: &[(String, String)], key: &str| {
+        let found = attributes.iter().find(|(k, _)| k == key);
+        found.map(|(_, v)| v.clone()).unwrap_or_default()
+    };
+    for suite in [named("testsuites")[0], named("testsuite")[0]] {
+        for (key, element) in [
+            ("tests", "testcase"),
+            ("failures", "failure"),
+            ("errors", "error"),
+            ("skipped", "skipped"),
+        ] {
+            assert_eq!(value(suite, key), named(element).len().to_string(), "{key}");
+        }
+    }
+    assert_eq!(named("testcase").len(), 8);
+    let types = |element: &str| -> Vec<String> {
+        named(element).iter().map(|a| value(a, "type")).collect()
+    };
+    assert_eq!(types("failure"), ["INCONCLUSIVE", "FAIL"]);
+    assert_eq!(types("error"), ["FAIL", "FAIL", "INVALID"]);
+    assert_eq!(
+        value(named("skipped")[0], "message"),
+        "not &quot;here&quot; &amp; &lt;now&gt;"
+    );
+    // Dates without a zone, as the readers want them.
+    assert_eq!(
+        value(named("testsuite")[0], "timestamp"),
+        "2026-11-20T02:00:00"
+    );
+}
+
+#[test]
+fn infrastructure_is_an_error_and_what_is_measured_a_failure() {
+    for (verdict, cause, outcome) in [
+        (Verdict::Pass, None, Outcome::Passed),
+        (Verdict::Marginal, None, Outcome::Passed),
+        (Verdict::Skipped, None, Outcome::Skipped),
+        (Verdict::Fail, Some(Cause::Skin), Outcome::Failure),
+        (Verdict::Fail, Some(Cause::Rig), Outcome::Failure),
+        (Verdict::Fail, Some(Cause::Infrastructure), Outcome::Error),
+        (Verdict::Fail, Some(Cause::Software), Outcome::Error),
+        (Verdict::Invalid, Some(Cause::Rig), Outcome::Error),
+        (
+            Verdict::Inconclusive,
+            Some(Cause::Infrastructure),
+            Outcome::Failure,
+        ),
+    ] {
+        assert_eq!(
+            Outcome::of(verdict, cause),
+            outcome,
+            "{verdict:?} {cause:?}"
+        );
+    }
+}
+
+/// Against the schema, by a validator that is not ours; CI has it.
+#[test]
+fn the_document_is_valid_by_the_schema() {
+    let Some(python) = std::env::var_os("SKINRIG_PYTHON") else {
+        eprintln!("skipped: no SKINRIG_PYTHON with lxml; the structure is checked all the same");
+        return;
+    };
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/judging");
+    let file = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("junit.xml");
+    std::fs::write(&file, junit(&one_of_everything(), "bench-1")).expect("a temporary file");
+    let done = std::process::Command::new(python)
+        .arg(folder.join("validate.py"))
+        .arg(folder.join("junit.xsd"))
+        .arg(&file)
+        .output()
+        .expect("a Python that starts");
+    let said = String::from_utf8_lossy(&done.stderr);
+    assert!(done.status.success(), "{said}");
+}
