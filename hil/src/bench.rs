@@ -106,6 +106,11 @@ pub trait Bench {
         false
     }
 
+    /// As [`stop_asked`](Self::stop_asked), for whoever has devices of the bench in hand.
+    fn stopping(&self) -> Box<dyn Fn() -> bool> {
+        Box::new(|| false)
+    }
+
     /// The operator's hand on the arm: a halt switches the motors off at once, wherever it is.
     fn control(&self) -> ControlHandle {
         ControlHandle::new()

@@ -41,19 +41,15 @@ pub fn clocks(check: &Check, bench: &mut dyn Bench, found: &mut Findings) {
     streams.pass(MARGIN, see);
     let (mut n, mut next) = (0, streams.now());
     let end = next + duration;
-    while next <= end && streams.send(mark(n), see).is_ok() {
+    while next <= end && streams.send(mark(n), see) {
         (n, next) = (n + 1, next + PERIOD);
         let rest = next - streams.now();
         streams.pass(rest, see);
     }
     streams.pass(MARGIN, see);
     let reports = streams.reports().to_vec();
-    let box_trouble = streams.box_trouble().cloned();
+    let is_cut_off = next <= end;
     let seen = streams.finish(found, METRICS, see);
-    let is_cut_off = box_trouble.is_some();
-    if let Some(trouble) = box_trouble {
-        found.evidence.push(*trouble);
-    }
     let told = told(&reports);
     let mut instants = [BTreeMap::new(), BTreeMap::new()];
     for camera in CameraId::ALL {

@@ -53,6 +53,13 @@ impl Edges {
         let edges = self.0[camera.index()].iter().copied();
         edges.filter(|e| e.channel == channel).collect()
     }
+
+    /// The other channels of `camera` that had edges.
+    fn elsewhere(&self, camera: CameraId, channel: u8) -> Vec<u8> {
+        let edges = self.0[camera.index()].iter().map(|e| e.channel);
+        let others: BTreeSet<u8> = edges.filter(|c| *c != channel).collect();
+        others.into_iter().collect()
+    }
 }
 
 /// Makes the check.
@@ -71,19 +78,15 @@ pub fn trigger_loopback(check: &Check, bench: &mut dyn Bench, found: &mut Findin
     streams.pass(MARGIN, see);
     let mut sent = Vec::new();
     for n in 0..trains {
-        match streams.send(mark(n), see) {
-            Ok(_) => sent.push(mark(n)),
-            Err(_) => break,
+        if !streams.send(mark(n), see) {
+            break;
         }
+        sent.push(mark(n));
         streams.pass(REST, see);
     }
     streams.pass(MARGIN, see);
     let reports = streams.reports().to_vec();
-    let box_trouble = streams.box_trouble().cloned();
     let seen = streams.finish(found, METRICS, see);
-    if let Some(trouble) = box_trouble {
-        found.evidence.push(*trouble);
-    }
     if reports.iter().any(|r| matches!(r, BoxReport::Reset { .. })) {
         let what = "expected the box's clock to go on, found that the box was reset";
         let subject = trouble::subject(skinrig_model::DeviceRole::TriggerBox);
@@ -105,7 +108,7 @@ pub fn trigger_loopback(check: &Check, bench: &mut dyn Bench, found: &mut Findin
         }
         let channel = channels[camera.index()];
         let line = Line::of(&sent, &reports, &edges.on(camera, channel), channel);
-        line.tell(subject, found);
+        line.tell(subject, &edges.elsewhere(camera, channel), found);
     }
 }
 
@@ -156,7 +159,7 @@ impl Line {
         }
     }
 
-    fn tell(self, subject: &str, found: &mut Findings) {
+    fn tell(self, subject: &str, elsewhere: &[u8], found: &mut Findings) {
         let trains = self.sent;
         for (metric, count) in [
             ("lost_pulses", self.lost_pulses),
@@ -183,13 +186,16 @@ impl Line {
         if self.lost_pulses + self.extra_edges + self.unread as u64 == 0 {
             return;
         }
-        let what = format!(
+        let mut what = format!(
             "expected {} pulses in {trains} trains, found {} of them missing, {} edges too many and {} trains unread",
             trains as u64 * PULSES_PER_TRAIN,
             self.lost_pulses,
             self.extra_edges,
             self.unread,
         );
+        if !elsewhere.is_empty() {
+            what += &format!("; edges on channel {elsewhere:?}");
+        }
         let next =
             "check the trigger cable, its channel in the rig file, and levels (docs/bench.md)";
         found

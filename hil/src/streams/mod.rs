@@ -1,61 +1,27 @@
 //! The cameras of a bench, and its trigger box, while they stream for a check: started in order, looked at, stopped whatever
 //! happens. Every wait ends.
 
+mod seen;
+
 use skinrig_device::{CameraSettings, DeviceError, EventCamera, SyncMode};
-use skinrig_model::{
-    BoxReport, CameraId, DeviceRole, HostDuration, HostTime, Mark, RawChunk, SentMark,
-};
+use skinrig_model::{BoxReport, CameraId, HostDuration, HostTime, Mark, RawChunk};
 use skinrig_nightly::{Evidence, EvidenceKind};
 
+use self::seen::Live;
 use crate::bench::{Bench, Devices, Trouble};
 use crate::findings::Findings;
 use crate::trouble::{self, COMPUTER};
+
+pub use self::seen::Seen;
 
 /// From one look at the devices to the next.
 const STEP: HostDuration = HostDuration::from_millis(10);
 /// Bytes that do not fill a chunk are fetched this often.
 const FLUSH_EVERY: HostDuration = HostDuration::from_millis(200);
-/// A camera whose time has not moved for so long sends no more: every format repeats its time base within milliseconds.
-const STALLED_AFTER: HostDuration = HostDuration::from_millis(2_000);
 /// A box that sends a train of its own is free again within this.
 const LINE_WITHIN: HostDuration = HostDuration::from_millis(1_000);
 /// A look that comes this much later than asked for is evidence of a computer that was held up.
 const HELD_UP: HostDuration = HostDuration::from_millis(1_000);
-
-/// What a camera delivered since [`Streams::begin`].
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct Seen {
-    /// Bytes that came.
-    pub bytes: u64,
-    /// Bytes known to be lost.
-    pub lost_bytes: u64,
-    /// How often bytes were lost.
-    pub losses: u64,
-    /// The camera's time at the beginning and at the end, µs.
-    pub span_us: Option<(u64, u64)>,
-    /// What the camera has to say about its stream.
-    pub notes: Vec<String>,
-}
-
-impl Seen {
-    /// Length of the stream on the camera's own clock, s; `None` when its time did not move.
-    #[must_use]
-    pub fn span_s(&self) -> Option<f64> {
-        let (from, to) = self.span_us?;
-        (to > from).then(|| (to - from) as f64 * 1e-6)
-    }
-}
-
-/// One camera while it streams.
-#[derive(Default)]
-struct Live {
-    seen: Seen,
-    /// Why it streams no more.
-    trouble: Option<Trouble>,
-    /// Its last time, µs, and when it was seen to move.
-    reached: Option<u64>,
-    moved_at: HostTime,
-}
 
 /// The streaming devices of a bench. The cameras stop with this value.
 pub struct Streams<'a> {
@@ -69,6 +35,8 @@ pub struct Streams<'a> {
     patience: HostDuration,
     held_up: Option<Trouble>,
     measuring: bool,
+    /// Whether everything is to end soon.
+    stop: Box<dyn Fn() -> bool>,
 }
 
 impl<'a> Streams<'a> {
@@ -77,7 +45,7 @@ impl<'a> Streams<'a> {
         bench: &'a mut dyn Bench,
         prepare: &mut dyn FnMut(CameraId, &mut dyn EventCamera) -> Result<(), DeviceError>,
     ) -> Self {
-        let patience = bench.patience();
+        let (patience, stop) = (bench.patience(), bench.stopping());
         let settings = CameraId::ALL.map(|camera| bench.camera_settings(camera));
         let devices = bench.devices();
         let now = devices.clock.now();
@@ -95,6 +63,7 @@ impl<'a> Streams<'a> {
             patience,
             held_up: None,
             measuring: false,
+            stop,
         };
         let is_slave = |c: &CameraId| {
             settings[c.index()]
@@ -152,12 +121,6 @@ impl<'a> Streams<'a> {
         self.cameras[camera.index()].trouble.is_none()
     }
 
-    /// What became of the trigger box, when it is of no more use.
-    #[must_use]
-    pub fn box_trouble(&self) -> Option<&Trouble> {
-        self.box_trouble.as_ref()
-    }
-
     /// What the box reported so far.
     #[must_use]
     pub fn reports(&self) -> &[BoxReport] {
@@ -168,39 +131,24 @@ impl<'a> Streams<'a> {
     pub fn begin(&mut self, see: &mut dyn FnMut(&RawChunk)) {
         self.look(true, see);
         self.measuring = true;
-        for live in &mut self.cameras {
-            live.seen = Seen {
-                span_us: live.reached.map(|us| (us, us)),
-                ..Seen::default()
-            };
-        }
+        self.cameras.iter_mut().for_each(Live::begin);
     }
 
-    /// Looks at the devices for `span`, and hands each chunk to `see`.
+    /// Looks at the devices for `span`, or until everything is to end, and hands each chunk to `see`.
     pub fn pass(&mut self, span: HostDuration, see: &mut dyn FnMut(&RawChunk)) {
         let end = self.now() + span;
-        while self.now() < end {
+        while self.now() < end && !(self.stop)() {
             self.step(end, see);
         }
     }
 
-    /// Sends a mark as soon as the line is free, and looks at the devices meanwhile until its train is over.
-    ///
-    /// # Errors
-    /// [`Trouble`] with the box, which is then of no more use.
-    pub fn send(
-        &mut self,
-        mark: Mark,
-        see: &mut dyn FnMut(&RawChunk),
-    ) -> Result<SentMark, Trouble> {
+    /// Sends a mark as soon as the line is free, and looks at the devices meanwhile until its train is over. False when it was not
+    /// sent: the box is of no more use ([`Self::finish`] tells why), or everything is to end.
+    pub fn send(&mut self, mark: Mark, see: &mut dyn FnMut(&RawChunk)) -> bool {
         let until = self.now() + LINE_WITHIN + self.patience;
-        loop {
-            if let Some(trouble) = &self.box_trouble {
-                return Err(trouble.clone());
-            }
+        while self.box_trouble.is_none() && !(self.stop)() {
             let Some(Ok(trigger)) = &mut self.devices.trigger_box else {
-                let role = DeviceRole::TriggerBox;
-                return Err(trouble::silent(role, "expected a trigger box, found none"));
+                return false;
             };
             match trigger.send(mark) {
                 Ok(sent) => {
@@ -208,14 +156,13 @@ impl<'a> Streams<'a> {
                     while self.now() < over {
                         self.step(over, see);
                     }
-                    return Ok(sent);
+                    return true;
                 }
                 Err(DeviceError::State { .. }) if self.now() < until => self.step(until, see),
-                Err(e) => {
-                    self.box_trouble = Some(trouble::of(&e));
-                }
+                Err(e) => self.box_trouble = Some(trouble::of(&e)),
             }
         }
+        false
     }
 
     /// Waits until both cameras' streams go beyond the present, or are known to stand still; then stops the cameras. Everything
@@ -245,7 +192,14 @@ impl<'a> Streams<'a> {
             }
             self.take(see);
         }
-        let others = [self.box_noise.take(), self.held_up.take()];
+        if let (Some(trouble), Some(slot)) = (&self.box_trouble, &mut self.devices.trigger_box) {
+            *slot = Err(trouble.clone());
+        }
+        let others = [
+            self.box_trouble.take(),
+            self.box_noise.take(),
+            self.held_up.take(),
+        ];
         found
             .evidence
             .extend(others.into_iter().flatten().map(|t| *t));
@@ -306,16 +260,8 @@ impl<'a> Streams<'a> {
             let live = &mut self.cameras[i];
             if let Err(e) = fetched {
                 live.trouble = Some(trouble::of(&e));
-            } else if all && now - live.moved_at > STALLED_AFTER + self.patience {
-                let role = DeviceRole::of_camera(camera);
-                let what = match live.reached {
-                    Some(us) => format!(
-                        "{camera}: expected its time to go on, found it standing at {:.6} s",
-                        us as f64 * 1e-6
-                    ),
-                    None => format!("{camera}: expected a stream, found nothing"),
-                };
-                live.trouble = Some(trouble::silent(role, what));
+            } else if all {
+                live.trouble = live.stalled(camera, now, self.patience);
             }
         }
         self.listen();
@@ -325,22 +271,7 @@ impl<'a> Streams<'a> {
     fn take(&mut self, see: &mut dyn FnMut(&RawChunk)) {
         let now = self.devices.clock.now();
         for chunk in self.chunks.drain(..) {
-            let live = &mut self.cameras[chunk.camera.index()];
-            if let Some(us) = chunk.facts.last_us {
-                if live.reached != Some(us) {
-                    live.moved_at = now;
-                }
-                live.reached = Some(us);
-                if self.measuring {
-                    let first = chunk.facts.first_us.unwrap_or(us);
-                    live.seen.span_us.get_or_insert((first, first)).1 = us;
-                }
-            }
-            if self.measuring {
-                live.seen.bytes += chunk.bytes.len() as u64;
-                live.seen.lost_bytes += chunk.lost_before;
-                live.seen.losses += u64::from(chunk.lost_before > 0);
-            }
+            self.cameras[chunk.camera.index()].see(&chunk, now, self.measuring);
             see(&chunk);
         }
     }
