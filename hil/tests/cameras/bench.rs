@@ -26,6 +26,8 @@ pub struct SimBench {
     /// Whether the lamps can be switched, and every time that they were.
     pub lamps: Result<bool, Trouble>,
     pub switched: Vec<Light>,
+    /// Everything is to end.
+    pub ends: bool,
 }
 
 impl SimBench {
@@ -42,6 +44,7 @@ impl SimBench {
             folder: std::env::temp_dir(),
             lamps: Ok(false),
             switched: Vec::new(),
+            ends: false,
         }
     }
 
@@ -155,6 +158,11 @@ impl Bench for SimBench {
             "skin",
             "not here",
         )))
+    }
+
+    fn stopping(&self) -> Box<dyn Fn() -> bool> {
+        let ends = self.ends;
+        Box::new(move || ends)
     }
 
     fn folder(&self) -> &Path {

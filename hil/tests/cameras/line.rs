@@ -183,3 +183,19 @@ fn a_camera_that_falls_silent_or_is_unplugged_leaves_the_other_measured() {
         assert!(bench.devices.unwrap().cameras[0].is_err());
     }
 }
+
+#[test]
+fn a_check_comes_back_when_everything_is_to_end() {
+    use skinrig_hil::Bench as _;
+    let mut bench = bench(Vec::new());
+    bench.ends = true;
+    for check in [
+        "clocks: {duration: 1 h, drift: {at_most: 1 ppm}}",
+        "trigger_loopback: {trains: 10000, jitter: {at_most: 1 us}}",
+        "idle: {duration: 1 h, gaps: {at_most: 0}}",
+    ] {
+        bench.make(check);
+    }
+    let now = bench.devices().clock.now();
+    assert!(now < HostTime::from_secs_f64(10.0), "{now}");
+}
