@@ -9,7 +9,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use clap::Parser;
+use clap::error::ErrorKind;
 use serde_json::Value;
+use skinrig::args::Cli;
 use skinrig_protocol::suite::Suite;
 
 fn top() -> PathBuf {
@@ -30,7 +33,7 @@ const DIRECTIVES: &[(&str, &str)] = &[
         "Service",
         "Type User Group SupplementaryGroups WorkingDirectory StateDirectory SyslogIdentifier ExecCondition ExecStart Restart \
          TimeoutStartSec TimeoutStopSec KillMode LimitRTPRIO LimitMEMLOCK OOMScoreAdjust DevicePolicy DeviceAllow NoNewPrivileges \
-         CapabilityBoundingSet ProtectSystem ProtectHome PrivateTmp PrivateNetwork ProtectKernelTunables ProtectKernelModules \
+         CapabilityBoundingSet ProtectSystem ProtectHome ReadWritePaths PrivateTmp PrivateNetwork ProtectKernelTunables ProtectKernelModules \
          ProtectKernelLogs ProtectControlGroups ProtectHostname RestrictAddressFamilies IPAddressDeny RestrictNamespaces \
          RestrictSUIDSGID LockPersonality SystemCallArchitectures UMask",
     ),
@@ -126,12 +129,44 @@ fn a_night_has_the_time_and_the_rights_that_it_needs() {
         let allowed = &service[&("Service".to_owned(), "DeviceAllow".to_owned())];
         assert!(allowed.iter().any(|a| a == kind), "{kind}");
     }
-    for forbidding in ["PrivateDevices", "RestrictRealtime", "PrivateNetwork"] {
+    // A lease that lies in a folder of its own keeps nobody off the bench.
+    assert_eq!(
+        one(&service, "Service", "ReadWritePaths"),
+        "-/run/lock /tmp"
+    );
+    for forbidding in [
+        "PrivateDevices",
+        "RestrictRealtime",
+        "PrivateNetwork",
+        "PrivateTmp",
+    ] {
         assert!(
             !service.keys().any(|(_, key)| key == forbidding),
             "{forbidding}"
         );
     }
+}
+
+#[test]
+fn the_night_is_a_command_that_the_program_takes() {
+    let service = unit("skinrig-nightly.service");
+    let command = one(&service, "Service", "ExecStart");
+    let words: Vec<&str> = command.split_whitespace().collect();
+    assert_eq!(words[1..3], ["hil", "run"]);
+    if let Err(e) = Cli::try_parse_from(&words) {
+        panic!("{command}: {e}");
+    }
+    for file in ["/etc/skinrig/nightly.yaml", "/etc/skinrig/rig.yaml"] {
+        assert!(words.contains(&file), "{command}");
+        let conditions = &service[&("Unit".to_owned(), "ConditionPathExists".to_owned())];
+        assert!(
+            conditions.iter().any(|c| c == file),
+            "{file} is no condition"
+        );
+    }
+    // What it writes, it may write.
+    assert_eq!(one(&service, "Service", "StateDirectory"), "skinrig");
+    assert!(words.contains(&"/var/lib/skinrig/nights"), "{command}");
 }
 
 #[test]
@@ -350,6 +385,25 @@ fn the_steps_of_the_guide_are_counted() {
     let numbers: Vec<usize> = steps.iter().map(|s| s[0].parse().unwrap()).collect();
     assert_eq!(numbers, (1..=steps.len()).collect::<Vec<_>>());
     assert!(steps.iter().all(|s| s.len() == 4), "{steps:?}");
+}
+
+#[test]
+fn every_command_of_the_guides_is_one_of_the_program() {
+    let mut seen = 0;
+    for file in ["docs/first-contact.md", "docs/bench.md", "hil/README.md"] {
+        let text = read(file);
+        for command in text.split('`').filter(|c| c.starts_with("skinrig ")) {
+            let words = command
+                .split_whitespace()
+                .take_while(|w| w.bytes().all(|b| b.is_ascii_alphabetic()));
+            let mut words: Vec<&str> = words.take(3).collect();
+            words.push("--help");
+            let kind = Cli::try_parse_from(&words).unwrap_err().kind();
+            assert_eq!(kind, ErrorKind::DisplayHelp, "{file}: {command}");
+            seen += 1;
+        }
+    }
+    assert!(seen > 15, "{seen}");
 }
 
 #[test]

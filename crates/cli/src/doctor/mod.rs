@@ -14,7 +14,8 @@ mod permissions;
 mod power;
 mod real_time;
 mod survey;
-#[cfg(all(test, unix))]
+#[cfg(test)]
+#[cfg(unix)]
 mod tests;
 mod usb;
 mod versions;
