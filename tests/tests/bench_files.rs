@@ -3,7 +3,6 @@
     clippy::unwrap_used,
     reason = "a test that cannot read the workspace must fail"
 )]
-#![expect(clippy::print_stderr, reason = "a test that is skipped says why")]
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
