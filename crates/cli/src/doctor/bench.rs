@@ -1,5 +1,8 @@
 //! Whether somebody else holds the bench: devices that are busy, and by whom; a run that writes here.
 
+use std::path::Path;
+
+use skinrig_hil::lease::{self, Standing};
 use skinrig_omega3::enumerate::USB_VENDOR;
 use skinrig_recorder::writer_of;
 
@@ -22,15 +25,36 @@ pub(super) fn findings(case: &Case<'_>) -> Vec<Finding> {
         .filter(|l| l.state == "busy")
         .map(|l| held(case, l))
         .collect();
-    let mut findings = vec![run(case)];
-    if busy.is_empty() {
-        findings.insert(
-            0,
-            check(AREA, "devices", "held by nobody else").ok("nobody"),
-        );
+    let mut findings = Vec::new();
+    findings.extend(case.lease.map(leased));
+    if busy.is_empty() && !case.survey.left_alone {
+        findings.push(check(AREA, "devices", "held by nobody else").ok("nobody"));
     }
+    findings.push(run(case));
     findings.extend(busy);
     findings
+}
+
+/// Whether somebody holds the lease at `path` at this moment.
+pub(super) fn is_held(path: &Path) -> bool {
+    matches!(lease::look(path), Ok(Standing::Held { .. }))
+}
+
+fn leased(path: &Path) -> Finding {
+    let check = check(AREA, "lease", "held by nobody");
+    match lease::look(path) {
+        Err(e) => check.not_checked(format!("cannot read {}: {e}", path.display())),
+        Ok(Standing::Free { last: None }) => check.ok("free; nobody ever took it"),
+        Ok(Standing::Free { last: Some(last) }) => check.ok(format!("free; last: {last}")),
+        Ok(Standing::Held { owner, .. }) => check.problem(
+            owner.map_or_else(|| "somebody is just taking it".to_owned(), |o| o.to_string()),
+            "let it end: `skinrig hil lease` shows who it is, `skinrig status` how a run is going",
+        ),
+        Ok(Standing::Left { owner, beat_at }) => check.warning(
+            format!("{owner} ended without releasing it, or runs on another computer; last sign of life {beat_at}"),
+            "look at the arm before it is moved again; whoever takes the bench next takes it over",
+        ),
+    }
 }
 
 fn held(case: &Case<'_>, line: &Line) -> Finding {

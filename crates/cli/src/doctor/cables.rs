@@ -5,7 +5,7 @@ use skinrig_protocol::rig::RigKind;
 
 use super::Case;
 use super::finding::{Finding, check};
-use super::survey::{Library, name_of};
+use super::survey::{LEFT_ALONE, Library, name_of};
 use super::usb::{self, UsbDevice};
 use crate::devices::Line;
 
@@ -19,6 +19,9 @@ const ROBOT_MBIT: u64 = 480;
 /// All findings about cables.
 pub(super) fn findings(case: &Case<'_>) -> Vec<Finding> {
     let devices = usb::list(case.machine);
+    if case.survey.left_alone {
+        return vec![check(AREA, "devices", "those of the rig file").not_checked(LEFT_ALONE)];
+    }
     let mut findings = connected(case, devices.as_deref().ok());
     let cameras: Vec<&Line> = case.survey.cameras().collect();
     match &devices {

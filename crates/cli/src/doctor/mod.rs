@@ -20,12 +20,13 @@ mod tests;
 mod usb;
 mod versions;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use skinrig_protocol::rig::RigFile;
 
 use crate::exit::{Exit, Outcome};
+use crate::hil::lease;
 use crate::rig::bench as rig_bench;
 use finding::{Finding, Verdict};
 use machine::Machine;
@@ -48,7 +49,9 @@ struct Case<'a> {
     machine: &'a Machine,
     rig: Option<&'a RigFile>,
     survey: &'a Survey,
-    sessions: &'a std::path::Path,
+    sessions: &'a Path,
+    /// The file of the bench's lease.
+    lease: Option<&'a Path>,
 }
 
 /// `skinrig doctor`.
@@ -57,11 +60,19 @@ struct Case<'a> {
 /// [`crate::exit::Failure`] for a rig file that cannot be read. Problems are no error: they are [`Exit::Rig`].
 pub fn doctor(args: &DoctorArgs, json: bool) -> Outcome {
     let rig = args.rig.as_deref().map(rig_bench::load).transpose()?;
+    let lease = rig.as_ref().map(lease::path);
+    // Asking costs the trigger box a reset, which nobody who holds the bench must suffer.
+    let survey = if lease.as_deref().is_some_and(bench::is_held) {
+        Survey::of_a_held_bench(rig.as_ref())
+    } else {
+        Survey::make(rig.as_ref())
+    };
     let findings = examine(&Case {
         machine: &Machine::this(),
         rig: rig.as_ref(),
-        survey: &Survey::make(rig.as_ref()),
+        survey: &survey,
         sessions: &args.sessions,
+        lease: lease.as_deref(),
     });
     if json {
         crate::print_json(&finding::json(rig.as_ref(), &findings));

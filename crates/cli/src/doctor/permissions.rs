@@ -7,7 +7,7 @@ use skinrig_omega3::enumerate::USB_VENDOR;
 use super::Case;
 use super::access::User;
 use super::finding::{Finding, check};
-use super::survey::name_of;
+use super::survey::{LEFT_ALONE, name_of};
 use super::usb;
 use crate::devices::Line;
 
@@ -44,7 +44,11 @@ fn cameras(case: &Case<'_>, user: Option<&User>) -> Vec<Finding> {
     let expected = "may be opened";
     if lines.is_empty() {
         let asked = case.survey.lines.iter().find(|l| l.what == "USB");
-        let why = asked.map_or("no camera on the bus", |l| l.detail.as_str());
+        let why = match asked {
+            _ if case.survey.left_alone => LEFT_ALONE,
+            Some(line) => line.detail.as_str(),
+            None => "no camera on the bus",
+        };
         return vec![check(AREA, "cameras", expected).not_checked(why)];
     }
     let finding = |line: &&Line| {
@@ -109,6 +113,7 @@ fn serial_port(case: &Case<'_>, user: Option<&User>) -> Vec<Finding> {
             let (rights, next) = shut(case, user, port);
             check().problem(format!("refused: {port}{rights}"), next)
         }
+        None if case.survey.left_alone => check().not_checked(LEFT_ALONE),
         Some("absent") | None => check().not_checked(format!("there is no {port}")),
         Some(_) => check().ok(format!("{port} opened")),
     }]

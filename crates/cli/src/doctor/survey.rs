@@ -11,7 +11,12 @@ pub(super) struct Survey {
     pub lines: Vec<Line>,
     /// The robot's library.
     pub library: Library,
+    /// Somebody else holds the bench: no device was asked.
+    pub left_alone: bool,
 }
+
+/// Why a device of a held bench was not asked.
+pub(super) const LEFT_ALONE: &str = "somebody holds the bench: its devices were left alone";
 
 /// The robot's library.
 pub(super) enum Library {
@@ -31,6 +36,15 @@ pub(super) enum Library {
 impl Survey {
     /// Asks everything that is there.
     pub fn make(rig: Option<&RigFile>) -> Self {
+        Self {
+            lines: devices::survey(rig),
+            left_alone: false,
+            ..Self::of_a_held_bench(rig)
+        }
+    }
+
+    /// Looks for the library alone.
+    pub fn of_a_held_bench(rig: Option<&RigFile>) -> Self {
         let library = match load::load(rig.and_then(|r| r.robot.library.as_deref())) {
             Ok(loaded) => Library::Loaded {
                 version: loaded.version.to_string(),
@@ -40,8 +54,9 @@ impl Survey {
             Err(other) => Library::Unusable(other.to_string()),
         };
         Self {
-            lines: devices::survey(rig),
+            lines: Vec::new(),
             library,
+            left_alone: true,
         }
     }
 

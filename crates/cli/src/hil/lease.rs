@@ -26,7 +26,7 @@ pub fn take(rig: &RigFile, what: &str) -> Result<Lease, Failure> {
 
 /// The file of the lease. The robot names it: two rig files for one robot share it. Stand-ins all have one serial number; what
 /// tells them apart is the library that each is reached through.
-fn path(rig: &RigFile) -> PathBuf {
+pub(crate) fn path(rig: &RigFile) -> PathBuf {
     let robot = &rig.robot;
     let name = format!("{}-{}", robot.model, robot.serial);
     let name = match (rig.kind, &robot.library) {

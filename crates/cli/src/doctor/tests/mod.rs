@@ -6,6 +6,7 @@ use std::fs;
 use std::os::unix::fs::{MetadataExt, PermissionsExt, symlink};
 use std::path::{Path, PathBuf};
 
+use skinrig_hil::lease::{Lease, Owner, Pace};
 use skinrig_protocol::rig::RigFile;
 use tempfile::TempDir;
 
@@ -19,6 +20,7 @@ use faults::FAULTS;
 const RIG: &str = include_str!("../../../../../hil/rigs/bench.example.yaml");
 const CAMERA_1: &str = "sys/bus/usb/devices/2-1";
 const CAMERA_2: &str = "sys/bus/usb/devices/4-2";
+const LEASE: &str = "skinrig-omega3-12345.lease";
 const ROBOT_NODE: &str = "dev/bus/usb/001/005";
 
 /// A planted machine and what its devices say.
@@ -82,6 +84,7 @@ impl Bench {
             rig: self.rig.as_ref(),
             survey: &self.survey,
             sessions: &self.path("sessions"),
+            lease: Some(&self.path(LEASE)),
         })
     }
 
@@ -132,6 +135,7 @@ fn healthy() -> Bench {
                 version: "3.17.6".to_owned(),
                 advice: None,
             },
+            left_alone: false,
         },
         rig: RigFile::parse("rig.yaml", rig.as_bytes(), &|_| None).ok(),
         free_b: |_| Ok(500e9),
@@ -227,6 +231,28 @@ fn the_process_that_holds_a_device_is_named() {
         held.unwrap().found,
         "process 4711 holds it: skinrig run demo.yaml"
     );
+}
+
+#[test]
+fn a_bench_that_somebody_holds_is_left_alone_and_its_holder_named() {
+    let mut bench = healthy();
+    let owner = Owner::this_process(
+        "bob".to_owned(),
+        "lab".to_owned(),
+        "hil run nightly".to_owned(),
+    );
+    let lease = Lease::take(&bench.path(LEASE), owner, Pace::default()).unwrap();
+    assert!(bench::is_held(lease.path()));
+    bench.survey.lines.clear();
+    bench.survey.left_alone = true;
+    let wrong = bench.wrong();
+    assert_eq!(wrong, [("bench", "lease".to_owned(), Verdict::Problem)]);
+    let findings = bench.findings();
+    let held = findings.iter().find(|f| f.verdict == Verdict::Problem);
+    assert!(held.unwrap().found.contains("bob on lab"), "{held:?}");
+    drop(lease);
+    assert!(!bench::is_held(&bench.path(LEASE)));
+    assert_eq!(bench.wrong(), []);
 }
 
 #[test]
