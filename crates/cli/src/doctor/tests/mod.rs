@@ -74,7 +74,9 @@ impl Bench {
                 &format!("{value}\n"),
             );
         }
-        self.write(&format!("dev/bus/usb/{bus:03}/{number:03}"), "");
+        let node = format!("dev/bus/usb/{bus:03}/{number:03}");
+        self.write(&node, "");
+        self.mode(&node, 0o666);
     }
 
     fn findings(&self) -> Vec<Finding> {
