@@ -91,7 +91,7 @@ fn today() -> i64 {
     i64::try_from(seconds / 86_400).unwrap_or(i64::MAX)
 }
 
-/// Takes robot and clock out of the bench, so that it can be asked meanwhile whether to stop, and puts them back.
+/// The robot of the bench, as long as the work takes.
 fn borrow(
     bench: &mut dyn Bench,
     reach: Reach,
@@ -99,34 +99,22 @@ fn borrow(
     found: &mut Findings,
     work: Work<'_>,
 ) -> Result<(), Trouble> {
-    let patience = bench.patience();
+    let (patience, control, stop) = (bench.patience(), bench.control(), bench.stopping());
     let devices = bench.devices();
-    let lent = || {
-        Box::new(Evidence::new(
-            EvidenceKind::Software,
-            "robot",
-            "lent to a check",
-        ))
-    };
-    let mut robot = match std::mem::replace(&mut devices.robot, Err(lent())) {
-        Ok(robot) => robot,
-        Err(why) => {
-            devices.robot = Err(why.clone());
-            return Err(why);
-        }
-    };
-    let mut clock = std::mem::replace(&mut devices.clock, Box::new(Lent));
-    let asked = &*bench;
-    let stop = move || asked.stop_asked();
-    let setup = Setup::new(room, reach, patience, &*robot, asked.control());
+    let robot = devices.robot.as_mut().map_err(|why| why.clone())?;
+    let setup = Setup::new(room, reach, patience, &**robot, control);
     let hand = Hand {
         search,
-        stop: &stop,
+        stop: &*stop,
     };
-    let answer = arm_and_work(&mut *robot, &mut *clock, &setup, &hand, found, work);
-    let devices = bench.devices();
-    devices.robot = Ok(robot);
-    devices.clock = clock;
+    let answer = arm_and_work(
+        &mut **robot,
+        &mut *devices.clock,
+        &setup,
+        &hand,
+        found,
+        work,
+    );
     if answer
         .as_ref()
         .is_err_and(|e| e.kind == EvidenceKind::DeviceLost)
@@ -134,17 +122,6 @@ fn borrow(
         bench.close(); // only opening it again helps
     }
     answer
-}
-
-/// The place of a clock that is lent: it stands still.
-struct Lent;
-
-impl Clock for Lent {
-    fn now(&self) -> HostTime {
-        HostTime::ZERO
-    }
-
-    fn wait_until(&mut self, _: HostTime) {}
 }
 
 /// How a check arms the robot.

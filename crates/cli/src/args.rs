@@ -10,7 +10,7 @@ use skinrig_protocol::quantity::{self, Dimension};
 
 use crate::doctor::DoctorArgs;
 use crate::exit::Exit;
-use crate::hil::args::HilArgs;
+use crate::hil::args::{HilArgs, HoldArmArgs};
 use crate::remote::What;
 
 /// Runs tactile-skin experiments: protocol, robot, event cameras, session, analysis, report.
@@ -192,6 +192,10 @@ pub enum Command {
     /// Brake the robot's arm when the program that started this one dies.
     #[command(hide = true)]
     SuperviseArm,
+
+    /// Hold the arm in free air as long as the program that started this one lives.
+    #[command(hide = true)]
+    HoldArm(HoldArmArgs),
 }
 
 /// A limit that something can be above or below.

@@ -109,6 +109,7 @@ fn dispatch(cli: &Cli, arguments: &[OsString]) -> Outcome {
         Command::Inspect(a) => inspect::inspect(a, json),
         Command::Schema(a) => schema::schema(a),
         Command::SuperviseArm => supervise::supervise(),
+        Command::HoldArm(a) => hil::hold::hold(a),
     }
 }
 

@@ -380,7 +380,8 @@ fn on_bench(
     )
 }
 
-fn intent_of<'a>(
+/// What a run of `protocol` is to record.
+pub(crate) fn intent_of<'a>(
     protocol: &'a Protocol,
     seed: u64,
     duration_s: f64,

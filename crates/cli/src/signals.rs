@@ -11,7 +11,8 @@ use crate::exit::Exit;
 
 static PRESSED: AtomicU8 = AtomicU8::new(0);
 
-/// The operator at this terminal, with a hand on the run from before the first device is opened.
+/// The operator at this terminal, with a hand on the run from before the first device is opened. Clones are the same one.
+#[derive(Clone)]
 pub struct Operator {
     control: ControlHandle,
     over: Arc<AtomicBool>,

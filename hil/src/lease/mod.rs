@@ -50,7 +50,7 @@ pub enum LeaseError {
     /// Somebody has it.
     #[error(
         "expected the bench for ourselves, found it held by {}; lease {}\n  next: wait for its end, or end it ({}); `skinrig hil lease` shows who holds it",
-        of(owner.as_ref()), path.display(), how_to_end(owner.as_ref())
+        of(owner.as_deref()), path.display(), how_to_end(owner.as_deref())
     )]
     Held {
         /// Who; `None` in the moment before it wrote its name.
@@ -68,14 +68,14 @@ pub enum LeaseError {
     },
 }
 
-fn of(owner: Option<&Box<Owner>>) -> String {
+fn of(owner: Option<&Owner>) -> String {
     owner.map_or_else(
         || "somebody who is just taking it".to_owned(),
         |o| o.to_string(),
     )
 }
 
-fn how_to_end(owner: Option<&Box<Owner>>) -> String {
+fn how_to_end(owner: Option<&Owner>) -> String {
     owner.map_or_else(
         || "try again".to_owned(),
         |o| format!("on {}: kill {}", o.host, o.pid),
@@ -192,6 +192,12 @@ impl Lease {
     #[must_use]
     pub fn is_lost(&self) -> bool {
         self.shared.lost.load(Ordering::SeqCst)
+    }
+
+    /// [`is_lost`](Self::is_lost), for whoever does not hold the lease itself.
+    pub fn watch(&self) -> impl Fn() -> bool + use<> {
+        let shared = Arc::clone(&self.shared);
+        move || shared.lost.load(Ordering::SeqCst)
     }
 }
 

@@ -2,6 +2,7 @@
 
 use std::cell::Cell;
 use std::path::Path;
+use std::rc::Rc;
 
 use skinrig_device::CameraSettings;
 use skinrig_hil::bench::{Bench, Devices, Drilled, GoldenRun, Trouble};
@@ -24,7 +25,7 @@ pub struct SimBench {
     pub drills: Vec<Drill>,
     pub drilled: Option<Drilled>,
     /// Looks until everything is to end.
-    pub patience_of_operator: Cell<Option<u32>>,
+    pub patience_of_operator: Rc<Cell<Option<u32>>>,
 }
 
 impl SimBench {
@@ -42,7 +43,7 @@ impl SimBench {
             opened: 0,
             drills: vec![Drill::Watchdog, Drill::Stop],
             drilled: None,
-            patience_of_operator: Cell::new(None),
+            patience_of_operator: Rc::default(),
         }
     }
 
@@ -109,11 +110,13 @@ impl Bench for SimBench {
         Path::new(".")
     }
 
-    fn stop_asked(&self) -> bool {
-        let left = self.patience_of_operator.get();
-        self.patience_of_operator
-            .set(left.map(|n| n.saturating_sub(1)));
-        left == Some(0)
+    fn stopping(&self) -> Box<dyn Fn() -> bool> {
+        let left = Rc::clone(&self.patience_of_operator);
+        Box::new(move || {
+            let was = left.get();
+            left.set(was.map(|n| n.saturating_sub(1)));
+            was == Some(0)
+        })
     }
 
     fn patience(&self) -> HostDuration {

@@ -44,6 +44,14 @@ pub struct HilLeaseArgs {
     pub rig: Option<PathBuf>,
 }
 
+/// Arguments of `hold-arm`.
+#[derive(Debug, Args)]
+pub struct HoldArmArgs {
+    /// The rig file of the bench.
+    #[arg(long, value_name = "FILE")]
+    pub rig: PathBuf,
+}
+
 /// Arguments of `hil run`.
 #[derive(Debug, Args)]
 pub struct HilRunArgs {

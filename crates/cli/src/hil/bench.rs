@@ -5,14 +5,14 @@ use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use skinrig_controller::ControlHandle;
-use skinrig_device::{CameraSettings, EventCamera, RealClock};
+use skinrig_device::{CameraSettings, EventCamera, RealClock, Rig};
 use skinrig_hil::lease::Lease;
 use skinrig_hil::{Bench, Devices, Drilled, GoldenRun, Slot, Trouble};
 use skinrig_model::{CameraId, HostDuration};
 use skinrig_nightly::{Evidence, EvidenceKind};
-use skinrig_protocol::CameraRequest;
 use skinrig_protocol::rig::{Drill, RigFile, RigKind};
 use skinrig_protocol::suite::Light;
+use skinrig_protocol::{CameraRequest, Protocol};
 
 use super::{drill, golden, trouble};
 use crate::exit::Failure;
@@ -74,6 +74,38 @@ impl RealBench {
         &self.command_line
     }
 
+    /// Opens every device and puts them together as the rig of a run of `protocol`, with a clock that begins with it. Nothing is
+    /// left with the bench.
+    ///
+    /// # Errors
+    /// Why the first of them could not be opened.
+    pub fn take_rig(&mut self, protocol: &Protocol) -> Result<Rig, Trouble> {
+        self.close();
+        self.clock = RealClock::start();
+        let mut settings = Vec::new();
+        for (setup, request) in self.rig.cameras.iter().zip(&protocol.cameras) {
+            let one = bench::camera_settings(setup, request);
+            settings.push(one.map_err(|f| software("computer", &f))?);
+        }
+        let settings: [CameraSettings; 2] = settings
+            .try_into()
+            .map_err(|_| software("computer", &Failure::internal("two cameras")))?;
+        self.devices();
+        let Some(devices) = self.devices.take() else {
+            return Err(software("computer", &Failure::internal("no devices")));
+        };
+        let [one, two] = devices.cameras;
+        bench::assemble(
+            (&self.rig, protocol),
+            settings,
+            devices.robot?,
+            [one?, two?],
+            devices.trigger_box.transpose()?,
+            self.clock,
+        )
+        .map_err(|f| software("computer", &f))
+    }
+
     fn note_firmware(&mut self, device: &str, version: &str) {
         if !self.firmware.iter().any(|(d, _)| d == device) {
             self.firmware.push((device.to_owned(), version.to_owned()));
@@ -94,6 +126,14 @@ impl RealBench {
             let what = failure.message;
             Box::new(Evidence::new(EvidenceKind::Absent, subject, what))
         })
+    }
+}
+
+/// How late stand-ins may be that share this computer's processors.
+pub fn patience(kind: RigKind) -> HostDuration {
+    match kind {
+        RigKind::Emulated => bench::SLOW_LATE,
+        RigKind::Bench => HostDuration::ZERO,
     }
 }
 
@@ -221,6 +261,12 @@ impl Bench for RealBench {
         self.firmware.clone()
     }
 
+    fn stopping(&self) -> Box<dyn Fn() -> bool> {
+        let operator = self.operator.clone();
+        let lost = self.lease.as_ref().map(Lease::watch);
+        Box::new(move || operator.asked() || lost.as_ref().is_some_and(|lost| lost()))
+    }
+
     fn stop_asked(&self) -> bool {
         self.operator.asked() || self.lease_is_lost()
     }
@@ -234,10 +280,7 @@ impl Bench for RealBench {
     }
 
     fn patience(&self) -> HostDuration {
-        match self.rig.kind {
-            RigKind::Emulated => bench::SLOW_LATE,
-            RigKind::Bench => HostDuration::ZERO,
-        }
+        patience(self.rig.kind)
     }
 }
 

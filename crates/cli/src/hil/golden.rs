@@ -2,20 +2,107 @@
 
 use std::path::Path;
 
-use skinrig_hil::{GoldenRun, Trouble};
-use skinrig_nightly::{Evidence, EvidenceKind};
+use sha2::{Digest, Sha256};
+use skinrig_hil::findings::Findings;
+use skinrig_hil::{Bench, GoldenRun, Trouble};
+use skinrig_model::RunEnd;
+use skinrig_nightly::{Evidence, EvidenceKind, Golden};
+use skinrig_protocol::{Plan, Protocol};
 
 use super::bench::RealBench;
+use super::golden_numbers::numbers;
+use super::run_fault;
+use crate::exit::Failure;
+use crate::results::{self, Choices};
+use crate::rig::{bench, gates};
+use crate::{check, run};
 
 /// Closes every device and runs the golden campaign.
 ///
 /// # Errors
 /// [`Trouble`] when there is no session to speak of.
-pub fn golden(_bench: &mut RealBench, _protocol: &Path) -> Result<GoldenRun, Trouble> {
-    let what = "the golden campaign is not built yet";
-    Err(Box::new(Evidence::new(
-        EvidenceKind::Software,
-        "skin",
-        what,
-    )))
+pub fn golden(bench: &mut RealBench, file: &Path) -> Result<GoldenRun, Trouble> {
+    let (protocol, plan) = protocol(bench, file)?;
+    let folder = bench.folder().to_owned();
+    let rig = bench.take_rig(&protocol)?;
+    let duration_s = plan.summary().duration_s;
+    let preflight = gates::of_bench(bench.rig(), &rig, &folder, duration_s);
+    let intent = run::intent_of(&protocol, protocol.seed, duration_s, bench.command_line());
+    let (session, report) = run::record(
+        &intent,
+        &plan,
+        rig,
+        &folder,
+        Some(preflight),
+        bench.operator(),
+    )
+    .map_err(|f| trouble(EvidenceKind::Disk, "computer", &f))?;
+    let mut findings = Findings::default();
+    match &report.end {
+        RunEnd::Completed => {}
+        RunEnd::Stopped(why) => findings.saw(EvidenceKind::TimeOut, "robot", why.as_str()),
+        RunEnd::Faulted(why) => findings.evidence.push(run_fault::of(why)),
+    }
+    for problem in &report.problems {
+        findings.evidence.push(run_fault::of(problem));
+    }
+    let mut golden = GoldenRun {
+        files: Golden {
+            session: name(&session),
+            report: None,
+            results_sha256: None,
+        },
+        skin: Some(protocol.prototype.id.clone()),
+        analysis_version: skinrig_analysis::result::ANALYSIS_VERSION,
+        findings,
+    };
+    match analysed(&session) {
+        Ok((results, html)) => {
+            golden.files.report = Some(html);
+            let json = serde_json::to_vec(&results.analysis).unwrap_or_default();
+            golden.files.results_sha256 = Some(hex(&Sha256::digest(json)));
+            let lost = results.provenance.lost_bytes;
+            numbers(&results.analysis, lost, &mut golden.findings);
+        }
+        // Nothing is measured then.
+        Err(failure) => {
+            golden
+                .findings
+                .evidence
+                .push(*trouble(EvidenceKind::Audit, "skin", &failure))
+        }
+    }
+    Ok(golden)
+}
+
+/// The protocol within what the bench bears, and its plan.
+fn protocol(bench: &RealBench, file: &Path) -> Result<(Protocol, Plan), Trouble> {
+    let refused = |f: Failure| trouble(EvidenceKind::Refused, "skin", &f);
+    let mut protocol = check::load(file, &[]).map_err(refused)?.protocol;
+    bench::tighten(&mut protocol, bench.rig());
+    let mut plan = protocol.compile();
+    protocol
+        .check(&plan)
+        .map_err(|found| refused(Failure::findings(&found)))?;
+    plan.seed = protocol.seed;
+    Ok((protocol, plan))
+}
+
+fn analysed(session: &Path) -> Result<(results::Results, String), Failure> {
+    let results = results::analyze_session(session, Choices::default())?;
+    let (_, html) = results::write_results(&results, None, None)?;
+    Ok((results, name(&html)))
+}
+
+fn name(path: &Path) -> String {
+    let name = path.file_name().unwrap_or_default();
+    name.to_string_lossy().into_owned()
+}
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|b| format!("{b:02x}")).collect()
+}
+
+fn trouble(kind: EvidenceKind, subject: &str, failure: &Failure) -> Trouble {
+    Box::new(Evidence::new(kind, subject, failure.message.as_str()))
 }

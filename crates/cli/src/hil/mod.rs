@@ -5,9 +5,12 @@ pub mod bench;
 mod drill;
 mod folder;
 mod golden;
+mod golden_numbers;
+pub mod hold;
 pub mod lease;
 mod live;
 pub mod run;
+mod run_fault;
 mod trouble;
 
 use crate::exit::Outcome;

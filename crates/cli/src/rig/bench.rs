@@ -65,6 +65,28 @@ pub fn open(rig: &RigFile, protocol: &Protocol) -> Result<Rig, Failure> {
         Some(setup) => Some(open_trigger_box(setup, rig.kind, clock)?),
         None => None,
     };
+    assemble(
+        (rig, protocol),
+        camera_settings,
+        indenter,
+        cameras,
+        trigger_box,
+        clock,
+    )
+}
+
+/// Open devices as the rig of a run.
+///
+/// # Errors
+/// [`Failure::internal`].
+pub(crate) fn assemble(
+    (rig, protocol): (&RigFile, &Protocol),
+    camera_settings: [CameraSettings; 2],
+    indenter: Box<dyn Indenter>,
+    cameras: [Box<dyn EventCamera>; 2],
+    trigger_box: Option<Box<dyn TriggerBox>>,
+    clock: RealClock,
+) -> Result<Rig, Failure> {
     Ok(Rig {
         kind: rig.kind.name().to_owned(),
         name: display_name(rig),

@@ -24,6 +24,12 @@ use skinrig_emulated_camera::{Bus, BusConfig, BusError, Evk1Config};
 use skinrig_emulated_trigger_box::{BoardOptions, EmulatedBox, Unavailable};
 use skinrig_model::{CameraId, Point3, RigidTransform, Robot, SimLevel, Skin};
 
+// What plants faults in its devices.
+pub use drd::{Fault, When};
+pub use skinrig_emulated_camera::steer::Order;
+pub use skinrig_emulated_trigger_box::NoisePerMillion;
+pub use ties::{LEAKS_EVERY, Wire};
+
 use ties::Ties;
 
 /// Serial numbers of the two cameras, as in `hil/rigs/emulated.yaml`.
@@ -91,7 +97,7 @@ pub enum BenchError {
 /// A running bench; everything on it ends with this value.
 pub struct EmulatedBench {
     // Declared first: nothing may reach for a device that is gone.
-    _ties: Ties,
+    ties: Ties,
     arm: Arc<EmulatedArm>,
     bus: Arc<Bus>,
     trigger_box: EmulatedBox,
@@ -128,7 +134,7 @@ impl EmulatedBench {
         })?);
         let ties = Ties::make(&arm, &bus, &trigger_box).map_err(BenchError::Ties)?;
         Ok(Self {
-            _ties: ties,
+            ties,
             arm,
             bus,
             trigger_box,
@@ -157,6 +163,11 @@ impl EmulatedBench {
     #[must_use]
     pub fn bus(&self) -> &Bus {
         &self.bus
+    }
+
+    /// The wire from the trigger box to a camera.
+    pub fn wire(&self, camera: CameraId, wire: Wire) {
+        self.ties.wire(camera, wire);
     }
 
     /// The trigger box: noise, unplugging, resets.

@@ -1,0 +1,259 @@
+//! What a golden campaign measured, in the units of the suite's metrics.
+
+use skinrig_analysis::Analysis;
+use skinrig_analysis::result::{Estimate, Fault, PressResult};
+use skinrig_hil::findings::Findings;
+use skinrig_model::{Point2, PressRole};
+use skinrig_nightly::EvidenceKind;
+
+const SKIN: &str = "skin";
+/// Fewer presses than this say nothing of the localisation.
+const PRESSES: u64 = 12;
+/// Fewer places than this say nothing of the spread between repetitions.
+const PLACES: u64 = 4;
+/// Fewer reference presses than this at either end say nothing of a shift.
+const REFERENCES: u64 = 2;
+/// Two places nearer than this are one, mm.
+const SAME_MM: f64 = 1e-6;
+/// Half width of a 95 % interval in standard errors.
+const Z: f64 = 1.96;
+/// What stands on the clocks.
+const CLOCKED: [&str; 8] = [
+    "rmse",
+    "repeat_std",
+    "latency",
+    "press_events",
+    "idle_events",
+    "located",
+    "reference_shift",
+    "reference_events",
+];
+
+/// Fills `found` with what `analysis` says, and with the evidence of what keeps it from being believed.
+pub fn numbers(analysis: &Analysis, lost_bytes: [u64; 2], found: &mut Findings) {
+    evidence(analysis, lost_bytes, found);
+    if !analysis.alignment.is_usable() {
+        // Where an event belongs is not known: no number that stands on it is to be used.
+        for metric in CLOCKED {
+            found.unmeasured(SKIN, metric);
+        }
+        valid(analysis, found);
+        found.value(SKIN, "lost", lost(lost_bytes));
+        return;
+    }
+    let scored = &analysis.scored;
+    estimate(found, "rmse", scored.rmse_mm, 1.0, PRESSES);
+    estimate(found, "repeat_std", scored.repeat_std_mm, 1.0, PLACES);
+    let contact = analysis.latency.as_ref().and_then(|l| l.from_contact);
+    match contact {
+        Some(contact) => estimate(found, "latency", contact.median_ms, 1e-3, PRESSES),
+        None => {
+            found
+                .unmeasured(SKIN, "latency")
+                .noting("the contacts are not timed by a clock of their own");
+        }
+    }
+    rates(analysis, found);
+    estimate(found, "located", scored.located_rate, 100.0, PRESSES);
+    valid(analysis, found);
+    references(analysis, found);
+    found.value(SKIN, "lost", lost(lost_bytes));
+}
+
+fn lost([one, two]: [u64; 2]) -> f64 {
+    (one + two) as f64
+}
+
+fn valid(analysis: &Analysis, found: &mut Findings) {
+    let counts = analysis.counts;
+    if counts.planned == 0 {
+        found.unmeasured(SKIN, "valid");
+        return;
+    }
+    let share = f64::from(counts.valid) / f64::from(counts.planned);
+    found
+        .value(SKIN, "valid", 100.0 * share)
+        .of(counts.planned as usize, PRESSES);
+}
+
+fn evidence(analysis: &Analysis, lost_bytes: [u64; 2], found: &mut Findings) {
+    for violation in &analysis.alignment.violations {
+        let what = format!("the clocks of the session are not aligned: {violation}");
+        found.saw(EvidenceKind::TriggerFault, "trigger box", what);
+    }
+    for finding in &analysis.findings {
+        let what = format!("{}; {}", finding.evidence, finding.advice);
+        let camera = finding.camera.map(|c| ["camera1", "camera2"][c.index()]);
+        let (kind, subject) = match finding.fault {
+            Fault::CameraBlind | Fault::NoEvents => {
+                (EvidenceKind::DeviceLost, camera.unwrap_or("camera1"))
+            }
+            Fault::NoTriggers | Fault::ClockWrong => (EvidenceKind::TriggerFault, "trigger box"),
+            Fault::RobotOff | Fault::NoTruth => (EvidenceKind::State, "robot"),
+            _ => (EvidenceKind::Audit, SKIN),
+        };
+        found.saw(kind, subject, what);
+    }
+    for (camera, lost) in ["camera1", "camera2"].into_iter().zip(lost_bytes) {
+        if lost > 0 {
+            let what = format!("expected no lost data, found {lost} bytes lost");
+            found.saw(EvidenceKind::DataLost, camera, what);
+        }
+    }
+}
+
+fn estimate(found: &mut Findings, metric: &'static str, e: Estimate, unit: f64, needs: u64) {
+    let value = match e.value {
+        Some(value) => found.value(SKIN, metric, unit * value),
+        None => found.unmeasured(SKIN, metric),
+    };
+    value.of(e.n as usize, needs);
+    value.interval = e
+        .low
+        .zip(e.high)
+        .map(|(low, high)| [unit * low, unit * high]);
+}
+
+/// Both cameras together, over the presses that are valid.
+fn rates(analysis: &Analysis, found: &mut Findings) {
+    let both = |of: fn(&PressResult, usize) -> Option<f64>| -> Vec<f64> {
+        let valid = analysis.presses.iter().filter(|p| p.verdict == "valid");
+        let sums = valid.map(|p| Some(of(p, 0)? + of(p, 1)?));
+        sums.flatten().collect()
+    };
+    let pressed = both(|p, camera| Some(p.views[camera]?.rate_per_s));
+    let idle = both(|p, camera| {
+        let view = p.views[camera]?;
+        (view.idle_s > 0.0).then_some(view.idle_rate_per_s)
+    });
+    for (metric, rates) in [("press_events", pressed), ("idle_events", idle)] {
+        let n = rates.len();
+        match Sample::of(&rates) {
+            Some(sample) => {
+                let value = found.value(SKIN, metric, sample.mean).of(n, PRESSES);
+                value.interval = sample.interval();
+            }
+            None => {
+                found.unmeasured(SKIN, metric);
+            }
+        }
+    }
+}
+
+/// The reference: the place of the first scored press, as long as presses stay there at the start, and again at the end.
+fn references(analysis: &Analysis, found: &mut Findings) {
+    let scored = |p: &&PressResult| p.role == PressRole::Score;
+    let scored: Vec<&PressResult> = analysis.presses.iter().filter(scored).collect();
+    let Some(first) = scored.first() else {
+        found.unmeasured(SKIN, "reference_shift");
+        found.unmeasured(SKIN, "reference_events");
+        return;
+    };
+    let there = |p: &&&PressResult| p.planned.distance_mm(first.planned) <= SAME_MM;
+    let start: Vec<&PressResult> = scored.iter().take_while(there).copied().collect();
+    let end = scored.iter().rev().take_while(there).copied();
+    let end: Vec<&PressResult> = end.take(scored.len() - start.len()).collect();
+    shift(&start, &end, found);
+    events(&start, &end, found);
+}
+
+/// Distance between the mean estimates.
+fn shift(start: &[&PressResult], end: &[&PressResult], found: &mut Findings) {
+    let estimates = |presses: &[&PressResult]| -> Vec<Point2> {
+        presses.iter().filter_map(|p| p.estimate()).collect()
+    };
+    let (start, end) = (estimates(start), estimates(end));
+    let along = |points: &[Point2], of: fn(&Point2) -> f64| {
+        Sample::of(&points.iter().map(of).collect::<Vec<f64>>())
+    };
+    let axes: Option<Vec<(Sample, Sample)>> = [|p: &Point2| p.x_mm, |p: &Point2| p.y_mm]
+        .into_iter()
+        .map(|of: fn(&Point2) -> f64| Some((along(&start, of)?, along(&end, of)?)))
+        .collect();
+    let few = start.len().min(end.len());
+    let Some(axes) = axes else {
+        found
+            .unmeasured(SKIN, "reference_shift")
+            .of(few, REFERENCES);
+        return;
+    };
+    let square: f64 = axes.iter().map(|(a, b)| (b.mean - a.mean).powi(2)).sum();
+    let shift_mm = square.sqrt();
+    let variance: f64 = axes.iter().map(|(a, b)| a.of_mean() + b.of_mean()).sum();
+    let value = found
+        .value(SKIN, "reference_shift", shift_mm)
+        .of(few, REFERENCES);
+    if variance.is_finite() {
+        let half = Z * variance.sqrt();
+        value.interval = Some([(shift_mm - half).max(0.0), shift_mm + half]);
+    }
+}
+
+/// Events of both cameras at the end, of those at the start.
+fn events(start: &[&PressResult], end: &[&PressResult], found: &mut Findings) {
+    let counts = |presses: &[&PressResult]| -> Vec<f64> {
+        let sums = presses.iter().map(|p| {
+            let [one, two] = p.views;
+            Some(f64::from(one?.events) + f64::from(two?.events))
+        });
+        sums.flatten().collect()
+    };
+    let (start, end) = (counts(start), counts(end));
+    let few = start.len().min(end.len());
+    let ratio = Sample::of(&start)
+        .zip(Sample::of(&end))
+        .filter(|(a, _)| a.mean > 0.0);
+    let Some((a, b)) = ratio else {
+        found
+            .unmeasured(SKIN, "reference_events")
+            .of(few, REFERENCES);
+        return;
+    };
+    let share = b.mean / a.mean;
+    // First order: relative variances add.
+    let relative = a.of_mean() / a.mean.powi(2) + b.of_mean() / b.mean.powi(2);
+    let value = found
+        .value(SKIN, "reference_events", 100.0 * share)
+        .of(few, REFERENCES);
+    if relative.is_finite() {
+        let half = Z * share * relative.sqrt();
+        value.interval = Some([100.0 * (share - half), 100.0 * (share + half)]);
+    }
+}
+
+/// Mean and spread of a few numbers.
+#[derive(Debug, Clone, Copy)]
+struct Sample {
+    mean: f64,
+    /// With n - 1; infinite for one number alone.
+    variance: f64,
+    n: f64,
+}
+
+impl Sample {
+    fn of(values: &[f64]) -> Option<Self> {
+        let n = values.len() as f64;
+        if values.is_empty() {
+            return None;
+        }
+        let mean = values.iter().sum::<f64>() / n;
+        let squares: f64 = values.iter().map(|v| (v - mean).powi(2)).sum();
+        let variance = if n > 1.0 {
+            squares / (n - 1.0)
+        } else {
+            f64::INFINITY
+        };
+        Some(Self { mean, variance, n })
+    }
+
+    /// Variance of the mean.
+    fn of_mean(&self) -> f64 {
+        self.variance / self.n
+    }
+
+    fn interval(&self) -> Option<[f64; 2]> {
+        let half = Z * self.of_mean().sqrt();
+        half.is_finite()
+            .then_some([self.mean - half, self.mean + half])
+    }
+}

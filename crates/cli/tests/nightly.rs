@@ -1,0 +1,326 @@
+//! The nightly suite on the emulated bench: a healthy bench passes, and a fault planted in each device makes the right check fail,
+//! with the right verdict, cause and exit code.
+#![cfg(target_os = "linux")]
+#![expect(
+    clippy::unwrap_used,
+    clippy::print_stderr,
+    reason = "a test that cannot run must fail, or say why it did not run"
+)]
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use serde_json::Value;
+use skinrig_emulated_bench::{
+    BenchConfig, BenchError, CAMERA_SERIALS, EmulatedBench, Fault, NoisePerMillion, Order, When,
+    Wire,
+};
+use skinrig_model::CameraId;
+
+const SKINRIG: &str = env!("CARGO_BIN_EXE_skinrig");
+const RIG: &str = include_str!("../../../hil/rigs/emulated.yaml");
+/// Where the skin's surface lies on this bench, m, robot frame.
+const SURFACE_M: f64 = -0.020;
+
+/// What the checks are made with here: short, never repeated.
+const SUITE: &str = "\
+skinrig_suite: 1
+name: planted
+budget: 10 min
+repeats: {at_most: 0}
+checks:
+  identity: {differences: {at_most: 0}}
+  settings: {differences: {at_most: 0}}
+  disk: {amount: 8 MB, free: {at_least: 1 MB}}
+  trigger_loopback: {trains: 6, lost_pulses: {at_most: 0}, extra_pulses: {at_most: 0}, unread_trains: {at_most: 0}}
+  test_pattern: {duration: 1 s, rate: 500 kev/s, lost: {at_most: 0 B}, gaps: {at_most: 0}}
+  robot_state: {faults: {at_most: 0}, creep: {at_most: 0.1 mm}}
+  repeatability: {approaches: 2, spread: {at_most: 0.2 mm}, error: {at_most: 0.3 mm}}
+  step_response: {steps: 2, settling: {at_most: 1 s}, error: {at_most: 0.2 mm}}
+  depth: {presses: 1, surface: {at_most: 0.6 mm}, error: {at_most: 0.2 mm}}
+  force_ceiling: {force: 1 N, depth: 2.5 mm, peak: {at_most: 1.5 N}}
+  watchdog_drill: {braked_within: {at_most: 10 s}, drop: {at_most: 50 mm}}
+  stop_drill: {stopped_within: {at_most: 1 s}, distance: {at_most: 10 mm}}
+";
+
+/// The bench and where its nights go.
+struct Nights {
+    bench: EmulatedBench,
+    folder: tempfile::TempDir,
+}
+
+/// How a night ended.
+struct Seen {
+    exit: i32,
+    night: Value,
+    said: String,
+}
+
+impl Seen {
+    fn check(&self, name: &str) -> &Value {
+        let checks = self.night["checks"].as_array().unwrap();
+        let found = checks.iter().find(|c| c["name"] == name);
+        found.unwrap_or_else(|| panic!("no {name} in {}", self.said))
+    }
+
+    /// Asserts exit code, verdict and cause of a check, and evidence of this kind about this device.
+    fn is(&self, exit: i32, name: &str, verdict: &str, cause: &str, seen: &[(&str, &str)]) {
+        let check = self.check(name);
+        let all = format!("{name}: {check:#}\n{}", self.said);
+        assert_eq!(check["verdict"], verdict, "{all}");
+        assert_eq!(check["cause"], cause, "{all}");
+        let evidence: Vec<&Value> = check["attempts"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .flat_map(|a| a["evidence"].as_array().unwrap())
+            .collect();
+        for (kind, subject) in seen {
+            let there = evidence
+                .iter()
+                .any(|e| e["kind"] == *kind && e["subject"] == *subject);
+            assert!(there, "expected {kind} of {subject}: {all}");
+        }
+        assert_eq!(self.exit, exit, "{all}");
+    }
+
+    /// The value of a metric on a device.
+    fn value(&self, name: &str, subject: &str, metric: &str) -> Option<f64> {
+        let attempts = self.check(name)["attempts"].as_array().unwrap();
+        let parts = attempts.last()?["parts"].as_array().unwrap();
+        let part = parts.iter().find(|p| p["subject"] == subject)?;
+        let measured = part["measurements"].as_array().unwrap();
+        measured.iter().find(|m| m["metric"] == metric)?["value"].as_f64()
+    }
+}
+
+impl Nights {
+    fn start() -> Option<Self> {
+        let bench = match EmulatedBench::start(&BenchConfig::default()) {
+            Ok(bench) => bench,
+            Err(BenchError::Box(reason)) => {
+                eprintln!("skipped: no emulated bench: {reason}");
+                return None;
+            }
+            Err(e) => panic!("{e}"),
+        };
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join("suite.yaml"), SUITE).unwrap();
+        fs::write(folder.path().join("rig.yaml"), RIG).unwrap();
+        Some(Self { bench, folder })
+    }
+
+    /// Makes these checks of the suite.
+    fn night(&self, only: &str) -> Seen {
+        self.night_in(only, &self.folder.path().join("nights"))
+    }
+
+    fn night_in(&self, only: &str, out: &Path) -> Seen {
+        let place = |name: &str| self.folder.path().join(name);
+        let mut command: Command = self.bench.command(SKINRIG).unwrap();
+        command
+            .args(["hil", "run", "--json", "--only", only])
+            .arg(place("suite.yaml"))
+            .arg("--rig")
+            .arg(place("rig.yaml"))
+            .arg("--out")
+            .arg(out);
+        let output = command.output().unwrap();
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        let night = serde_json::from_slice(&output.stdout)
+            .unwrap_or_else(|e| panic!("{e}: {} {said}", output.status));
+        Seen {
+            exit: output.status.code().unwrap(),
+            night,
+            said,
+        }
+    }
+
+    fn camera(&self, camera: CameraId, order: Order) {
+        let remote = self.bench.bus().remote().unwrap();
+        remote.order(CAMERA_SERIALS[camera.index()], order).unwrap();
+    }
+}
+
+/// A tiny disk, unmounted with this value; `None` where that is not allowed.
+struct TinyDisk(PathBuf);
+
+impl TinyDisk {
+    fn mount(at: PathBuf) -> Option<Self> {
+        fs::create_dir(&at).unwrap();
+        let mut command = Command::new("mount");
+        command
+            .args(["-t", "tmpfs", "-o", "size=4m", "tiny"])
+            .arg(&at);
+        let mounted = command.output().is_ok_and(|o| o.status.success());
+        mounted.then_some(Self(at))
+    }
+}
+
+impl Drop for TinyDisk {
+    fn drop(&mut self) {
+        let _ = Command::new("umount").arg(&self.0).status();
+    }
+}
+
+#[test]
+fn a_fault_in_each_device_makes_the_right_check_fail() {
+    let Some(mut nights) = Nights::start() else {
+        return;
+    };
+    healthy(&nights);
+    cameras(&nights);
+    wires(&nights);
+    robot(&nights);
+    trigger_box(&mut nights);
+    disk(&nights);
+    // Last: this arm stays as it is then.
+    nights
+        .bench
+        .arm()
+        .inject(When::Now, Fault::PowerLoss)
+        .unwrap();
+    let seen = nights.night("robot_state,repeatability");
+    seen.is(4, "robot_state", "INVALID", "rig", &[("state", "robot")]);
+    // The arm is not moved before it is initialised.
+    assert_eq!(
+        seen.check("repeatability")["verdict"],
+        "INVALID",
+        "{}",
+        seen.said
+    );
+}
+
+fn healthy(nights: &Nights) {
+    let all = "identity,settings,disk,trigger_loopback,test_pattern,robot_state,repeatability,step_response,depth,force_ceiling,\
+               watchdog_drill,stop_drill";
+    let seen = nights.night(all);
+    for name in all.split(',') {
+        let verdict = &seen.check(name)["verdict"];
+        assert_eq!(verdict, "PASS", "{:#}\n{}", seen.check(name), seen.said);
+    }
+    assert_eq!(seen.exit, 0, "{}", seen.said);
+    // A touch is told at 0.2 N, which this skin of 500 N/m gives 0.4 mm deep.
+    let surface_mm = seen.value("depth", "robot", "surface").unwrap();
+    assert!((0.2..0.6).contains(&surface_mm), "{surface_mm}");
+    let peak_n = seen.value("force_ceiling", "robot", "peak").unwrap();
+    assert!((0.9..1.5).contains(&peak_n), "{peak_n}");
+    assert!(
+        seen.value("watchdog_drill", "robot", "braked_within")
+            .is_some()
+    );
+}
+
+fn cameras(nights: &Nights) {
+    nights.camera(CameraId::Two, Order::Unplug);
+    let seen = nights.night("identity");
+    seen.is(
+        3,
+        "identity",
+        "FAIL",
+        "infrastructure",
+        &[("absent", "camera2")],
+    );
+    nights.camera(CameraId::Two, Order::Plug);
+    // A generator of the biases.
+    nights.camera(CameraId::One, Order::Stick(0x0354));
+    let seen = nights.night("settings");
+    seen.is(4, "settings", "INVALID", "rig", &[("read_back", "camera1")]);
+    nights.camera(CameraId::One, Order::Unplug);
+    nights.camera(CameraId::One, Order::Plug);
+}
+
+fn wires(nights: &Nights) {
+    for wire in [Wire::Cut, Wire::Leaky] {
+        nights.bench.wire(CameraId::Two, wire);
+        let seen = nights.night("trigger_loopback");
+        let fault = [("trigger_fault", "camera2")];
+        seen.is(4, "trigger_loopback", "INVALID", "rig", &fault);
+        let lost = seen.value("trigger_loopback", "camera2", "lost_pulses");
+        assert!(lost > Some(0.0), "{wire:?}: {}", seen.said);
+        let lost = seen.value("trigger_loopback", "camera1", "lost_pulses");
+        assert_eq!(lost, Some(0.0), "{wire:?}: {}", seen.said);
+    }
+    nights.bench.wire(CameraId::Two, Wire::Whole);
+}
+
+fn robot(nights: &Nights) {
+    let arm = nights.bench.arm();
+    arm.inject(When::IntoMove(0.1), Fault::Jammed).unwrap();
+    let seen = nights.night("repeatability");
+    seen.is(4, "repeatability", "INVALID", "rig", &[("state", "robot")]);
+    arm.clear_faults().unwrap();
+    arm.inject(When::IntoMove(1.0), Fault::Unplug).unwrap();
+    let seen = nights.night("repeatability");
+    seen.is(
+        4,
+        "repeatability",
+        "INVALID",
+        "rig",
+        &[("device_lost", "robot")],
+    );
+    arm.clear_faults().unwrap();
+    // Half a newton that nobody exerts, on the way down: the touch is told above the skin.
+    let offset = Fault::ForceOffset([0.0, 0.0, -0.5]);
+    arm.inject(When::Below(SURFACE_M + 0.0009), offset).unwrap();
+    let seen = nights.night("depth");
+    seen.is(1, "depth", "FAIL", "rig", &[]);
+    assert!(
+        seen.value("depth", "robot", "surface") > Some(0.6),
+        "{}",
+        seen.said
+    );
+    arm.clear_faults().unwrap();
+}
+
+fn trigger_box(nights: &mut Nights) {
+    nights.bench.trigger_box().unplug().unwrap();
+    let seen = nights.night("identity");
+    seen.is(
+        3,
+        "identity",
+        "FAIL",
+        "infrastructure",
+        &[("absent", "trigger box")],
+    );
+    nights.bench.trigger_box().plug().unwrap();
+    let noise = NoisePerMillion {
+        flip: 30_000,
+        ..NoisePerMillion::default()
+    };
+    nights.bench.trigger_box().noise(1, noise).unwrap();
+    let seen = nights.night("trigger_loopback");
+    let check = seen.check("trigger_loopback");
+    assert!(
+        check["cause"] == "rig" && seen.exit == 4,
+        "{check:#}\n{}",
+        seen.said
+    );
+    nights
+        .bench
+        .trigger_box()
+        .noise(1, NoisePerMillion::default())
+        .unwrap();
+    let other = RIG.replace("  port: ", "  firmware: \"9.9.9\"\n  port: ");
+    let rig = nights.folder.path().join("rig.yaml");
+    fs::write(&rig, other).unwrap();
+    let seen = nights.night("identity");
+    seen.is(
+        4,
+        "identity",
+        "INVALID",
+        "rig",
+        &[("other_device", "trigger box")],
+    );
+    fs::write(&rig, RIG).unwrap();
+}
+
+fn disk(nights: &Nights) {
+    let Some(tiny) = TinyDisk::mount(nights.folder.path().join("tiny")) else {
+        eprintln!("skipped: no full disk: this user may not mount a small one");
+        return;
+    };
+    let seen = nights.night_in("disk", &tiny.0);
+    seen.is(3, "disk", "FAIL", "infrastructure", &[("disk", "computer")]);
+}
