@@ -28,8 +28,9 @@ use rustix::time::{ClockId, clock_gettime};
 /// How far cameras lag behind the present at least, ns.
 pub const LATENCY_NS: i64 = 2_000_000;
 
-/// How long tip positions are remembered, ns.
-const REMEMBERED_NS: i64 = 2_000_000_000;
+/// How long tip positions are remembered, ns: as long as a camera may lag behind a source that is late. One that finds its press
+/// forgotten would see nothing but noise.
+const REMEMBERED_NS: i64 = 60_000_000_000;
 
 /// How long edges are remembered that no camera takes, ns.
 const EDGES_REMEMBERED_NS: i64 = 60_000_000_000;
@@ -315,6 +316,17 @@ mod tests {
             let said = world.obey(1, bad).unwrap_err();
             assert!(said.contains("expected") && said.contains(bad), "{said}");
         }
+    }
+
+    #[test]
+    fn a_camera_that_waited_long_for_a_late_source_still_finds_the_tip() {
+        let world = World::default();
+        let late = 10_000_000_000;
+        for (at_ns, z_mm) in [(0, -1.0), (1_000_000_000, 5.0), (late, 5.0)] {
+            let position_mm = [0.0, 0.0, z_mm];
+            world.tip(Tip { at_ns, position_mm });
+        }
+        assert_eq!(world.tip_at(0), Some([0.0, 0.0, -1.0]));
     }
 
     #[test]
