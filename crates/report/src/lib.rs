@@ -22,6 +22,7 @@ pub mod provenance;
 pub mod published;
 pub mod svg;
 pub mod tradeoff;
+pub mod trend;
 
 mod detector;
 mod document;

@@ -10,6 +10,7 @@ mod write;
 use std::path::{Path, PathBuf};
 
 use skinrig_nightly::Night;
+use skinrig_nightly::trend::derived::RATIOS;
 use skinrig_nightly::trend::{Acceptance, History, NightHead};
 use tokio::runtime::Runtime;
 
@@ -148,7 +149,10 @@ pub fn accept(path: &Path, history: &History, said: &Acceptance) -> Result<(), H
             format!("none of that name; the newest is {newest}"),
         ));
     };
-    let known = |name: &String| history.series.iter().any(|s| s.name == *name);
+    let known = |name: &String| {
+        let derived = RATIOS.iter().any(|r| r.name == name);
+        derived || history.series.iter().any(|s| s.name == *name)
+    };
     if let Some(name) = said.series.as_ref().filter(|name| !known(name)) {
         return Err(not_there(
             format!("a series {name}"),

@@ -1,5 +1,7 @@
 //! `skinrig hil`: a suite of checks on a bench.
 
+pub mod accept;
+mod alarms;
 pub mod args;
 pub mod bench;
 mod drill;
@@ -11,6 +13,7 @@ pub mod lease;
 mod live;
 pub mod run;
 mod run_fault;
+pub mod trend;
 mod trouble;
 
 use crate::exit::Outcome;
@@ -24,5 +27,7 @@ pub fn hil(args: &HilArgs, command_line: &str, json: bool) -> Outcome {
     match &args.command {
         HilCommand::Lease(a) => lease::lease(a, json),
         HilCommand::Run(a) => run::run(a, command_line, json),
+        HilCommand::Trend(a) => trend::trend(a, json),
+        HilCommand::Accept(a) => accept::accept(a, json),
     }
 }

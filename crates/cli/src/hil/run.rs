@@ -17,7 +17,7 @@ use skinrig_report::night::{self, span};
 use super::args::HilRunArgs;
 use super::bench::RealBench;
 use super::live::{self, Live};
-use super::{folder, lease};
+use super::{folder, lease, trend};
 use crate::check;
 use crate::exit::{Exit, Failure, Outcome};
 use crate::rig::bench;
@@ -82,7 +82,12 @@ pub fn run(args: &HilRunArgs, command_line: &str, json: bool) -> Outcome {
         outln!("{}", folder.join(folder::PAGE).display());
     }
     match unwritten.map_or(kept, Err) {
-        Ok(()) => Ok(Exit::Night(night.exit)),
+        Ok(trend) => {
+            if let Some(headline) = trend.filter(|_| !json) {
+                outln!("trend: {headline}");
+            }
+            Ok(Exit::Night(night.exit))
+        }
         Err(why) => Err(Failure::rig(format!(
             "{}: {why}\n  next: make room or choose another folder with --out; what was measured is above",
             folder.display()
@@ -91,17 +96,14 @@ pub fn run(args: &HilRunArgs, command_line: &str, json: bool) -> Outcome {
 }
 
 /// Writes the finished night in its other forms, and adds it to the history.
-fn keep(night: &Night, folder: &Path, history: Option<&Path>) -> Result<(), String> {
+fn keep(night: &Night, folder: &Path, history: Option<&Path>) -> Result<Option<String>, String> {
     let page = night::html(night).map_err(|e| e.to_string())?;
     let xml = skinrig_nightly::junit::junit(night, &host_name());
     for (name, text) in [(folder::PAGE, page), (folder::JUNIT, xml)] {
         folder::write(folder, name, &text).map_err(|e| format!("{name}: {e}"))?;
     }
-    if let Some(history) = history {
-        skinrig_hil::history::append(history, night, folder)
-            .map_err(|e| format!("--history: {e}"))?;
-    }
-    Ok(())
+    let trend = history.map(|history| trend::after(history, night, folder));
+    trend.transpose().map_err(|e| format!("--history: {e}"))
 }
 
 fn load(path: &Path) -> Result<Suite, Failure> {

@@ -168,14 +168,14 @@ pub fn moved_by(excursion: &Excursion, unit: &str) -> String {
     }
 }
 
-/// A number with four significant figures, and as many places as that takes.
+/// A number with four significant figures; with an exponent from 10,000 up and below 0.001.
 #[must_use]
 pub fn figure(value: f64) -> String {
     if value == 0.0 || !value.is_finite() {
         return value.to_string();
     }
     let places = 3 - value.abs().log10().floor() as i32;
-    if !(0..=9).contains(&places) {
+    if !(0..=6).contains(&places) {
         return format!("{value:.3e}").replace(".000e", "e");
     }
     let text = format!("{value:.*}", places as usize);

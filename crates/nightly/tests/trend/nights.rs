@@ -1,5 +1,4 @@
 //! Nights of a bench that is well, and of one that is not: numbers as a suite gives them, from a seed.
-#![allow(dead_code)]
 
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
@@ -330,11 +329,16 @@ pub fn head(at: usize) -> NightHead {
     }
 }
 
-/// Two in the morning of day number `at` of months of 30 days.
+/// Two in the morning, so many days after the first of January 2025.
 pub fn date(at: usize) -> String {
-    let (year, month, day) = (2026 + at / 360, at / 30 % 12 + 1, at % 30 + 1);
-    let day = if month == 2 { day.min(28) } else { day };
-    format!("{year}-{month:02}-{day:02}T02:00:00Z")
+    const DAYS: [usize; 12] = [31, 28, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31];
+    let (year, mut day) = (2025 + at / 365, at % 365);
+    let mut month = 0;
+    while day >= DAYS[month] {
+        day -= DAYS[month];
+        month += 1;
+    }
+    format!("{year}-{:02}-{:02}T02:00:00Z", month + 1, day + 1)
 }
 
 impl Metric {

@@ -1,0 +1,128 @@
+//! What is kept of an alarm: the golden session of the night that raised it, beside the history, where it stays when old nights are
+//! cleared away.
+
+use std::path::{Path, PathBuf};
+
+use skinrig_hil::history;
+use skinrig_nightly::trend::{Alarm, Report};
+use skinrig_recorder::SessionReader;
+use skinrig_report::trend::Links;
+
+use super::folder;
+
+/// The files of an alarm.
+#[derive(Debug)]
+pub struct Kept {
+    /// The page of the night that raised it.
+    page: Option<PathBuf>,
+    /// The session that shows it, or why there is none.
+    pub session: Result<PathBuf, String>,
+}
+
+/// Keeps the session of every alarm in `alarms/NIGHT/` beside the history, once; one entry per alarm.
+pub fn keep(history: &Path, report: &Report) -> Vec<Kept> {
+    let one = |alarm: &Alarm| {
+        let night = &report.nights[alarm.raised];
+        let home = history::folder_of(history, &night.folder);
+        let page = home.join(folder::PAGE);
+        let kept = history::folder_of(history, "alarms").join(plain(&alarm.id));
+        let session = match &night.golden {
+            Some(golden) => copy(&home.join(golden), &kept),
+            None => Err("that night has no golden session".to_owned()),
+        };
+        Kept {
+            page: page.is_file().then_some(page),
+            session,
+        }
+    };
+    report.alarms.iter().map(one).collect()
+}
+
+/// Copies a sealed session into `folder`, unless it is there.
+fn copy(session: &Path, folder: &Path) -> Result<PathBuf, String> {
+    let name = session.file_name().unwrap_or_default();
+    let to = folder.join(name);
+    if to.is_file() {
+        return Ok(to);
+    }
+    let seal = SessionReader::open(session).and_then(|reader| reader.seal());
+    match seal {
+        Ok(Some(_)) => {}
+        Ok(None) => return Err(format!("{} is not sealed", session.display())),
+        Err(e) => return Err(e.to_string()),
+    }
+    let part = folder.join("part");
+    let copied = std::fs::create_dir_all(folder)
+        .and_then(|()| std::fs::copy(session, &part))
+        .and_then(|_| std::fs::rename(&part, &to));
+    match copied {
+        Ok(()) => Ok(to),
+        Err(e) => Err(format!("{}: {e}", to.display())),
+    }
+}
+
+/// An id as a part of a file name.
+fn plain(id: &str) -> String {
+    let safe = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
+    let name: String = id.chars().map(|c| if safe(c) { c } else { '-' }).collect();
+    name.trim_start_matches('.').to_owned()
+}
+
+impl Kept {
+    /// As links of a page in `folder`; `None`: of no page.
+    pub fn links(&self, folder: Option<&Path>) -> Links {
+        let session = self.session.as_ref().ok();
+        let commands = session.map_or_else(Vec::new, |path| {
+            let path = quoted(path);
+            vec![
+                format!("skinrig run --replay {path}"),
+                format!("skinrig verify {path}"),
+            ]
+        });
+        let href = |path: &Path| folder.map(|folder| href(folder, path));
+        Links {
+            night: self.page.as_deref().and_then(href),
+            session: session.and_then(|p| href(p)),
+            commands,
+            missing: self.session.as_ref().err().cloned(),
+        }
+    }
+}
+
+/// A path as a shell takes it.
+fn quoted(path: &Path) -> String {
+    let text = path.display().to_string();
+    let plain = |c: char| c.is_ascii_alphanumeric() || "-_./:+".contains(c);
+    if text.chars().all(plain) {
+        text
+    } else {
+        format!("'{}'", text.replace('\'', "'\\''"))
+    }
+}
+
+/// The link to `path` from a page in `folder`: relative when it lies below, so that both can be moved together.
+fn href(folder: &Path, path: &Path) -> String {
+    let full = |p: &Path| {
+        let p = if p.as_os_str().is_empty() {
+            Path::new(".")
+        } else {
+            p
+        };
+        std::fs::canonicalize(p).unwrap_or_else(|_| p.to_owned())
+    };
+    let (folder, path) = (full(folder), full(path));
+    let (scheme, path) = match path.strip_prefix(&folder) {
+        Ok(below) => ("", below.to_owned()),
+        Err(_) => ("file://", path),
+    };
+    let plain = |b: u8| b.is_ascii_alphanumeric() || b"-_./~".contains(&b);
+    let text = path.display().to_string();
+    let each = text.bytes().map(|b| {
+        if plain(b) {
+            char::from(b).to_string()
+        } else {
+            format!("%{b:02X}")
+        }
+    });
+    scheme.to_owned() + &each.collect::<String>()
+}

@@ -1,0 +1,173 @@
+//! `skinrig hil trend`: what moved over the nights, since when, and why, probably.
+
+use std::io::IsTerminal;
+use std::path::{Path, PathBuf};
+
+use skinrig_hil::history::{self, Appended, Filter, HistoryError};
+use skinrig_nightly::trend::{History, Report, judge};
+use skinrig_nightly::{Night, NightExit};
+use skinrig_report::trend::{Links, Style, page, terminal};
+
+use super::alarms;
+use super::args::HilTrendArgs;
+use super::folder;
+use crate::exit::{Exit, Failure, Outcome};
+
+/// `skinrig hil trend`.
+///
+/// # Errors
+/// [`Failure::input`] for a file that is no history, a bench or a series that is not in it; [`Failure::internal`] when something
+/// cannot be written.
+pub fn trend(args: &HilTrendArgs, json: bool) -> Outcome {
+    if let Some(folder) = &args.rebuild {
+        rebuild(&args.history, folder)?;
+    }
+    let (history, report) = judged(args)?;
+    let pattern = args.series.as_deref().unwrap_or("*");
+    let shown = |name: &str| matches(pattern, name);
+    if args.series.is_some() && !report.charts.iter().any(|c| shown(&c.series.name)) {
+        return Err(Failure::input(format!(
+            "--series: expected part of the name of a series, or a pattern with `*`, found `{pattern}`, which none of {} has; \
+             without --series all are listed",
+            report.charts.len()
+        )));
+    }
+    let kept = alarms::keep(&args.history, &report);
+    if let Some(file) = &args.html {
+        let links: Vec<Links> = kept.iter().map(|k| k.links(file.parent())).collect();
+        let html = page(&report, &links, &history.accepted);
+        std::fs::write(file, html)
+            .map_err(|e| Failure::internal(format!("{}: {e}", file.display())))?;
+    }
+    if json {
+        let mut value = serde_json::to_value(&report).map_err(Failure::internal)?;
+        value["accepted"] = serde_json::to_value(&history.accepted).map_err(Failure::internal)?;
+        let sessions: Vec<_> = kept.iter().map(|k| k.session.as_ref().ok()).collect();
+        value["sessions"] = serde_json::to_value(sessions).map_err(Failure::internal)?;
+        crate::print_json(&value);
+    } else {
+        let links: Vec<Links> = kept.iter().map(|k| k.links(None)).collect();
+        let style = Style {
+            unicode: !args.ascii && is_unicode(),
+            color: std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none(),
+            nights: args.nights,
+        };
+        let text = terminal(&report, &links, shown, style);
+        outln!("{}", text.trim_end());
+        if let Some(file) = &args.html {
+            outln!("\n{}", file.display());
+        }
+    }
+    Ok(Exit::Night(if report.alarms.is_empty() {
+        NightExit::Pass
+    } else {
+        NightExit::Fail
+    }))
+}
+
+fn judged(args: &HilTrendArgs) -> Result<(History, Report), Failure> {
+    let filter = Filter {
+        rig: args.rig.clone(),
+        suite: args.suite.clone(),
+    };
+    let history = history::load(&args.history, &filter).map_err(Failure::input)?;
+    let report = judge(&history);
+    Ok((history, report))
+}
+
+/// Adds the nights in the folders of `nights` to the history.
+fn rebuild(path: &Path, nights: &Path) -> Result<(), Failure> {
+    let cannot = |e| Failure::input(format!("--rebuild: {}: {e}", nights.display()));
+    let entries = std::fs::read_dir(nights).map_err(cannot)?;
+    let entries = entries.map(|e| e.map(|e| e.path().join(folder::JSON)));
+    let mut found: Vec<PathBuf> = entries.collect::<Result<_, _>>().map_err(cannot)?;
+    found.retain(|json| json.is_file());
+    found.sort();
+    let (mut new, mut known, mut left) = (0, 0, 0);
+    for json in &found {
+        let night = history::read_night(json);
+        let home = json.parent().unwrap_or(nights);
+        match night.and_then(|night| history::append(path, &night, home)) {
+            Ok(Appended::New) => new += 1,
+            Ok(Appended::Known) => known += 1,
+            Err(e @ (HistoryError::NoNight { .. } | HistoryError::OtherNight { .. })) => {
+                left += 1;
+                errln!("warning: left out: {e}");
+            }
+            Err(e) => return Err(Failure::input(e)),
+        }
+    }
+    if found.is_empty() {
+        return Err(Failure::input(format!(
+            "--rebuild: {}: expected folders with a {}, found none",
+            nights.display(),
+            folder::JSON
+        )));
+    }
+    errln!("{new} nights added, {known} were there, {left} left out");
+    Ok(())
+}
+
+/// Whether `name` has the pattern: with `*` for anything as a whole, without one as a part.
+fn matches(pattern: &str, name: &str) -> bool {
+    if !pattern.contains('*') {
+        return name.contains(pattern);
+    }
+    let mut parts = pattern.split('*');
+    let Some(mut rest) = parts.next().and_then(|first| name.strip_prefix(first)) else {
+        return false;
+    };
+    let parts: Vec<&str> = parts.collect();
+    let Some((last, middle)) = parts.split_last() else {
+        return rest.is_empty();
+    };
+    for part in middle {
+        match rest.find(part) {
+            Some(at) => rest = &rest[at + part.len()..],
+            None => return false,
+        }
+    }
+    rest.ends_with(last)
+}
+
+/// Whether the terminal takes more than ASCII, by the locale's own variables, strongest first.
+fn is_unicode() -> bool {
+    let set = |key| std::env::var(key).ok().filter(|v| !v.is_empty());
+    let locale = ["LC_ALL", "LC_CTYPE", "LANG"].into_iter().find_map(set);
+    locale.is_some_and(|l| l.to_lowercase().replace('-', "").contains("utf8"))
+}
+
+/// Adds a night to the history in `path`, and says what the trends make of it.
+pub(super) fn after(path: &Path, night: &Night, home: &Path) -> Result<String, HistoryError> {
+    history::append(path, night, home)?;
+    let filter = Filter {
+        rig: Some(night.rig.clone()),
+        suite: Some(night.suite.clone()),
+    };
+    let report = judge(&history::load(path, &filter)?);
+    // Whether sessions of alarms could be kept is told by `hil trend`, which tries again.
+    alarms::keep(path, &report);
+    Ok(report.headline)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::matches;
+
+    #[test]
+    fn patterns_are_parts_or_wholes() {
+        for (pattern, name, expected) in [
+            ("*", "a/b/c", true),
+            ("b/", "a/b/c", true),
+            ("x", "a/b/c", false),
+            ("a*c", "a/b/c", true),
+            ("a*b", "a/b/c", false),
+            ("*b*", "a/b/c", true),
+            ("golden/*/located", "golden/skin/located", true),
+            ("b*", "a/b/c", false),
+            ("a*bb*b", "a/bb", false),
+        ] {
+            assert_eq!(matches(pattern, name), expected, "{pattern} {name}");
+        }
+    }
+}

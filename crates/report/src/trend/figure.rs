@@ -1,0 +1,169 @@
+//! Owns the drawing of one control chart.
+
+use skinrig_nightly::trend::report::{day, figure as number};
+use skinrig_nightly::trend::{Chart, Report};
+
+use crate::axes::{Axes, Scale};
+use crate::svg::{Px, Svg, dots, polyline};
+
+/// Size of a chart of an alarm and of a chart in the table, px.
+const LARGE: (f64, f64) = (860.0, 250.0);
+const SMALL: (f64, f64) = (330.0, 46.0);
+/// Around the large one: left, right, top, bottom.
+const MARGINS: (f64, f64, f64, f64) = (84.0, 16.0, 14.0, 46.0);
+
+/// The values that must be seen, and a little room.
+fn range(chart: &Chart, limits: bool) -> (f64, f64) {
+    let values = chart.nights.iter().map(|n| n.value);
+    let reference = chart.reference.iter();
+    let around = reference.flat_map(|r| [r.centre - 3.0 * r.below, r.centre + 3.0 * r.above]);
+    let mut all: Vec<f64> = values.chain(around).collect();
+    let (low, high) = ends(&all);
+    // A limit that is far away would press everything else into a line.
+    let near = |v: &f64| limits && (*v - low).abs().min((*v - high).abs()) <= high - low;
+    let last = chart.series.points.iter().rev().find_map(|p| p.limit);
+    let stated = last.into_iter().flat_map(|l| [l.at_least, l.at_most]);
+    all.extend(stated.flatten().filter(near));
+    let (low, high) = ends(&all);
+    let room = 0.06 * (high - low);
+    (low - room, high + room)
+}
+
+fn ends(values: &[f64]) -> (f64, f64) {
+    let low = values.iter().copied().fold(f64::INFINITY, f64::min);
+    let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    if low < high {
+        (low, high)
+    } else {
+        (low - 0.5, low + 0.5)
+    }
+}
+
+/// The chart of a series that moved, over all nights.
+pub(super) fn large(report: &Report, chart: &Chart) -> String {
+    let (width, height) = LARGE;
+    let (left, right, top, bottom) = MARGINS;
+    let nights = report.nights.len();
+    let axes = Axes {
+        x: Scale::new((-0.5, nights as f64 - 0.5), (left, width - right)),
+        y: Scale::new(range(chart, true), (height - bottom, top)),
+        x_label: "night".to_owned(),
+        y_label: unit_of(chart),
+        tick_count: (0, 5),
+    };
+    let mut svg = begin(chart, LARGE);
+    // Days along the axis, ends included.
+    let step = (nights / 7).max(1);
+    let days = (0..nights).step_by(step);
+    let days: Vec<_> = days
+        .map(|n| (n as f64, day(&report.nights[n]).to_owned()))
+        .collect();
+    let ys = crate::axes::ticks(axes.y.data.0, axes.y.data.1, 5);
+    let ys: Vec<_> = ys.into_iter().map(|y| (y, number(y))).collect();
+    axes.draw_with(&mut svg, &days, &ys);
+    marks(&mut svg, chart, axes.x, axes.y, true);
+    svg.close();
+    svg.finish()
+}
+
+/// The chart in the table: no axes.
+pub(super) fn small(report: &Report, chart: &Chart) -> String {
+    let (width, height) = SMALL;
+    let x = Scale::new((-0.5, report.nights.len() as f64 - 0.5), (2.0, width - 2.0));
+    let y = Scale::new(range(chart, false), (height - 2.0, 2.0));
+    let mut svg = begin(chart, SMALL);
+    marks(&mut svg, chart, x, y, false);
+    svg.close();
+    svg.finish()
+}
+
+fn unit_of(chart: &Chart) -> String {
+    match chart.series.unit.as_str() {
+        "" => "count".to_owned(),
+        unit => unit.to_owned(),
+    }
+}
+
+fn begin(chart: &Chart, (width, height): (f64, f64)) -> Svg {
+    let mut svg = Svg::new();
+    svg.open(
+        "svg",
+        &[
+            ("class", &"fig"),
+            ("viewBox", &format_args!("0 0 {width} {height}")),
+            ("width", &width),
+            ("height", &height),
+            ("role", &"img"),
+        ],
+    );
+    svg.holding(
+        "title",
+        &[],
+        &format!("{} over the nights", chart.series.name),
+    );
+    svg
+}
+
+/// Band of the reference, limits, changes, values.
+fn marks(svg: &mut Svg, chart: &Chart, x: Scale, y: Scale, large: bool) {
+    let (left, right) = (x.px.0, x.px.1);
+    if let Some(r) = chart.reference {
+        // Two standard deviations of a new night: about where three nights in a row raise an alarm.
+        let per = 2.0 / r.score(r.centre + r.above).max(1e-9);
+        let (high, low) = (
+            y.at(r.centre + per * r.above),
+            y.at(r.centre - per * r.below),
+        );
+        svg.leaf(
+            "rect",
+            &[
+                ("class", &"band on"),
+                ("x", &Px(left)),
+                ("y", &Px(high)),
+                ("width", &Px(right - left)),
+                ("height", &Px(low - high)),
+            ],
+        );
+        svg.line("axis", (left, y.at(r.centre)), (right, y.at(r.centre)));
+    }
+    let last = chart.series.points.iter().rev().find_map(|p| p.limit);
+    for limit in last
+        .into_iter()
+        .flat_map(|l| [l.at_least, l.at_most])
+        .flatten()
+    {
+        if large && limit > y.data.0 && limit < y.data.1 {
+            svg.line("ref2", (left, y.at(limit)), (right, y.at(limit)));
+            svg.text(
+                (right - 4.0, y.at(limit) - 4.0),
+                "note",
+                "end",
+                &format!("limit {}", number(limit)),
+            );
+        }
+    }
+    for night in &chart.accepted {
+        let at = x.at(*night as f64 - 0.5);
+        svg.line("ref2", (at, y.px.0), (at, y.px.1));
+    }
+    for e in &chart.excursions {
+        let at = x.at(e.change.likeliest as f64 - 0.5);
+        svg.line("ref", (at, y.px.0), (at, y.px.1));
+    }
+    let place = |n: &skinrig_nightly::trend::Charted| (x.at(n.night as f64), y.at(n.value));
+    let off = |night: usize| {
+        chart
+            .excursions
+            .iter()
+            .any(|e| night >= e.change.likeliest && e.ended.is_none_or(|end| night <= end))
+    };
+    let (bad, good): (Vec<_>, Vec<_>) = chart.nights.iter().partition(|n| off(n.night));
+    let line = if large { "line marks" } else { "line dot-ink" };
+    svg.path(line, &polyline(chart.nights.iter().map(place), false));
+    if large {
+        svg.path("dots dot-ink", &dots(good.into_iter().map(place)));
+        svg.path("dots mid c2", &dots(bad.into_iter().map(place)));
+    } else {
+        svg.path("dots c2", &dots(bad.into_iter().map(place)));
+    }
+}

@@ -1,0 +1,201 @@
+//! Owns the trends for a terminal: 80 columns, one line per series, a chart per series that moved.
+
+use std::fmt::Write as _;
+
+use skinrig_nightly::trend::report::figure as number;
+use skinrig_nightly::trend::{Chart, Report};
+
+use super::{Links, cause, moved, since, state, with_unit};
+use crate::terminal::plain;
+
+const WIDTH: usize = 80;
+/// Nights of a line of blocks.
+const SPARK: usize = 20;
+/// Columns and rows of a chart.
+const PLOT: (usize, usize) = (66, 9);
+/// Columns before it.
+const MARGIN: usize = 12;
+/// Series of one alarm that get a chart; the others have their lines.
+const MOST_CHARTS: usize = 4;
+
+/// How it is drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Style {
+    /// The terminal shows more than ASCII.
+    pub unicode: bool,
+    /// It shows colours.
+    pub color: bool,
+    /// Nights that are shown, at most.
+    pub nights: usize,
+}
+
+/// The trends of `report`: headline, alarms with charts of what moved, one line for each series whose name `shown` accepts. `links`:
+/// one per alarm.
+#[must_use]
+pub fn terminal(
+    report: &Report,
+    links: &[Links],
+    shown: impl Fn(&str) -> bool,
+    style: Style,
+) -> String {
+    let mut out = String::new();
+    let (bold, end) = if style.color {
+        ("\u{1b}[1m", "\u{1b}[0m")
+    } else {
+        ("", "")
+    };
+    for line in wrapped(&report.headline, 0) {
+        let _ = writeln!(out, "{bold}{line}{end}");
+    }
+    for (alarm, links) in report.alarms.iter().zip(links) {
+        let _ = writeln!(
+            out,
+            "\n{bold}alarm {}{end}: {}",
+            plain(&alarm.id),
+            since(report, alarm)
+        );
+        for line in wrapped(&format!("probable cause: {}", cause(alarm)), 2) {
+            let _ = writeln!(out, "{line}");
+        }
+        for changed in &alarm.attribution.changed {
+            let _ = writeln!(out, "  changed: {}", plain(changed));
+        }
+        for command in &links.commands {
+            let _ = writeln!(out, "  {command}");
+        }
+        if let Some(missing) = &links.missing {
+            let _ = writeln!(out, "  no session: {}", plain(missing));
+        }
+        for at in alarm.charts.iter().take(MOST_CHARTS) {
+            out.push('\n');
+            plot(&mut out, report, &report.charts[*at], style);
+        }
+    }
+    let charts = report.charts.iter().filter(|c| shown(&c.series.name));
+    let charts: Vec<&Chart> = charts.collect();
+    if !charts.is_empty() {
+        let _ = writeln!(
+            out,
+            "\n{:<36} {:<SPARK$} {:>13}  state",
+            "series",
+            format!("last {} nights", SPARK.min(style.nights)),
+            "last"
+        );
+    }
+    for chart in charts {
+        line(&mut out, report, chart, style);
+    }
+    out
+}
+
+fn line(out: &mut String, report: &Report, chart: &Chart, style: Style) {
+    let name: String = plain(&chart.series.name).chars().take(36).collect();
+    let last = chart.nights.last();
+    let last = last.map_or_else(
+        || "-".to_owned(),
+        |n| with_unit(n.value, &chart.series.unit),
+    );
+    let (bold, end) = if style.color && chart.off().is_some() {
+        ("\u{1b}[1m", "\u{1b}[0m")
+    } else {
+        ("", "")
+    };
+    let _ = writeln!(
+        out,
+        "{bold}{name:<36} {:<SPARK$} {last:>13}  {}{end}",
+        spark(report, chart, style),
+        state(chart)
+    );
+}
+
+/// A block per night, the centre of the reference in the middle; a space for a night without a value.
+fn spark(report: &Report, chart: &Chart, style: Style) -> String {
+    let blocks: Vec<char> = if style.unicode {
+        "▁▂▃▄▅▆▇█"
+    } else {
+        "_.,-=+*#"
+    }
+    .chars()
+    .collect();
+    let from = report.nights.len().saturating_sub(SPARK.min(style.nights));
+    (from..report.nights.len())
+        .map(|night| {
+            let found = chart.nights.binary_search_by_key(&night, |n| n.night);
+            let Ok(at) = found else { return ' ' };
+            let score = chart
+                .reference
+                .map_or(0.0, |r| r.score(chart.nights[at].value));
+            let place = (score.clamp(-4.0, 4.0) + 4.0) / 8.0 * (blocks.len() - 1) as f64;
+            blocks[place.round() as usize]
+        })
+        .collect()
+}
+
+/// A chart of one series: values, the centre of its reference, the night of the change.
+fn plot(out: &mut String, report: &Report, chart: &Chart, style: Style) {
+    let (columns, rows) = PLOT;
+    let (dot, centre, change) = if style.unicode {
+        ('●', '─', '┊')
+    } else {
+        ('o', '-', ':')
+    };
+    let count = report.nights.len().min(style.nights).min(columns);
+    let first = report.nights.len() - count;
+    let shown = chart.nights.iter().filter(|n| n.night >= first);
+    let shown: Vec<(usize, f64)> = shown.map(|n| (n.night - first, n.value)).collect();
+    let middle = chart.reference.map(|r| r.centre);
+    let all = || shown.iter().map(|s| s.1).chain(middle);
+    let (low, high) = (
+        all().fold(f64::INFINITY, f64::min),
+        all().fold(f64::NEG_INFINITY, f64::max),
+    );
+    let span = if high > low { high - low } else { 1.0 };
+    let row = |value: f64| {
+        let share = ((high - value) / span).clamp(0.0, 1.0);
+        (share * (rows - 1) as f64).round() as usize
+    };
+    let mut cells = vec![vec![' '; count]; rows];
+    if let Some(middle) = middle {
+        cells[row(middle)].fill(centre);
+    }
+    if let Some(at) = chart
+        .off()
+        .and_then(|e| e.change.likeliest.checked_sub(first))
+    {
+        for cells in &mut cells {
+            cells[at] = change;
+        }
+    }
+    for (at, value) in &shown {
+        cells[row(*value)][*at] = dot;
+    }
+    let _ = writeln!(out, "  {} ({})", plain(&chart.series.name), moved(chart));
+    for (at, cells) in cells.iter().enumerate() {
+        let label = match (at, middle) {
+            (0, _) => number(high),
+            (at, _) if at == rows - 1 => number(low),
+            (at, Some(middle)) if at == row(middle) => number(middle),
+            _ => String::new(),
+        };
+        let cells: String = cells.iter().collect();
+        let _ = writeln!(out, "{label:>MARGIN$} {}", cells.trim_end());
+    }
+}
+
+/// Lines of at most 80 columns, broken between words.
+fn wrapped(text: &str, indent: usize) -> Vec<String> {
+    let mut lines = vec![" ".repeat(indent)];
+    for word in plain(text).split(' ') {
+        let last = lines.len() - 1;
+        let empty = lines[last].trim().is_empty();
+        if !empty && lines[last].chars().count() + 1 + word.chars().count() > WIDTH {
+            lines.push(format!("{}{word}", " ".repeat(indent)));
+        } else {
+            if !empty {
+                lines[last].push(' ');
+            }
+            lines[last].push_str(word);
+        }
+    }
+    lines
+}
