@@ -253,8 +253,10 @@ impl<'a> Accumulator<'a> {
         // Stores every event and steps on for those in the crop: no branch to mispredict.
         let mut count = 0;
         for event in events {
-            // Never beyond the room, which is as long as the longest slice: the mask only tells so.
-            room[count % SLICE] = *event;
+            // Never beyond the room, which is as long as the longest slice: the mask only tells so. As a slice of one an event is
+            // copied whole, not field by field.
+            let at = count % SLICE;
+            room[at..=at].copy_from_slice(std::slice::from_ref(event));
             count += usize::from((low <= event.y) & (event.y <= high));
         }
         if let Some(rates) = &mut self.rates {
