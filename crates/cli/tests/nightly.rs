@@ -8,6 +8,7 @@
 )]
 
 use std::fs;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -37,7 +38,7 @@ checks:
   test_pattern: {duration: 1 s, rate: 500 kev/s, lost: {at_most: 0 B}, gaps: {at_most: 0}}
   robot_state: {faults: {at_most: 0}, creep: {at_most: 0.1 mm}}
   repeatability: {approaches: 2, spread: {at_most: 0.2 mm}, error: {at_most: 0.3 mm}}
-  step_response: {steps: 2, settling: {at_most: 1 s}, error: {at_most: 0.2 mm}}
+  step_response: {steps: 3, settling: {at_most: 1 s}, error: {at_most: 0.2 mm}}
   depth: {presses: 1, surface: {at_most: 0.6 mm}, error: {at_most: 0.2 mm}}
   force_ceiling: {force: 1 N, depth: 2.5 mm, peak: {at_most: 1.5 N}}
   watchdog_drill: {braked_within: {at_most: 10 s}, drop: {at_most: 50 mm}}
@@ -169,13 +170,29 @@ fn a_fault_in_each_device_makes_the_right_check_fail() {
     let Some(mut nights) = Nights::start() else {
         return;
     };
-    healthy(&nights);
-    cameras(&nights);
-    wires(&nights);
-    robot(&nights);
-    trigger_box(&mut nights);
-    disk(&nights);
-    // Last: this arm stays as it is then.
+    // Each group is made, whatever became of the ones before: one run tells all that is wrong.
+    let groups: [(&str, fn(&mut Nights)); 7] = [
+        ("healthy", |n| healthy(n)),
+        ("cameras", |n| cameras(n)),
+        ("wires", |n| wires(n)),
+        ("robot", |n| robot(n)),
+        ("trigger box", trigger_box),
+        ("disk", |n| disk(n)),
+        // Last: this arm stays as it is then.
+        ("not initialised", |n| not_initialised(n)),
+    ];
+    let made = groups.map(|(name, group)| {
+        let made = catch_unwind(AssertUnwindSafe(|| group(&mut nights)));
+        (name, made.is_ok())
+    });
+    let failed: Vec<&str> = made
+        .into_iter()
+        .filter_map(|(name, well)| (!well).then_some(name))
+        .collect();
+    assert_eq!(failed, [""; 0]);
+}
+
+fn not_initialised(nights: &Nights) {
     nights
         .bench
         .arm()
@@ -184,12 +201,8 @@ fn a_fault_in_each_device_makes_the_right_check_fail() {
     let seen = nights.night("robot_state,repeatability");
     seen.is(4, "robot_state", "INVALID", "rig", &[("state", "robot")]);
     // The arm is not moved before it is initialised.
-    assert_eq!(
-        seen.check("repeatability")["verdict"],
-        "INVALID",
-        "{}",
-        seen.said
-    );
+    let verdict = &seen.check("repeatability")["verdict"];
+    assert_eq!(verdict, "INVALID", "{}", seen.said);
 }
 
 fn healthy(nights: &Nights) {
@@ -263,6 +276,8 @@ fn robot(nights: &Nights) {
     arm.clear_faults().unwrap();
     // Half a newton that nobody exerts, on the way down: the touch is told above the skin.
     let offset = Fault::ForceOffset([0.0, 0.0, -0.5]);
+    // Braked, the arm has sunk onto the skin: up with it, so that it comes down once more.
+    arm.place([0.0125, 0.0, 0.02]).unwrap();
     arm.inject(When::Below(SURFACE_M + 0.0009), offset).unwrap();
     let seen = nights.night("depth");
     seen.is(1, "depth", "FAIL", "rig", &[]);

@@ -112,14 +112,15 @@ impl RealBench {
         }
     }
 
-    fn open_camera(&self, camera: CameraId) -> Slot<dyn EventCamera> {
+    /// `held` cameras of this bench are open already: busy for everybody else.
+    fn open_camera(&self, camera: CameraId, held: usize) -> Slot<dyn EventCamera> {
         let setup = &self.rig.cameras[camera.index()];
         let subject = subject(camera);
         if setup.model == "evk1" {
             let opened = bench::evk1(setup, camera, self.clock);
             return match opened {
                 Ok(evk1) => Ok(Box::new(evk1)),
-                Err(e) => Err(trouble::camera(&e, subject)),
+                Err(e) => Err(trouble::camera(&e, subject, held)),
             };
         }
         bench::open_camera(setup, camera, self.clock).map_err(|failure| {
@@ -176,9 +177,10 @@ impl Bench for RealBench {
             };
         }
         for camera in CameraId::ALL {
+            let held = devices.cameras.iter().filter(|c| c.is_ok()).count();
             let slot = &mut devices.cameras[camera.index()];
             if slot.is_err() {
-                *slot = self.open_camera(camera);
+                *slot = self.open_camera(camera, held);
             }
         }
         if let (Some(slot @ Err(_)), Some(setup)) =

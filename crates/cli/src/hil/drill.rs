@@ -22,6 +22,9 @@ const HOLD: &str = "hold-arm";
 const HOLDS_WITHIN: Duration = Duration::from_secs(60);
 /// The robot can be opened again within this time.
 const OPENS_WITHIN: Duration = Duration::from_secs(20);
+/// The killed process is left alone for so long: its watchdog (at most 32 ms) and its supervisor have braked the arm by then, and who
+/// opens the robot earlier brakes it himself.
+const LEFT_ALONE: Duration = Duration::from_millis(300);
 /// Between two looks.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
 /// A braked robot tells where it is within this time.
@@ -36,6 +39,7 @@ pub fn watchdog(bench: &mut RealBench) -> Result<Drilled, Trouble> {
     let held = holder.holds(bench)?;
     let killed = Instant::now();
     holder.kill()?;
+    std::thread::sleep(LEFT_ALONE);
     // Whoever of watchdog and supervisor brakes it, from here on nobody else does.
     let (mut omega, after) = reopen(bench, killed)?;
     let live = omega.remarks().iter().any(|r| r.contains("were live"));

@@ -51,9 +51,9 @@ fn robot_not_found(rig: &RigFile) -> EvidenceKind {
 }
 
 /// Why a camera, called `subject` in results, could not be opened.
-pub fn camera(error: &Evk1Error, subject: &str) -> Trouble {
+pub fn camera(error: &Evk1Error, subject: &str, held: usize) -> Trouble {
     let kind = match error {
-        Evk1Error::NotFound { .. } => camera_not_found(),
+        Evk1Error::NotFound { .. } => camera_not_found(held),
         Evk1Error::NotEvk1 { .. } => EvidenceKind::OtherDevice,
         Evk1Error::Usb { cause, .. } => match cause {
             UsbError::NoUsb(_) | UsbError::Gone => EvidenceKind::Absent,
@@ -69,14 +69,15 @@ pub fn camera(error: &Evk1Error, subject: &str) -> Trouble {
 }
 
 /// No camera with this serial number answers: is there one that may not be asked?
-fn camera_not_found() -> EvidenceKind {
+fn camera_not_found(held: usize) -> EvidenceKind {
     let states: Vec<_> = skinrig_evk1::enumerate()
         .unwrap_or_default()
         .into_iter()
         .map(|found| found.state)
         .collect();
     let any = |is: fn(&FoundState) -> bool| states.iter().any(is);
-    if any(|s| matches!(s, FoundState::Busy)) {
+    let busy = states.iter().filter(|s| matches!(s, FoundState::Busy));
+    if busy.count() > held {
         EvidenceKind::Busy
     } else if any(|s| matches!(s, FoundState::NoPermission)) {
         EvidenceKind::NotPermitted
