@@ -33,7 +33,7 @@ repeats: {at_most: 0}
 checks:
   identity: {differences: {at_most: 0}}
   settings: {differences: {at_most: 0}}
-  disk: {amount: 8 MB, free: {at_least: 1 MB}}
+  disk: {amount: 8 MB, write_rate: {at_least: 100 kB/s}, free: {at_least: 1 MB}}
   trigger_loopback: {trains: 6, lost_pulses: {at_most: 0}, extra_pulses: {at_most: 0}, unread_trains: {at_most: 0}}
   test_pattern: {duration: 1 s, rate: 500 kev/s, lost: {at_most: 0 B}, gaps: {at_most: 0}}
   robot_state: {faults: {at_most: 0}, creep: {at_most: 0.1 mm}}
