@@ -25,19 +25,21 @@ pub fn take(rig: &RigFile, what: &str) -> Result<Lease, Failure> {
 }
 
 /// The file of the lease. The robot names it: two rig files for one robot share it. Stand-ins all have one serial number; what
-/// tells them apart is the library that each is reached through.
+/// tells them apart is the library that each is reached through, and their leases lie beside it and go with it.
 pub(crate) fn path(rig: &RigFile) -> PathBuf {
     let robot = &rig.robot;
     let name = format!("{}-{}", robot.model, robot.serial);
-    let name = match (rig.kind, &robot.library) {
-        (RigKind::Emulated, Some(library)) => {
-            let digest = Sha256::digest(library.as_os_str().as_encoded_bytes());
-            let short: String = digest[..4].iter().map(|b| format!("{b:02x}")).collect();
-            format!("{name}-emulated-{short}")
-        }
-        _ => name,
+    let (RigKind::Emulated, Some(library)) = (rig.kind, &robot.library) else {
+        return lease::path_of(&lease::folder(), &name);
     };
-    lease::path_of(&lease::folder(), &name)
+    let digest = Sha256::digest(library.as_os_str().as_encoded_bytes());
+    let short: String = digest[..4].iter().map(|b| format!("{b:02x}")).collect();
+    let beside = library.parent().filter(|f| f.is_dir());
+    let folder = match beside {
+        Some(folder) if std::env::var_os(lease::VARIABLE).is_none() => folder.to_owned(),
+        _ => lease::folder(),
+    };
+    lease::path_of(&folder, &format!("{name}-emulated-{short}"))
 }
 
 /// The login name, as far as the environment tells it.

@@ -10,6 +10,7 @@ mod dataset;
 mod evaluation;
 mod faults;
 mod help;
+mod hil;
 mod import;
 mod import_refusals;
 mod interrupt;

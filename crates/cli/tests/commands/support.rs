@@ -3,6 +3,7 @@
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use serde_json::Value;
 use sha2::{Digest, Sha256};
@@ -55,7 +56,22 @@ impl Said {
 pub fn program<S: AsRef<OsStr>>(arguments: &[S]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_skinrig"));
     command.current_dir(ROOT).args(arguments);
+    // Each call has its leases for itself: tests run side by side, on benches of one name.
+    command.env("SKINRIG_LEASES", leases());
     command
+}
+
+/// A new folder for leases.
+fn leases() -> PathBuf {
+    static MADE: AtomicUsize = AtomicUsize::new(0);
+    let name = format!(
+        "leases-{}-{}",
+        std::process::id(),
+        MADE.fetch_add(1, Ordering::Relaxed)
+    );
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    std::fs::create_dir_all(&folder).unwrap();
+    folder
 }
 
 /// Runs the program to its end. Neither of its outputs is a terminal.
