@@ -316,6 +316,24 @@ proptest! {
     }
 }
 
+/// Chunks of nothing but events, as a busy camera sends them, whose ends fall beside the decoder's own block.
+#[test]
+fn a_chunk_that_ends_just_behind_a_block_is_decoded_whole() {
+    for events in (1_000..1_060).chain(2_040..2_070) {
+        let time = 0x8000_0001_u32.to_le_bytes();
+        let event = (3_u32 << 11 | 5).to_le_bytes();
+        let chunk: Vec<u8> = std::iter::repeat_n(event, events).flatten().collect();
+        // The time base comes first, so that the chunk begins with an empty block and whole groups.
+        let (seen, decoder) = decode(StreamFormat::Evt2, &[&time, &chunk]);
+        assert_eq!(
+            decoder.stats().cd_events(),
+            events as u64,
+            "{events} events"
+        );
+        assert_eq!(seen.len(), events, "{events} events");
+    }
+}
+
 #[test]
 fn an_idle_camera_repeats_its_time_base() {
     let mut encoder = Encoder::new(40);

@@ -264,8 +264,12 @@ impl Words {
             words += GROUP;
         }
         if !full {
-            // Fewer words than a group, or what precedes a word that is not plain: they fit.
+            // What precedes a word that is not plain fits; the last words of the input, fewer than a group, may not.
             for word in &all[words..] {
+                if KEEP && run.events == BLOCK {
+                    full = true;
+                    break;
+                }
                 if !run.word::<KEEP>(u32::from_le_bytes(*word), buffer) {
                     break;
                 }
