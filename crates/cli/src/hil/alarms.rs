@@ -38,7 +38,7 @@ pub fn keep(history: &Path, report: &Report) -> Vec<Kept> {
     report.alarms.iter().map(one).collect()
 }
 
-/// Copies a sealed session into `folder`, unless it is there.
+/// Puts a sealed session into `folder`, unless it is there: as a second name of the file where that can be, else as a copy.
 fn copy(session: &Path, folder: &Path) -> Result<PathBuf, String> {
     let name = session.file_name().unwrap_or_default();
     let to = folder.join(name);
@@ -52,9 +52,12 @@ fn copy(session: &Path, folder: &Path) -> Result<PathBuf, String> {
         Err(e) => return Err(e.to_string()),
     }
     let part = folder.join("part");
-    let copied = std::fs::create_dir_all(folder)
-        .and_then(|()| std::fs::copy(session, &part))
-        .and_then(|_| std::fs::rename(&part, &to));
+    let copied = std::fs::create_dir_all(folder).and_then(|()| {
+        std::fs::hard_link(session, &to).or_else(|_| {
+            std::fs::copy(session, &part)?;
+            std::fs::rename(&part, &to)
+        })
+    });
     match copied {
         Ok(()) => Ok(to),
         Err(e) => Err(format!("{}: {e}", to.display())),
