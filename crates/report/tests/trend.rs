@@ -1,5 +1,4 @@
 //! Trends as they are shown: nothing in a name becomes markup, and a terminal of 80 columns holds every line.
-#![expect(clippy::unwrap_used, reason = "a test that fails must say so")]
 
 use skinrig_nightly::trend::{History, NightHead, Point, Report, judge};
 use skinrig_nightly::{Verdict, Versions};
