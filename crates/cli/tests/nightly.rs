@@ -165,13 +165,16 @@ impl Drop for TinyDisk {
     }
 }
 
+/// A device, and the faults planted into it.
+type Group = (&'static str, fn(&mut Nights));
+
 #[test]
 fn a_fault_in_each_device_makes_the_right_check_fail() {
     let Some(mut nights) = Nights::start() else {
         return;
     };
     // Each group is made, whatever became of the ones before: one run tells all that is wrong.
-    let groups: [(&str, fn(&mut Nights)); 7] = [
+    let groups: [Group; 7] = [
         ("healthy", |n| healthy(n)),
         ("cameras", |n| cameras(n)),
         ("wires", |n| wires(n)),
