@@ -239,10 +239,19 @@ fn cameras(nights: &Nights) {
         &[("absent", "camera2")],
     );
     nights.camera(CameraId::Two, Order::Plug);
-    // A generator of the biases.
-    nights.camera(CameraId::One, Order::Stick(0x0354));
+    // The generator of bias_diff_on keeps its default, and the rig file asks for another value.
+    let serial = "    serial: \"00000001\"\n";
+    let other = RIG.replace(
+        serial,
+        &format!("{serial}    biases: {{bias_diff_on: 400}}\n"),
+    );
+    assert_ne!(other, RIG);
+    let rig = nights.folder.path().join("rig.yaml");
+    fs::write(&rig, other).unwrap();
+    nights.camera(CameraId::One, Order::Stick(0x0350));
     let seen = nights.night("settings");
     seen.is(4, "settings", "INVALID", "rig", &[("read_back", "camera1")]);
+    fs::write(&rig, RIG).unwrap();
     nights.camera(CameraId::One, Order::Unplug);
     nights.camera(CameraId::One, Order::Plug);
 }
