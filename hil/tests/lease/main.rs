@@ -1,9 +1,5 @@
 //! The lease of a bench between processes: only one ever holds it, and whoever dies lets go.
-#![expect(
-    clippy::unwrap_used,
-    clippy::print_stdout,
-    reason = "a test that cannot be set up must fail; a child tells its parent on standard output"
-)]
+#![expect(clippy::unwrap_used, reason = "a test that cannot be set up must fail")]
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;

@@ -15,6 +15,11 @@ fn of<'a>(night: &'a Night, check: &str) -> &'a CheckResult {
     night.checks.iter().find(|c| c.name == check).unwrap()
 }
 
+/// What an attempt finds.
+type Step = fn(&mut Findings);
+/// Attempts, and what they come to: verdict, how many are made, in words.
+type Case<'a> = (&'a [Step], Verdict, usize, Option<&'a str>);
+
 fn good(found: &mut Findings) {
     lost(found, [0.0; 2]);
 }
@@ -57,7 +62,7 @@ fn what_was_not_measured_on_one_camera_is_a_failure_of_that_camera() {
 
 #[test]
 fn numbers_that_are_none_unknown_metrics_and_doubles_are_never_good() {
-    let broken: [(fn(&mut Findings), Option<Cause>); 3] = [
+    let broken: [(Step, Option<Cause>); 3] = [
         (|f| lost(f, [f64::NAN, 0.0]), Some(Cause::Rig)),
         (
             |f| {
@@ -89,7 +94,7 @@ fn after_a_failure_only_passes_in_a_row_help_and_only_to_marginal() {
         f.saw(EvidenceKind::DataLost, "camera2", "7 bytes");
         lost(f, [0.0, 7.0]);
     };
-    let cases: [(&[fn(&mut Findings)], Verdict, usize, Option<&str>); 4] = [
+    let cases: [Case; 4] = [
         (&[good], Verdict::Pass, 1, None),
         (
             &[bad, good, good],

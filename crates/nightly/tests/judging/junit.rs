@@ -101,11 +101,11 @@ fn the_document_is_whole_and_its_counts_add_up() {
     let text = junit(&one_of_everything(), "bench-1");
     let tags = elements(&text);
     let named = |name: &str| -> Vec<&Vec<(String, String)>> {
-        let of = |t| match t {
-            &Tag::Open(ref n, ref a) if n == name => Some(a),
+        let opened = tags.iter().filter_map(|tag| match tag {
+            Tag::Open(n, a) if n == name => Some(a),
             _ => None,
-        };
-        tags.iter().filter_map(of).collect()
+        });
+        opened.collect()
     };
     let value = |attributes: &[(String, String)], key: &str| {
         let found = attributes.iter().find(|(k, _)| k == key);

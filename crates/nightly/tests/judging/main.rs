@@ -1,7 +1,5 @@
 //! Rules over evidence, attempts and repeats: what each kind of evidence means, and laws that hold for all of it.
 
-#![expect(clippy::print_stderr, reason = "a test that is skipped says why")]
-
 mod junit;
 mod support;
 
