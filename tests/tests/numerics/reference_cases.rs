@@ -151,7 +151,7 @@ const CASES: &[(&str, &str, &str, &str)] = &[
     (
         "latency",
         "bins_0.6 bins_1.7 bins_0.3 bins_1.0 bins_0.0002 bins_0.00021",
-        LATENCY,
+        "crates/analysis/tests/latency/binning.rs",
         "windows_of_published_length_hold_the_published_bins",
     ),
     (
