@@ -231,7 +231,7 @@ impl Rival {
 
 /// Not a test by itself: the process that [`Rival`] starts.
 #[test]
-#[ignore = "the other process of the tests here"]
+#[ignore = "no test by itself: the tests here start it as their other process"]
 fn rival() {
     let Some(path) = std::env::var_os(LEASE) else {
         return;

@@ -61,7 +61,7 @@ fn the_planted_cause_is_named() {
 }
 
 #[test]
-#[ignore = "200 seeds: minutes"]
+#[ignore = "200 seeds take minutes: SKINRIG_CI_LONG=1 .ci/run, or cargo test -p skinrig-compare --test causes -- --ignored"]
 fn the_planted_cause_is_named_in_95_of_100_pairs() {
     let right = named(1_000..1_200);
     println!("right of 200, in the order of the plants: {right:?}");

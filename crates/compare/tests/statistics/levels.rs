@@ -201,7 +201,7 @@ fn of_a_rate_of_hardly_any_counts() {
 
 /// The table of `docs/comparison.md`.
 #[test]
-#[ignore = "takes minutes; cargo test -p skinrig-compare --test statistics -- --ignored --nocapture"]
+#[ignore = "takes minutes: SKINRIG_CI_LONG=1 .ci/run, or cargo test -p skinrig-compare --test statistics -- --ignored --nocapture"]
 fn table_of_levels() {
     println!(
         "| metric | locations | covered, no difference | covered | type I, differ | type I, equivalent | naive covered | naive type I |"

@@ -169,7 +169,7 @@ fn few_nights_are_learnt_from_and_invalid_ones_are_not() {
 }
 
 #[test]
-#[ignore = "takes a minute: the tables of docs/trends.md"]
+#[ignore = "the tables of docs/trends.md take minutes: SKINRIG_CI_LONG=1 .ci/run, or cargo test --release -p skinrig-nightly --test trend -- --ignored --nocapture"]
 fn the_trade() {
     let counts: Vec<usize> = (0..200).map(false_alarms).collect();
     let total: usize = counts.iter().sum();
