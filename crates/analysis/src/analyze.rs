@@ -90,10 +90,12 @@ pub fn analyze_and_keep(
             input.settings.seed,
         )
     };
-    let (scored, scored_without_exclusions) = (
-        measure(&scores, Exclusions::Applied),
-        measure(&scores, Exclusions::Ignored),
-    );
+    let scored = measure(&scores, Exclusions::Applied);
+    let scored_without_exclusions = if scores.excludes_estimates() {
+        measure(&scores, Exclusions::Ignored)
+    } else {
+        scored
+    };
     let penalised = penalised(
         &scores,
         input.settings.failure_penalty_mm,

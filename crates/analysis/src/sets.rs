@@ -85,6 +85,12 @@ pub struct Scored {
 pub struct ScoreSet(Vec<Scored>);
 
 impl ScoreSet {
+    /// Whether a press has an estimate that does not count.
+    #[must_use]
+    pub fn excludes_estimates(&self) -> bool {
+        self.0.iter().any(|p| !p.valid && p.found.is_some())
+    }
+
     /// Takes the attempted scored presses out of the table. `journal` holds the outcomes of the same presses: what
     /// it excludes was left out before anybody looked at the data, and says nothing about the skin.
     #[must_use]

@@ -35,6 +35,12 @@ use solver::{Descent, minimise};
 
 /// Bound on an error vector while the starts compete, mm: a quarter of the skin's side.
 const COARSE_BOUND_MM: f64 = 25.0;
+/// Where descents end, as [`Problem::settled`]: along the arcs, which lead into the valley only (stopped at 1e-4, many
+/// starts found another one); along the errors while starts compete, whose ends then differ by about a millionth of their
+/// standard errors; in the last fit, about the rounding of the sum.
+const SETTLED_ARCS: f64 = 1e-9;
+const SETTLED_COARSE: f64 = 1e-12;
+const SETTLED_FINE: f64 = 1e-15;
 /// Bound of the last fit in robust standard deviations of one coordinate.
 const FINE_BOUND_SIGMAS: f64 = 10.0;
 /// Smallest bound of the last fit, mm.
@@ -216,6 +222,7 @@ impl<'a> Problem<'a> {
             count,
             measure: Measure::Error,
             bound_mm: COARSE_BOUND_MM,
+            settled: SETTLED_COARSE,
         }
     }
 
@@ -223,6 +230,7 @@ impl<'a> Problem<'a> {
     fn descend(&self, from: Parameters) -> Descent {
         let smooth = Problem {
             measure: Measure::Arc,
+            settled: SETTLED_ARCS,
             ..*self
         };
         minimise(self, minimise(&smooth, from).parameters)
@@ -246,6 +254,7 @@ impl<'a> Problem<'a> {
         let sigma = lengths[lengths.len() / 2] / RAYLEIGH_MEDIAN;
         Problem {
             bound_mm: (FINE_BOUND_SIGMAS * sigma).max(LEAST_BOUND_MM),
+            settled: SETTLED_FINE,
             ..*self
         }
     }

@@ -166,6 +166,8 @@ pub struct Problem<'a> {
     pub measure: Measure,
     /// What an error vector, or an arc, can count at most, mm.
     pub bound_mm: f64,
+    /// A descent has ended when a step promises to lower the cost by no more than this share of it.
+    pub settled: f64,
 }
 
 impl Problem<'_> {
@@ -182,7 +184,8 @@ impl Problem<'_> {
             for i in 0..self.count {
                 let (x, y) = (slope[0][i], slope[1][i]);
                 gradient[i] += x * residual[0] + y * residual[1];
-                for j in 0..=i {
+                // The half above the diagonal is not used, but whole rows are faster than half ones.
+                for j in 0..PARAMETERS {
                     matrix[i][j] += x * slope[0][j] + y * slope[1][j];
                 }
             }
@@ -249,7 +252,7 @@ impl Problem<'_> {
         let shrink = 1.0 / (1.0 + (length / c) * (length / c)).sqrt();
         let bend = shrink * shrink * shrink / (c * c);
         let [by_x, by_y] = &mut slope;
-        for (x, y) in by_x.iter_mut().zip(by_y).take(self.count) {
+        for (x, y) in by_x.iter_mut().zip(by_y) {
             let radial = bend * (e[0] * *x + e[1] * *y);
             *x = shrink * *x - e[0] * radial;
             *y = shrink * *y - e[1] * radial;
@@ -305,6 +308,7 @@ mod tests {
                     count: PARAMETERS,
                     measure,
                     bound_mm: 25.0,
+                    settled: 0.0,
                 };
                 let (_, jacobian) = problem.rows(&p);
                 for k in 0..PARAMETERS {
@@ -336,6 +340,7 @@ mod tests {
                 count,
                 measure: Measure::Error,
                 bound_mm: 25.0,
+                settled: 0.0,
             };
             let (r, j) = problem.rows(&p);
             let normal = problem.normal(&p);

@@ -18,8 +18,6 @@ const FIRST_DAMPING: f64 = 1e-3;
 const DAMPING: (f64, f64) = (1e-14, 1e16);
 /// Converged: the cosine between residuals and each column of the Jacobian is at most this.
 const FLAT: f64 = 1e-10;
-/// Converged: the relative reduction of the cost that a step promises is at most this, about the rounding of the sum.
-const NO_GAIN: f64 = 1e-15;
 /// A step counts when it reduces the cost by at least this share of what it promised.
 const LEAST_GAIN_RATIO: f64 = 1e-4;
 
@@ -61,7 +59,7 @@ pub fn minimise(problem: &Problem<'_>, from: Parameters) -> Descent {
             continue;
         };
         let promised = damping * step.component_mul(&step).dot(&scale) - step.dot(&here.gradient);
-        if promised <= NO_GAIN * here.cost {
+        if promised <= problem.settled * here.cost {
             return ended(
                 at,
                 here.cost,
@@ -185,6 +183,7 @@ mod tests {
                 count,
                 measure,
                 bound_mm,
+                settled: 1e-15,
             };
             let start = parameters_of(&base);
             let ours = minimise(&problem, start);
