@@ -215,15 +215,26 @@ fn contact_timing(input: &SessionInput, scheduled: bool) -> ContactTiming {
     }
 }
 
-/// Fills in what stands on the finished table of presses.
+/// Fills in what stands on the finished table of presses. The parts look at the table only, not at each other.
 fn evaluate(analysis: &mut Analysis, input: &SessionInput, kept: &Kept) {
-    analysis.coverage = coverage::coverage(analysis);
-    analysis.cmre = cmre::cmre(analysis);
-    analysis.bit_rates = bit_rates::bit_rates(analysis);
+    let table = &*analysis;
+    let (findings, (coverage, cmre, bit_rates)) = rayon::join(
+        || audit::audit(input, table),
+        || {
+            (
+                coverage::coverage(table),
+                cmre::cmre(table),
+                bit_rates::bit_rates(table),
+            )
+        },
+    );
+    analysis.findings = findings;
+    analysis.coverage = coverage;
+    analysis.cmre = cmre;
+    analysis.bit_rates = bit_rates;
     analysis.reduction = reduction::study(analysis, kept);
     analysis.latency = latency::study(analysis, kept);
     analysis.warnings.extend(caveats::caveats(analysis));
-    analysis.findings = audit::audit(input, analysis);
 }
 
 /// What came from one camera.
