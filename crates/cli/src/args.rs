@@ -15,7 +15,7 @@ use crate::remote::What;
 
 /// Runs tactile-skin experiments: protocol, robot, event cameras, session, analysis, report.
 #[derive(Debug, Parser)]
-#[command(name = "skinrig", version, about, after_help = Exit::HELP, arg_required_else_help = true)]
+#[command(name = "skinrig", version = crate::version::VERSION, about, after_help = Exit::HELP, arg_required_else_help = true)]
 pub struct Cli {
     /// Print results as JSON on standard output; progress and messages stay on standard error.
     #[arg(long, global = true)]

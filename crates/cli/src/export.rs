@@ -280,6 +280,7 @@ fn bundle(
         folder.path(),
         &session_id,
         &header.prototype,
+        crate::version::SOFTWARE,
         &names[0],
         &names,
     )

@@ -41,6 +41,7 @@ pub mod supervise;
 pub mod tag;
 pub mod tradeoff;
 pub mod verify;
+pub mod version;
 pub mod watch;
 
 use std::ffi::OsString;

@@ -64,7 +64,7 @@ pub fn resume(args: &ResumeArgs, command_line: &str, json: bool) -> Outcome {
         operator: found.header.operator.clone(),
         started_at: Utc::now().to_rfc3339_opts(SecondsFormat::Secs, true),
         host: host_name(),
-        software: format!("skinrig {}", env!("CARGO_PKG_VERSION")),
+        software: crate::version::SOFTWARE.to_owned(),
         command_line: command_line.to_owned(),
     };
     let report = if wanted.contains(&true) {

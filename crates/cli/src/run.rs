@@ -179,7 +179,7 @@ fn header(
         operator: intent.operator.to_owned(),
         started_at: started_at.to_owned(),
         host: host_name(),
-        software: format!("skinrig {}", env!("CARGO_PKG_VERSION")),
+        software: crate::version::SOFTWARE.to_owned(),
         command_line: intent.command_line.to_owned(),
         presses: plan.presses.clone(),
     })

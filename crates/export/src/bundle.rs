@@ -51,6 +51,7 @@ pub struct BundleReport {
 }
 
 /// Lists the files of `folder` with their hashes in its manifest, which comes last: a folder without one is no bundle.
+/// `software` is the program that wrote them.
 ///
 /// # Errors
 /// When a file cannot be read or the manifest not be written.
@@ -58,6 +59,7 @@ pub fn seal_bundle(
     folder: &Path,
     session_id: &str,
     prototype: &str,
+    software: &str,
     session: &str,
     names: &[String],
 ) -> Result<(), ExportError> {
@@ -67,7 +69,7 @@ pub fn seal_bundle(
         format_version: VERSION,
         session_id: session_id.into(),
         prototype: prototype.into(),
-        software: concat!("skinrig ", env!("CARGO_PKG_VERSION")).into(),
+        software: software.into(),
         session: session.into(),
         files: entries.collect::<Result<_, _>>()?,
     };

@@ -56,7 +56,7 @@ pub struct Night {
 /// The versions that a change of a metric may come from.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Versions {
-    /// This program and its version. Two builds of one version look alike.
+    /// This program: version, commit, a digest of what the sources differ by; `commit unknown` when built outside a repository.
     pub software: String,
     /// Of the analysis: results of two versions do not compare.
     pub analysis: u32,

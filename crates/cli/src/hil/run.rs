@@ -159,7 +159,7 @@ fn blank(id: String, suite: &Suite, rig: &RigFile, started: String) -> Night {
         rig_kind: rig.kind.name().to_owned(),
         rig_sha256: rig.sha256.clone(),
         versions: Versions {
-            software: format!("skinrig {}", env!("CARGO_PKG_VERSION")),
+            software: crate::version::SOFTWARE.to_owned(),
             ..Versions::default()
         },
         started,

@@ -129,6 +129,15 @@ fn a_recorded_session_can_be_verified_listed_and_shown() {
     ] {
         assert!(shown.contains(part), "{part}\n{shown}");
     }
+    // Of which build: the one that runs here.
+    let version = skinrig(&["--version"]).code(0).out;
+    let build = version.trim_end().split_once(" (commit ").unwrap().1;
+    assert!(
+        build == "unknown)" || build.len() >= 9 && build.ends_with(')'),
+        "{version}"
+    );
+    let line = format!("software   {} on ", version.trim_end());
+    assert!(shown.contains(&line), "{line}\n{shown}");
     // One line per press, each cell under its heading.
     let mut table = shown
         .lines()
