@@ -6,6 +6,7 @@
 
 mod edges;
 mod epochs;
+mod held_out;
 mod host;
 mod piecewise;
 mod residuals;
@@ -17,6 +18,7 @@ use skinrig_model::{AlignmentSettings, BoxReport, HostTime, TriggerEdge};
 
 use self::edges::{CameraFromBox, Edges};
 use self::epochs::{Epoch, epochs};
+use self::held_out::coverage;
 use self::host::HostFromBox;
 use self::piecewise::{Piecewise, Point};
 use crate::clock::line::{self, Pair};
@@ -418,21 +420,6 @@ fn shared(piece: &Piece) -> Vec<(f64, f64)> {
     let each = pairs(piece).into_iter();
     each.map(|p| (references[0] + p.from_us, references[1] + p.to_us))
         .collect()
-}
-
-/// (inside, of how many): every second point against the fit to the others, in the interval stated for a point.
-fn coverage(points: &[Point]) -> Option<(u32, u32)> {
-    let half = |odd: usize| -> Vec<Point> { points.iter().skip(odd).step_by(2).copied().collect() };
-    let (mut inside, mut n) = (0, 0);
-    for odd in [0, 1] {
-        let fit = Piecewise::fit(&half(odd), SPACING_US, FLOOR_US)?;
-        for p in half(1 - odd) {
-            let width = 1.96 * libm::hypot(fit.sigma_us, fit.standard_error(p.from_us));
-            n += 1;
-            inside += u32::from((p.to_us - fit.value(p.from_us)).abs() <= width);
-        }
-    }
-    Some((inside, n))
 }
 
 fn covered(map: ClockMap, held_out: &[(u32, u32)]) -> ClockMap {
