@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use serde::Serialize;
 use skinrig_evk1::FoundState;
+use skinrig_hil::lease::{self, Standing};
 use skinrig_omega3::enumerate::Availability;
 use skinrig_omega3::load::LoadError;
 use skinrig_protocol::rig::{RigFile, RigKind};
@@ -63,7 +64,8 @@ pub fn devices(args: &DevicesArgs, json: bool) -> Outcome {
     Ok(Exit::Ok)
 }
 
-/// Everything that is connected, and what the rig file misses. Nothing moves; opening the box's port resets it.
+/// Everything that is connected, and what the rig file misses. Nothing moves; opening the box's port resets it, which is not done
+/// while somebody holds the bench.
 pub(crate) fn survey(rig: Option<&RigFile>) -> Vec<Line> {
     let mut lines = robots(rig);
     lines.extend(cameras(rig));
@@ -343,7 +345,27 @@ fn trigger_boxes(rig: Option<&RigFile>) -> Vec<Line> {
         _ => HELLO,
     };
     let mut lines = Vec::new();
-    for found in skinrig_trigger_box::enumerate(port.as_slice(), hello) {
+    // Opening the port resets the box: not in the middle of somebody's run.
+    let holder = rig.and_then(holder);
+    let open = if let (Some(holder), Some(port)) = (&holder, &port) {
+        lines.push(Line {
+            device: "trigger box",
+            what: port.clone(),
+            state: "busy",
+            detail: "not opened, which would reset it".to_owned(),
+            role: Some("trigger_box".to_owned()),
+            next_step: Some(format!(
+                "let the bench become free: held by {holder}; `skinrig hil lease` shows it"
+            )),
+            ..Line::default()
+        });
+        None
+    } else {
+        port.as_ref()
+    };
+    for found in
+        skinrig_trigger_box::enumerate(open.map(std::slice::from_ref).unwrap_or_default(), hello)
+    {
         use skinrig_trigger_box::OpenError;
         use skinrig_trigger_box::greeting::GreetingError;
         let (state, detail) = match &found.state {
@@ -390,6 +412,17 @@ fn trigger_boxes(rig: Option<&RigFile>) -> Vec<Line> {
         }
     }
     lines
+}
+
+/// Who holds the lease of the bench at this moment.
+fn holder(rig: &RigFile) -> Option<String> {
+    match lease::look(&crate::hil::lease::path(rig)) {
+        Ok(Standing::Held { owner, .. }) => Some(owner.map_or_else(
+            || "somebody who is just taking it".to_owned(),
+            |owner| owner.to_string(),
+        )),
+        _ => None,
+    }
 }
 
 /// Serial ports under their lasting names, sorted.

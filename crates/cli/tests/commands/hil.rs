@@ -155,12 +155,28 @@ fn a_bench_has_one_holder_whichever_command_asks() {
         ]);
     }
     assert!(files(&lab.path("out"), "").is_empty());
+    // Whoever only asks what is there does not reset the holder's box.
+    let asked = || {
+        let listed = on_nothing(&leases, &["devices", "--rig", EMULATED, "--json"]).code(0);
+        let lines = listed.json()["devices"].as_array().unwrap().clone();
+        let boxed = |l: &&Value| l["device"] == "trigger box";
+        lines.iter().find(boxed).unwrap().clone()
+    };
+    let boxed = asked();
+    assert_eq!(boxed["state"], "busy");
+    assert!(
+        boxed["next_step"]
+            .as_str()
+            .unwrap()
+            .contains("maria on lab-2")
+    );
     let lease = &shown(&[])["leases"][0];
     assert_eq!(
         (&lease["state"], &lease["owner"]["user"]),
         (&"held".into(), &"maria".into())
     );
     drop(held);
+    assert_eq!(asked()["state"], "absent");
     let plain = on_nothing(&leases, &["hil", "lease"]).code(0);
     assert!(plain.out.contains("free; last: ") && plain.out.contains(&text(Path::new(&path))));
 }
