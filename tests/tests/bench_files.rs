@@ -166,6 +166,13 @@ fn the_night_is_a_command_that_the_program_takes() {
     // What it writes, it may write.
     assert_eq!(one(&service, "Service", "StateDirectory"), "skinrig");
     assert!(words.contains(&"/var/lib/skinrig/nights"), "{command}");
+    // Without a history no page says what moved; beside the nights, links between them hold when all are moved together.
+    let history = words.iter().position(|w| *w == "--history");
+    assert_eq!(
+        history.map(|at| words[at + 1]),
+        Some("/var/lib/skinrig/nights/history.sqlite"),
+        "{command}"
+    );
 }
 
 #[test]

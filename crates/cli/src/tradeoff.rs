@@ -156,10 +156,8 @@ pub fn tradeoff(args: &TradeoffArgs, json: bool) -> Outcome {
         .file_name()
         .map(|n| n.to_string_lossy().into_owned());
     let text = serde_json::to_string_pretty(&document).map_err(Failure::internal)?;
-    write(
-        &html_path,
-        page(&result, &name.unwrap_or_default(), &rig).as_bytes(),
-    )?;
+    let html = page(&result, &name.unwrap_or_default(), &rig).map_err(Failure::internal)?;
+    write(&html_path, html.as_bytes())?;
     write(&json_path, text.as_bytes())?;
     if json {
         document["files"] = serde_json::json!({ "page": html_path, "results": json_path });

@@ -2,6 +2,11 @@
 
 use crate::svg::{Px, Svg};
 
+/// Width of a digit of a tick, px: 0.6 of the 11 px that figure.css sets, rounded up.
+const DIGIT_PX: f64 = 6.7;
+/// Middle of the label at the left to the axis, px: as far as ticks of four digits need, or more.
+const LABEL_PX: f64 = 46.0;
+
 /// Tick positions at 1, 2 or 5 times a power of ten inside `low..=high`, about `wanted` of them; none for 0.
 #[must_use]
 pub fn ticks(low: f64, high: f64, wanted: u32) -> Vec<f64> {
@@ -128,7 +133,10 @@ impl Axes {
             "middle",
             &self.x_label,
         );
-        let (x, y) = (left - 46.0, (top + bottom) / 2.0);
+        // Beside the widest tick, but inside the drawing.
+        let widest = ys.iter().map(|(_, l)| l.chars().count()).max().unwrap_or(0);
+        let away = (widest as f64).mul_add(DIGIT_PX, 17.0).max(LABEL_PX);
+        let (x, y) = ((left - away).max(left.min(12.0)), (top + bottom) / 2.0);
         svg.holding(
             "text",
             &[

@@ -27,6 +27,7 @@ pub mod trend;
 mod detector;
 mod document;
 mod format;
+mod frame;
 mod tables;
 mod terminal;
 

@@ -1,7 +1,7 @@
 //! Owns the writing of SVG: elements with escaped attributes and text.
 //!
 //! Why not a plotting crate: figures must follow the page's light and dark theme, so every colour that
-//! means "ink", "grid" or "camera 1" is a CSS class (`assets/figure.css`), not a baked-in value; each figure
+//! means "ink", "grid" or "camera 1" is a CSS class (`assets/frame/figure.css`), not a baked-in value; each figure
 //! needs a title, a description and one element per press that a script can find; and a page of 2,500
 //! presses must stay small. Plotting crates bake colours in, and write neither. What is left is little:
 //! elements here, scales and ticks in [`crate::axes`].
@@ -9,7 +9,7 @@
 use std::fmt::{self, Display, Write};
 
 /// Style of the figures: classes and theme variables, light by default.
-pub const FIGURE_CSS: &str = include_str!("../assets/figure.css");
+pub const FIGURE_CSS: &str = include_str!("../assets/frame/figure.css");
 
 /// [`FIGURE_CSS`] with every `var(--name)` replaced by its light value, for programs that know no variables.
 #[must_use]
@@ -120,12 +120,6 @@ impl Svg {
         self.out.push('>');
         let _ = Escaping(&mut self.out).write_str(text);
         let _ = write!(self.out, "</{tag}>");
-        self
-    }
-
-    /// Markup that is written already, by this builder or by hand.
-    pub(crate) fn raw(&mut self, markup: &str) -> &mut Self {
-        self.out.push_str(markup);
         self
     }
 

@@ -2,13 +2,21 @@
 
 use std::fmt::Write as _;
 
+use minijinja::value::Serde;
+use minijinja::{Value, context};
+use serde::Serialize;
 use skinrig_analysis::result::Estimate;
 use skinrig_analysis::tradeoff::{Choice, Cost, Region, Row, Tradeoff};
 use skinrig_model::{CentroidRule, Estimator, Precision};
 
+use crate::ReportError;
 use crate::figures::tradeoff as figure;
 use crate::format::{interval, number};
-use crate::svg::{FIGURE_CSS, Svg};
+use crate::frame::Frame;
+use crate::svg::FIGURE_CSS;
+
+const TEMPLATE: &str = include_str!("../assets/tradeoff/page.html");
+const CSS: &str = include_str!("../assets/tradeoff/page.css");
 
 /// More rows than this are not all printed: what is on a front is, and the rest is in the files.
 const MOST_ROWS: usize = 120;
@@ -187,95 +195,64 @@ pub fn protocol_lines(row: &Row) -> String {
     out
 }
 
-/// The page: figure and table of all rows; needs no network and no other file. `rig` says in words where the session
-/// comes from.
-#[must_use]
-pub fn page(result: &Tradeoff, session: &str, rig: &str) -> String {
-    let mut page = Svg::new();
-    page.open("html", &[("lang", &"en")]);
-    page.open("head", &[]);
-    page.leaf("meta", &[("charset", &"utf-8")]);
-    page.leaf(
-        "meta",
-        &[
-            ("name", &"viewport"),
-            ("content", &"width=device-width, initial-scale=1"),
-        ],
-    );
-    page.leaf(
-        "meta",
-        &[("name", &"color-scheme"), ("content", &"light dark")],
-    );
-    page.holding("title", &[], &format!("Speed against accuracy: {session}"));
-    // Style sheets hold none of the characters that XML escapes but `>`, which CSS needs as it is.
-    page.raw(&format!(
-        "<style>{FIGURE_CSS}{}{EXTRA_CSS}</style>",
-        crate::page::PAGE_CSS
-    ));
-    page.close();
-    page.open("body", &[]);
-    page.open("header", &[])
-        .open("div", &[("class", &"top")])
-        .open("div", &[]);
-    page.holding("p", &[("class", &"brand")], "skinrig tradeoff");
-    page.holding("h1", &[], "Speed against accuracy");
-    page.holding("p", &[("class", &"sub")], &format!("session {session}"));
-    page.holding("p", &[("class", &"sub")], rig);
-    page.close().close().close();
-    page.open("main", &[]);
-    let figure = figure::fronts(result, rig, &format!("session {session}"));
-    page.open(
-        "figure",
-        &[
-            ("class", &"card figure"),
-            ("data-testid", &"figure-tradeoff"),
-        ],
-    );
-    page.raw(&figure.svg);
-    page.holding("figcaption", &[], &figure.caption);
-    page.close();
-    page.open("div", &[("class", &"card scroll")]);
-    table(&mut page, result);
-    page.close();
-    format!("<!doctype html>\n{}\n", page.finish())
+/// The columns of numbers, with units.
+const HEADS: [&str; 11] = [
+    "Front",
+    "RMSE (mm)",
+    "95 % interval",
+    "n",
+    "Penalised (mm)",
+    "Located (%)",
+    "Within (%)",
+    "CPU (µs)",
+    "CPU range",
+    "Sent (kB/s)",
+    "Delay (ms)",
+];
+
+/// A row of the page's table.
+#[derive(Serialize)]
+struct Line {
+    class: &'static str,
+    name: String,
+    cells: [String; HEADS.len()],
 }
 
-const EXTRA_CSS: &str = "main{padding-bottom:40px}.card{margin-top:18px}table.trade td,table.trade th{white-space:nowrap}\
-table.trade tr.front td{font-weight:600}table.trade tr.out td{opacity:.55}table.trade td.num,table.trade th.num{text-align:right}";
+/// The page: figure and table of all rows; needs no network and no other file. `rig` says in words where the session
+/// comes from.
+///
+/// # Errors
+/// [`ReportError`] when the template cannot be written; no input is known to cause it.
+pub fn page(result: &Tradeoff, session: &str, rig: &str) -> Result<String, ReportError> {
+    let frame = Frame {
+        templates: &[("tradeoff.html", TEMPLATE)],
+        styles: &[FIGURE_CSS, CSS],
+        script: "",
+    };
+    let figure = figure::fronts(result, rig, &format!("session {session}"));
+    let rows = ordered(result).into_iter().enumerate();
+    let rows: Vec<Line> = rows.map(|(i, row)| line(row, i == 0)).collect();
+    frame.render(context! {
+        session, rig,
+        svg => figure.svg,
+        caption => figure.caption,
+        heads => HEADS,
+        rows => Value::from(Serde(rows)),
+    })
+}
 
-fn table(page: &mut Svg, result: &Tradeoff) {
-    page.open("table", &[("class", &"trade")]);
-    page.open("thead", &[]).open("tr", &[]);
-    page.holding("th", &[("scope", &"col")], "Choice");
-    for head in [
-        "Front",
-        "RMSE (mm)",
-        "95 % interval",
-        "n",
-        "Penalised (mm)",
-        "Located (%)",
-        "Within (%)",
-        "CPU (µs)",
-        "CPU range",
-        "Sent (kB/s)",
-        "Delay (ms)",
-    ] {
-        page.holding("th", &[("scope", &"col"), ("class", &"num")], head);
-    }
-    page.close().close();
-    page.open("tbody", &[]);
-    for (i, row) in ordered(result).into_iter().enumerate() {
-        let class = match (row.competes, row.fronts.is_empty()) {
+fn line(row: &Row, is_own: bool) -> Line {
+    let own = if is_own { " (the session's own)" } else { "" };
+    let names = row.fronts.iter().map(|c| figure::name(*c));
+    let (low, high) = row.cpu_range_us;
+    Line {
+        class: match (row.competes, row.fronts.is_empty()) {
             (false, _) => "out",
             (true, false) => "front",
             (true, true) => "",
-        };
-        page.open("tr", &[("class", &class)]);
-        let own = if i == 0 { " (the session's own)" } else { "" };
-        page.holding("td", &[], &format!("{}{own}", label(&row.choice)));
-        let names = row.fronts.iter().map(|c| figure::name(*c));
-        let (low, high) = row.cpu_range_us;
-        for cell in [
+        },
+        name: format!("{}{own}", label(&row.choice)),
+        cells: [
             names.collect::<Vec<_>>().join(", "),
             number(row.rmse_mm.value, 2),
             interval(&row.rmse_mm, 1.0, 2),
@@ -287,10 +264,6 @@ fn table(page: &mut Svg, result: &Tradeoff) {
             format!("{} to {}", short(low), short(high)),
             short(row.bytes_per_s / 1e3),
             short(row.delay_ms),
-        ] {
-            page.holding("td", &[("class", &"num")], &cell);
-        }
-        page.close();
+        ],
     }
-    page.close().close();
 }

@@ -13,6 +13,8 @@ use super::folder;
 /// The files of an alarm.
 #[derive(Debug)]
 pub struct Kept {
+    /// The folder of the history.
+    home: PathBuf,
     /// The page of the night that raised it.
     page: Option<PathBuf>,
     /// The session that shows it, or why there is none.
@@ -31,6 +33,7 @@ pub fn keep(history: &Path, report: &Report) -> Vec<Kept> {
             None => Err("that night has no golden session".to_owned()),
         };
         Kept {
+            home: history::folder_of(history, ""),
             page: page.is_file().then_some(page),
             session,
         }
@@ -82,7 +85,7 @@ impl Kept {
                 format!("skinrig verify {path}"),
             ]
         });
-        let href = |path: &Path| folder.map(|folder| href(folder, path));
+        let href = |path: &Path| folder.map(|folder| href(&self.home, folder, path));
         Links {
             night: self.page.as_deref().and_then(href),
             session: session.and_then(|p| href(p)),
@@ -103,8 +106,8 @@ fn quoted(path: &Path) -> String {
     }
 }
 
-/// The link to `path` from a page in `folder`: relative when it lies below, so that both can be moved together.
-fn href(folder: &Path, path: &Path) -> String {
+/// The link to `path` from a page in `folder`: relative when it lies below, or both lie in `home`, so that all can be moved together.
+fn href(home: &Path, folder: &Path, path: &Path) -> String {
     let full = |p: &Path| {
         let p = if p.as_os_str().is_empty() {
             Path::new(".")
@@ -113,10 +116,14 @@ fn href(folder: &Path, path: &Path) -> String {
         };
         std::fs::canonicalize(p).unwrap_or_else(|_| p.to_owned())
     };
-    let (folder, path) = (full(folder), full(path));
-    let (scheme, path) = match path.strip_prefix(&folder) {
-        Ok(below) => ("", below.to_owned()),
-        Err(_) => ("file://", path),
+    let (home, folder, path) = (full(home), full(folder), full(path));
+    let (scheme, path) = match (path.strip_prefix(&folder), folder.strip_prefix(&home)) {
+        (Ok(below), _) => ("", below.to_owned()),
+        (Err(_), Ok(down)) if path.starts_with(&home) => {
+            let up: PathBuf = down.components().map(|_| "..").collect();
+            ("", up.join(path.strip_prefix(&home).unwrap_or(&path)))
+        }
+        (Err(_), _) => ("file://", path),
     };
     let plain = |b: u8| b.is_ascii_alphanumeric() || b"-_./~".contains(&b);
     let text = path.display().to_string();

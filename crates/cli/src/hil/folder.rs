@@ -13,6 +13,8 @@ use crate::exit::Failure;
 pub const JSON: &str = "night.json";
 /// The page for people.
 pub const PAGE: &str = "night.html";
+/// The page of the nights up to this one.
+pub const TRENDS: &str = "trends.html";
 /// The results for programs that collect those of tests.
 pub const JUNIT: &str = "junit.xml";
 /// Nights of one second, at most.

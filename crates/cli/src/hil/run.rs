@@ -12,11 +12,13 @@ use skinrig_nightly::night::NIGHT_VERSION;
 use skinrig_nightly::{Night, NightExit, Verdict, Versions};
 use skinrig_protocol::rig::RigFile;
 use skinrig_protocol::suite::{Measure, Suite};
-use skinrig_report::night::{self, span};
+use skinrig_report::night::{self, Trends, span};
+use skinrig_report::trend::sentence;
 
 use super::args::HilRunArgs;
 use super::bench::RealBench;
 use super::live::{self, Live};
+use super::trend::After;
 use super::{folder, lease, trend};
 use crate::check;
 use crate::exit::{Exit, Failure, Outcome};
@@ -73,7 +75,7 @@ pub fn run(args: &HilRunArgs, command_line: &str, json: bool) -> Outcome {
     let unwritten = live.finish();
     // Nothing is open any more.
     drop(bench);
-    let kept = keep(&night, &folder, args.history.as_deref());
+    let trends = keep(&night, &folder, args.history.as_deref());
     if json {
         crate::print_json(&serde_json::to_value(&night).map_err(Failure::internal)?);
     } else {
@@ -81,10 +83,21 @@ pub fn run(args: &HilRunArgs, command_line: &str, json: bool) -> Outcome {
         outln!("{}", night::tree(&night, colour).trim_end());
         outln!("{}", folder.join(folder::PAGE).display());
     }
-    match unwritten.map_or(kept, Err) {
-        Ok(trend) => {
-            if let Some(headline) = trend.filter(|_| !json) {
-                outln!("trend: {headline}");
+    match unwritten.map_or(trends, Err) {
+        Ok(None) => Ok(Exit::Night(night.exit)),
+        // Trends say what moved; whether the night is good is said by its limits alone.
+        Ok(Some(trends)) => {
+            match trends {
+                Ok(after) if !json => {
+                    outln!("{}", sentence(&after.report));
+                    outln!("{}", folder.join(folder::TRENDS).display());
+                }
+                Ok(_) => {}
+                Err(why) => errln!(
+                    "warning: no trends tonight: --history: {why}\n  \
+                     next: once that is mended, `skinrig hil trend HISTORY --rebuild {}` adds this night",
+                    args.out.display()
+                ),
             }
             Ok(Exit::Night(night.exit))
         }
@@ -95,15 +108,41 @@ pub fn run(args: &HilRunArgs, command_line: &str, json: bool) -> Outcome {
     }
 }
 
+/// What the trends say, when they were asked for, or why they say nothing.
+type Told = Option<Result<After, String>>;
+
 /// Writes the finished night in its other forms, and adds it to the history.
-fn keep(night: &Night, folder: &Path, history: Option<&Path>) -> Result<Option<String>, String> {
-    let page = night::html(night).map_err(|e| e.to_string())?;
-    let xml = skinrig_nightly::junit::junit(night, &host_name());
-    for (name, text) in [(folder::PAGE, page), (folder::JUNIT, xml)] {
-        folder::write(folder, name, &text).map_err(|e| format!("{name}: {e}"))?;
+fn keep(night: &Night, folder: &Path, history: Option<&Path>) -> Result<Told, String> {
+    let write = |name: &str, text: &str| {
+        folder::write(folder, name, text).map_err(|e| format!("{name}: {e}"))
+    };
+    let page = |trends: Trends<'_>| {
+        let page = night::html(night, trends).map_err(|e| e.to_string())?;
+        write(folder::PAGE, &page)
+    };
+    write(
+        folder::JUNIT,
+        &skinrig_nightly::junit::junit(night, &host_name()),
+    )?;
+    let Some(history) = history else {
+        page(Trends::NotKept)?;
+        return Ok(None);
+    };
+    // There before the history is touched: whatever is wrong with that, the night has its page.
+    page(Trends::Untold("the program ended before it had read them"))?;
+    let after = trend::after(history, night, folder).map_err(|e| e.to_string());
+    match &after {
+        Ok(after) => {
+            write(folder::TRENDS, &after.page().map_err(|e| e.to_string())?)?;
+            page(Trends::Told {
+                report: &after.report,
+                links: &after.links,
+                page: folder::TRENDS,
+            })?;
+        }
+        Err(why) => page(Trends::Untold(why))?,
     }
-    let trend = history.map(|history| trend::after(history, night, folder));
-    trend.transpose().map_err(|e| format!("--history: {e}"))
+    Ok(Some(after))
 }
 
 fn load(path: &Path) -> Result<Suite, Failure> {

@@ -4,8 +4,9 @@ use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 
 use skinrig_hil::history::{self, Appended, Filter, HistoryError};
-use skinrig_nightly::trend::{History, Report, judge};
+use skinrig_nightly::trend::{Acceptance, History, Report, judge};
 use skinrig_nightly::{Night, NightExit};
+use skinrig_report::ReportError;
 use skinrig_report::trend::{Links, Style, page, terminal};
 
 use super::alarms;
@@ -35,7 +36,7 @@ pub fn trend(args: &HilTrendArgs, json: bool) -> Outcome {
     let kept = alarms::keep(&args.history, &report);
     if let Some(file) = &args.html {
         let links: Vec<Links> = kept.iter().map(|k| k.links(file.parent())).collect();
-        let html = page(&report, &links, &history.accepted);
+        let html = page(&report, &links, &history.accepted).map_err(Failure::internal)?;
         std::fs::write(file, html)
             .map_err(|e| Failure::internal(format!("{}: {e}", file.display())))?;
     }
@@ -137,17 +138,36 @@ fn is_unicode() -> bool {
     locale.is_some_and(|l| l.to_lowercase().replace('-', "").contains("utf8"))
 }
 
-/// Adds a night to the history in `path`, and says what the trends make of it.
-pub(super) fn after(path: &Path, night: &Night, home: &Path) -> Result<String, HistoryError> {
+/// What the trends say after a night.
+pub(super) struct After {
+    pub report: Report,
+    /// One per alarm, of a page in the night's folder.
+    pub links: Vec<Links>,
+    accepted: Vec<Acceptance>,
+}
+
+impl After {
+    /// The page of all charts, for the night's folder.
+    pub fn page(&self) -> Result<String, ReportError> {
+        page(&self.report, &self.links, &self.accepted)
+    }
+}
+
+/// Adds a night, whose files are in `home`, to the history in `path`, and judges all nights up to it.
+pub(super) fn after(path: &Path, night: &Night, home: &Path) -> Result<After, HistoryError> {
     history::append(path, night, home)?;
     let filter = Filter {
         rig: Some(night.rig.clone()),
         suite: Some(night.suite.clone()),
     };
-    let report = judge(&history::load(path, &filter)?);
-    // Whether sessions of alarms could be kept is told by `hil trend`, which tries again.
-    alarms::keep(path, &report);
-    Ok(report.headline)
+    let history = history::load(path, &filter)?;
+    let report = judge(&history);
+    let kept = alarms::keep(path, &report);
+    Ok(After {
+        report,
+        links: kept.iter().map(|k| k.links(Some(home))).collect(),
+        accepted: history.accepted,
+    })
 }
 
 #[cfg(test)]

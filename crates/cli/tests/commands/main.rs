@@ -27,4 +27,5 @@ mod strangers;
 mod streams;
 mod support;
 mod tradeoff;
+mod trend;
 mod watch;

@@ -51,6 +51,14 @@ pub struct Alarm {
     pub attribution: Attribution,
 }
 
+impl Report {
+    /// Whether there are too few nights to say anything of any series.
+    #[must_use]
+    pub fn is_learning(&self) -> bool {
+        self.charts.iter().all(|c| c.reference.is_none())
+    }
+}
+
 /// Judges all series of `history`, and the ratios derived from them.
 #[must_use]
 pub fn judge(history: &History) -> Report {
@@ -211,20 +219,20 @@ fn headline(charts: &[Chart], alarms: &[Alarm], nights: &[NightHead]) -> String 
             "no trends: no night has a value yet".to_owned()
         } else if learning == charts.len() {
             format!(
-                "learning: {} of {FEWEST} nights that a reference needs",
+                "too few nights to say what moved: {} of the {FEWEST} that a reference needs",
                 most_nights(charts)
             )
         } else if learning > 0 {
             format!(
-                "nothing moved in {} nights; {learning} of {} series are being learnt",
+                "nothing moved in {} nights; {learning} of {} series are still being learnt",
                 nights.len(),
                 charts.len()
             )
         } else {
             format!(
-                "nothing moved: {} series over {} nights",
-                charts.len(),
-                nights.len()
+                "nothing moved in {} nights ({} series)",
+                nights.len(),
+                charts.len()
             )
         };
     };
@@ -257,6 +265,11 @@ fn headline(charts: &[Chart], alarms: &[Alarm], nights: &[NightHead]) -> String 
     )
 }
 
+/// Nights that were learnt from, of the series that has most.
 fn most_nights(charts: &[Chart]) -> usize {
-    charts.iter().map(|c| c.nights.len()).max().unwrap_or(0)
+    let learnt = |c: &Chart| {
+        let from = c.accepted.last().copied().unwrap_or(0);
+        c.nights.iter().filter(|n| n.night >= from).count()
+    };
+    charts.iter().map(learnt).max().unwrap_or(0)
 }

@@ -141,6 +141,15 @@ fn what_was_accepted_is_learnt_anew() {
     assert_eq!(chart.accepted, [60]);
     let centre = chart.reference.unwrap().centre;
     assert!((centre / (0.75 * 2.4e5) - 1.0).abs() < 0.05, "{centre}");
+    // Nights before it do not count towards the next reference.
+    history.accepted[0].night = history.nights[history.nights.len() - 5].id.clone();
+    let report = judge(&history);
+    assert!(report.is_learning());
+    assert!(
+        report.headline.contains(" 5 of the 12"),
+        "{}",
+        report.headline
+    );
 }
 
 #[test]
@@ -155,7 +164,7 @@ fn few_nights_are_learnt_from_and_invalid_ones_are_not() {
     let report = judge(&bench.history(11));
     assert!(report.alarms.is_empty());
     assert!(
-        report.headline.starts_with("learning: 11 of 12"),
+        report.headline.contains("what moved: 11 of the 12"),
         "{}",
         report.headline
     );

@@ -1,27 +1,8 @@
-// Behaviour of the page of a comparison: theme, print, downloads. No dependencies.
-'use strict';
+// Behaviour of the page of a comparison: downloads. Stands after the script of all pages. No dependencies.
 (() => {
   const $ = (q, from = document) => from.querySelector(q);
   const $$ = (q, from = document) => [...from.querySelectorAll(q)];
   const data = JSON.parse($('#report-data').textContent);
-
-  // Theme: follows the system until the button is used.
-  const root = document.documentElement;
-  const button = $('#theme');
-  const systemDark = matchMedia('(prefers-color-scheme: dark)');
-  const isDark = () => (root.dataset.theme || (systemDark.matches ? 'dark' : 'light')) === 'dark';
-  const label = () => { button.textContent = isDark() ? 'Light' : 'Dark'; };
-  const store = value => { try { localStorage.setItem('skinrig-theme', value); } catch { /* a page may be denied storage */ } };
-  try { const kept = localStorage.getItem('skinrig-theme'); if (kept === 'dark' || kept === 'light') root.dataset.theme = kept; } catch { /* same */ }
-  const asked = location.hash.match(/theme=(dark|light)/);
-  if (asked) root.dataset.theme = asked[1];
-  button.addEventListener('click', () => { root.dataset.theme = isDark() ? 'light' : 'dark'; store(root.dataset.theme); label(); });
-  systemDark.addEventListener('change', label);
-  label();
-  let before;
-  addEventListener('beforeprint', () => { before = root.dataset.theme; root.dataset.theme = 'light'; });
-  addEventListener('afterprint', () => { if (before) root.dataset.theme = before; else delete root.dataset.theme; });
-  $('#print').addEventListener('click', () => print());
 
   // Downloads.
   const save = (name, type, content) => {

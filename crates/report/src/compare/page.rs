@@ -1,7 +1,7 @@
 //! Owns the page of a comparison: what its template and its script receive.
 
 use minijinja::value::Serde;
-use minijinja::{AutoEscape, Environment, Value, context};
+use minijinja::{Value, context};
 use serde::Serialize;
 use skinrig_compare::statistics::Verdict;
 use skinrig_compare::{Comparison, Weight};
@@ -10,13 +10,11 @@ use super::figures::{self, Drawn};
 use super::{tables, words};
 use crate::ReportError;
 use crate::format::number;
-use crate::page::{PAGE_CSS, script_json};
+use crate::frame::{Frame, safe};
+use crate::page::script_json;
 use crate::svg::{FIGURE_CSS, plain_css};
 
-const TEMPLATES: [(&str, &str); 2] = [
-    ("page.html", include_str!("../../assets/compare/page.html")),
-    ("macros.html", include_str!("../../assets/macros.html")),
-];
+const TEMPLATE: &str = include_str!("../../assets/compare/page.html");
 const CSS: &str = include_str!("../../assets/compare/page.css");
 const SCRIPT: &str = include_str!("../../assets/compare/page.js");
 
@@ -62,12 +60,6 @@ struct Why {
 /// # Errors
 /// [`ReportError`] when the template or the script data cannot be written; no input is known to cause it.
 pub fn html(result: &Comparison) -> Result<String, ReportError> {
-    let mut env = Environment::new();
-    env.set_auto_escape_callback(|_| AutoEscape::Html);
-    for (name, source) in TEMPLATES {
-        env.add_template(name, source)?;
-    }
-    let safe = |text: &str| Value::from_safe_string(text.to_owned());
     let versus: Vec<Versus> = (1..result.skins.len()).map(|k| versus(result, k)).collect();
     let of = |weight: Weight| {
         let rows = result
@@ -88,12 +80,13 @@ pub fn html(result: &Comparison) -> Result<String, ReportError> {
         many => format!("{} skins against {}", many.len(), result.skins[0].name),
     };
     let data = tables::script_data(result);
-    Ok(env.get_template("page.html")?.render(context! {
-        page_css => safe(PAGE_CSS),
-        own_css => safe(CSS),
-        figure_css => safe(FIGURE_CSS),
+    let frame = Frame {
+        templates: &[("comparison.html", TEMPLATE)],
+        styles: &[FIGURE_CSS, CSS],
+        script: SCRIPT,
+    };
+    frame.render(context! {
         plain_css => safe(&plain_css()),
-        script => safe(SCRIPT),
         data => safe(&script_json(&data)?),
         heading,
         stand_in => words::stand_in(result),
@@ -111,7 +104,7 @@ pub fn html(result: &Comparison) -> Result<String, ReportError> {
         confounding => of(Weight::Confounding),
         harmless => of(Weight::Harmless),
         versus => Value::from(Serde(versus)),
-    })?)
+    })
 }
 
 fn versus(result: &Comparison, k: usize) -> Versus {

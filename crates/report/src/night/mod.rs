@@ -3,8 +3,10 @@
 mod bars;
 mod page;
 mod tree;
+mod trends;
 mod words;
 
 pub use page::html;
 pub use tree::{Colour, line, tree};
+pub use trends::Trends;
 pub use words::span;

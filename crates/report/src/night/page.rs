@@ -1,16 +1,15 @@
 //! Owns the page of a night: what its template receives.
 
-use base64::Engine as _;
-use base64::engine::general_purpose::STANDARD;
 use minijinja::value::Serde;
-use minijinja::{AutoEscape, Environment, Value, context};
+use minijinja::{Value, context};
 use serde::Serialize;
-use sha2::{Digest, Sha256};
 use skinrig_nightly::{Attempt, Cause, CheckResult, Measurement, Night, Verdict};
 
+use super::trends::Trends;
 use super::{bars, words};
 use crate::ReportError;
-use crate::page::PAGE_CSS;
+use crate::frame::Frame;
+use crate::trend::{ALARM_CSS, ALARM_TEMPLATE};
 
 const TEMPLATE: &str = include_str!("../../assets/night/page.html");
 const CSS: &str = include_str!("../../assets/night/page.css");
@@ -22,6 +21,8 @@ struct Place {
     name: &'static str,
     state: &'static str,
     words: String,
+    moved: Option<bool>,
+    trend: Option<String>,
     checks: Vec<Named>,
 }
 
@@ -76,24 +77,23 @@ struct Seen {
     next: Option<String>,
 }
 
-/// The night as one HTML page that needs no network; only the golden session's report is another file, and linked.
+/// The night, and what the nights before make of it, as one HTML page that needs no network; the golden session's report and the
+/// page of the trends are other files, and linked.
 ///
 /// # Errors
 /// [`ReportError`] when the template cannot be written; no input is known to cause it.
-pub fn html(night: &Night) -> Result<String, ReportError> {
-    let mut env = Environment::new();
-    env.set_auto_escape_callback(|_| AutoEscape::Html);
-    env.add_template("night.html", TEMPLATE)?;
-    let safe = |text: &str| Value::from_safe_string(text.to_owned());
+pub fn html(night: &Night, trends: Trends<'_>) -> Result<String, ReportError> {
+    let frame = Frame {
+        templates: &[("night.html", TEMPLATE), ("alarm.html", ALARM_TEMPLATE)],
+        styles: &[ALARM_CSS, CSS],
+        script: SCRIPT,
+    };
     let longest = night.checks.iter().map(words::took_s).fold(0.0, f64::max);
     let checks: Vec<Check> = night.checks.iter().map(|c| check(c, longest)).collect();
     let share = |seconds: f64| (100.0 * seconds / night.budget_s.max(1e-9)).clamp(0.0, 100.0);
-    Ok(env.get_template("night.html")?.render(context! {
-        page_css => safe(PAGE_CSS),
-        own_css => safe(CSS),
-        script => safe(SCRIPT),
-        script_hash => format!("sha256-{}", STANDARD.encode(Sha256::digest(SCRIPT))),
-        headline => words::headline(night),
+    frame.render(context! {
+        headline => trends.headline(night),
+        trends => trends.value(),
         id => night.id.clone(),
         suite => night.suite.clone(),
         rig => night.rig.clone(),
@@ -106,7 +106,7 @@ pub fn html(night: &Night) -> Result<String, ReportError> {
         ended_early => night.ended_early.clone(),
         lease_note => night.lease_note.clone(),
         tally => words::tally(night),
-        places => Value::from(Serde(places(night))),
+        places => Value::from(Serde(places(night, trends))),
         took => words::span(night.took_s),
         planned => words::span(night.planned_s),
         budget => words::span(night.budget_s),
@@ -122,11 +122,11 @@ pub fn html(night: &Night) -> Result<String, ReportError> {
         skin => night.versions.skin.clone(),
         suite_sha256 => night.suite_sha256.clone(),
         rig_sha256 => night.rig_sha256.clone(),
-    })?)
+    })
 }
 
 /// The four places that may have to be looked at, and what the night says of each.
-fn places(night: &Night) -> Vec<Place> {
+fn places(night: &Night, trends: Trends<'_>) -> Vec<Place> {
     let named = words::causes(night);
     [
         (Cause::Rig, "Rig"),
@@ -149,10 +149,13 @@ fn places(night: &Night) -> Vec<Place> {
         } else {
             ("ok", "nothing found".to_owned())
         };
+        let (moved, trend) = trends.of(cause).unzip();
         Place {
             name,
             state,
             words,
+            moved,
+            trend,
             checks,
         }
     })

@@ -141,7 +141,7 @@ pub(super) fn headline(night: &Night) -> String {
     let marginal = count(night, Verdict::Marginal);
     match (looked_at.as_slice(), night.verdict, marginal) {
         ([], Verdict::Skipped, _) => "Nothing was checked".to_owned(),
-        ([], _, 0) => "Rig, skin and software are as they should be".to_owned(),
+        ([], _, 0) => "All within limits".to_owned(),
         ([], _, 1) => "All within limits, one of them nearly not".to_owned(),
         ([], _, n) => format!("All within limits, {n} of them nearly not"),
         (some, _, _) => format!("Look at {}", listed(some)),
@@ -149,12 +149,17 @@ pub(super) fn headline(night: &Night) -> String {
 }
 
 /// `a, b and c`.
-fn listed(words: &[String]) -> String {
+pub(super) fn listed(words: &[String]) -> String {
     match words {
         [] => String::new(),
         [one] => one.clone(),
         [most @ .., last] => format!("{} and {last}", most.join(", ")),
     }
+}
+
+/// Whether any check was made.
+pub(super) fn was_made(night: &Night) -> bool {
+    night.checks.iter().any(|c| !c.attempts.is_empty())
 }
 
 /// How many checks have this verdict.

@@ -1,13 +1,8 @@
-//! Owns what the page is made of: templates, style, script.
+//! Owns what the page is made of beside the frame of all pages: templates and script.
 
-use base64::Engine as _;
-use base64::engine::general_purpose::STANDARD;
-use sha2::{Digest, Sha256};
-
-/// The templates: the page, its macros, and one file per section.
-pub(super) const TEMPLATES: [(&str, &str); 15] = [
+/// The templates: the page, and one file per section.
+pub(super) const TEMPLATES: [(&str, &str); 14] = [
     ("page.html", include_str!("../../assets/page.html")),
-    ("macros.html", include_str!("../../assets/macros.html")),
     (
         "sections/results.html",
         include_str!("../../assets/sections/results.html"),
@@ -61,19 +56,12 @@ pub(super) const TEMPLATES: [(&str, &str); 15] = [
         include_str!("../../assets/sections/presses.html"),
     ),
 ];
-pub(crate) const PAGE_CSS: &str = include_str!("../../assets/page.css");
 /// One script: each part but the first stands in a function of its own.
 pub(super) const SCRIPT: &str = concat!(
     include_str!("../../assets/script/core.js"),
-    include_str!("../../assets/script/theme.js"),
     include_str!("../../assets/script/filter.js"),
     include_str!("../../assets/script/download.js"),
     include_str!("../../assets/script/map.js"),
     include_str!("../../assets/script/rates.js"),
     include_str!("../../assets/script/presses.js"),
 );
-
-/// The script's digest as a content security policy names it: nothing else on the page may run.
-pub(super) fn script_hash() -> String {
-    format!("sha256-{}", STANDARD.encode(Sha256::digest(SCRIPT)))
-}

@@ -1,7 +1,7 @@
 //! Owns the HTML page: what the template and the script receive.
 //!
-//! The template is `assets/page.html` with `assets/sections/*.html` (minijinja, auto-escaped), the style `assets/page.css` and
-//! `assets/figure.css`, the script `assets/script/*.js`. The script gets one JSON value with named tables
+//! The template is `assets/page.html` with `assets/sections/*.html` (minijinja, auto-escaped) in the frame of all pages
+//! (`assets/frame/`), the script `assets/script/*.js`. The script gets one JSON value with named tables
 //! (columns and column-wise data): the press table, tooltips and CSV downloads all read it.
 
 mod alignment;
@@ -17,16 +17,16 @@ mod reduction;
 use std::collections::BTreeMap;
 
 use minijinja::value::Serde;
-use minijinja::{AutoEscape, Environment, Value, context};
+use minijinja::{Value, context};
 use serde::Serialize;
 use skinrig_analysis::result::Analysis;
 
-pub(crate) use assets::PAGE_CSS;
-use assets::{SCRIPT, TEMPLATES, script_hash};
+use assets::{SCRIPT, TEMPLATES};
 
 use crate::derive;
 use crate::figures::{self, Figure};
 use crate::format::{digits_of_error, grouped, interval, number, or_missing};
+use crate::frame::{Frame, safe};
 use crate::provenance::Provenance;
 use crate::svg::{FIGURE_CSS, plain_css};
 use crate::tables;
@@ -56,11 +56,6 @@ pub fn script_json<T: Serialize>(value: &T) -> Result<String, serde_json::Error>
 
 /// See [`crate::html`].
 pub(crate) fn render(input: &ReportInput<'_>) -> Result<String, ReportError> {
-    let mut env = Environment::new();
-    env.set_auto_escape_callback(|_| AutoEscape::Html);
-    for (name, source) in TEMPLATES {
-        env.add_template(name, source)?;
-    }
     let (a, p) = (input.analysis, &input.provenance);
     let fig: BTreeMap<&str, Value> = figures::all(input)
         .into_iter()
@@ -69,12 +64,13 @@ pub(crate) fn render(input: &ReportInput<'_>) -> Result<String, ReportError> {
     let c = &a.counts;
     let usable = a.alignment.is_usable();
     let count = |key: &str, name: &str, n: u32| context! { key, name, n };
-    let page = env.get_template("page.html")?.render(context! {
-        page_css => safe(PAGE_CSS),
-        figure_css => safe(FIGURE_CSS),
+    let frame = Frame {
+        templates: &TEMPLATES,
+        styles: &[FIGURE_CSS],
+        script: SCRIPT,
+    };
+    frame.render(context! {
         plain_css => safe(&plain_css()),
-        script => safe(SCRIPT),
-        script_hash => safe(&script_hash()),
         data => safe(&script_json(&tables::script_data(input))?),
         session => or_missing(&p.session_id),
         heading => heading(&p.protocol_name),
@@ -156,8 +152,7 @@ pub(crate) fn render(input: &ReportInput<'_>) -> Result<String, ReportError> {
         tradeoff_unreadable => input.tradeoff.and_then(Result::err),
         fig,
         press_total => a.presses.len(),
-    })?;
-    Ok(page)
+    })
 }
 
 /// The tables of the sections, by name; those without data are missing.
@@ -233,10 +228,6 @@ fn threshold_note(a: &Analysis) -> Option<String> {
         "A press needs {} cluster events in each camera: chosen on the {} calibrating presses alone, of which it leaves out {}.",
         t.events, t.n, t.left_out
     ))
-}
-
-fn safe(text: &str) -> Value {
-    Value::from_safe_string(text.to_owned())
 }
 
 fn figure_value(f: Figure) -> Value {

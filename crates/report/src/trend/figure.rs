@@ -10,7 +10,7 @@ use crate::svg::{Px, Svg, dots, polyline};
 const LARGE: (f64, f64) = (860.0, 250.0);
 const SMALL: (f64, f64) = (330.0, 46.0);
 /// Around the large one: left, right, top, bottom.
-const MARGINS: (f64, f64, f64, f64) = (84.0, 16.0, 14.0, 46.0);
+const MARGINS: (f64, f64, f64, f64) = (84.0, 36.0, 14.0, 46.0);
 
 /// The values that must be seen, and a little room.
 fn range(chart: &Chart, limits: bool) -> (f64, f64) {
@@ -136,7 +136,7 @@ fn marks(svg: &mut Svg, chart: &Chart, x: Scale, y: Scale, large: bool) {
             svg.line("ref2", (left, y.at(limit)), (right, y.at(limit)));
             svg.text(
                 (right - 4.0, y.at(limit) - 4.0),
-                "note",
+                "note halo",
                 "end",
                 &format!("limit {}", number(limit)),
             );

@@ -1,15 +1,20 @@
 //! Owns the presentation of trends: charts for the terminal, page with alarms first.
 
+mod alarm;
 mod figure;
 mod page;
 mod terminal;
 
-use skinrig_nightly::Cause;
 use skinrig_nightly::trend::report::{day, figure as number, moved_by, name};
 use skinrig_nightly::trend::{Alarm, Chart, Report};
 
+pub(crate) use alarm::told;
 pub use page::page;
-pub use terminal::{Style, terminal};
+pub use terminal::{Style, sentence, terminal};
+
+/// How an alarm is told, on every page that does, and its style.
+pub(crate) const ALARM_TEMPLATE: &str = include_str!("../../assets/trend/alarm.html");
+pub(crate) const ALARM_CSS: &str = include_str!("../../assets/trend/alarm.css");
 
 /// Where an alarm's files are, as links of the page that is written.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -25,7 +30,7 @@ pub struct Links {
 }
 
 /// When an alarm began, for people.
-fn since(report: &Report, alarm: &Alarm) -> String {
+pub(crate) fn since(report: &Report, alarm: &Alarm) -> String {
     let [from, to] = alarm.since.map(|n| &report.nights[n]);
     if alarm.since[0] == alarm.since[1] {
         format!("since the night of {}", day(from))
@@ -66,12 +71,4 @@ fn moved(chart: &Chart) -> String {
     let off = chart.off();
     off.map(|e| moved_by(e, &chart.series.unit))
         .unwrap_or_default()
-}
-
-/// A class for the colour of a cause.
-const fn tone(cause: Option<Cause>) -> &'static str {
-    match cause {
-        Some(Cause::Infrastructure) => "warn",
-        _ => "bad",
-    }
 }

@@ -88,6 +88,12 @@ pub fn terminal(
     out
 }
 
+/// The trends of `report` in one sentence, in lines of 80 columns.
+#[must_use]
+pub fn sentence(report: &Report) -> String {
+    wrapped(&format!("trend: {}", report.headline), 0).join("\n")
+}
+
 fn line(out: &mut String, report: &Report, chart: &Chart, style: Style) {
     let name: String = plain(&chart.series.name).chars().take(36).collect();
     let last = chart.nights.last();

@@ -1,5 +1,7 @@
 //! A night on a terminal and as a page: what is said first, what of each check, and that nothing escapes its place.
 
+mod trends;
+
 use skinrig_model::Limit;
 use skinrig_nightly::judge::{RepeatRule, attempt};
 use skinrig_nightly::rules::across;
@@ -7,7 +9,7 @@ use skinrig_nightly::{
     Cause, CheckResult, Evidence, EvidenceKind, Golden, Measurement, Night, NightExit, Part,
     Verdict, Versions,
 };
-use skinrig_report::night::{Colour, html, tree};
+use skinrig_report::night::{Colour, Trends, html, tree};
 
 fn measured(metric: &str, value: Option<f64>, unit: &str, limit: Option<Limit>) -> Measurement {
     Measurement {
@@ -215,7 +217,7 @@ fn what_a_device_says_neither_moves_the_cursor_nor_becomes_markup() {
     let mut night = bad_night();
     night.checks[1].attempts[0].evidence[0].what = "\u{1b}[2J<b>x</b> \u{7}".to_owned();
     assert!(!tree(&night, Colour::Off).contains(['\u{1b}', '\u{7}']));
-    let page = html(&night).unwrap_or_default();
+    let page = html(&night, Trends::NotKept).unwrap_or_default();
     assert!(page.contains("&lt;b&gt;x"), "{page}");
     assert!(!page.contains("<b>x</b>"));
     assert!(!page.contains("<script>alert"));
@@ -229,24 +231,24 @@ fn places(page: &str) -> Vec<&str> {
 
 #[test]
 fn the_page_says_first_where_to_look() {
-    let bad = html(&bad_night()).unwrap_or_default();
+    let bad = html(&bad_night(), Trends::NotKept).unwrap_or_default();
     assert!(bad.contains("<h1 data-testid=\"headline\">Look at the rig</h1>"));
     // The skin: its campaign says nothing, for the rig was at fault.
     assert_eq!(places(&bad), ["bad", "unknown", "ok", "ok"]);
     assert!(bad.contains("href=\"golden.report.html\""));
     assert!(bad.contains("data-testid=\"emulated\""));
-    let good = html(&good_night()).unwrap_or_default();
-    assert!(good.contains("Rig, skin and software are as they should be"));
+    let good = html(&good_night(), Trends::NotKept).unwrap_or_default();
+    assert!(good.contains(">All within limits</h1>"));
     assert_eq!(places(&good), ["ok", "unknown", "ok", "ok"]);
     let mut unfinished = good_night();
     unfinished.finished = false;
-    let page = html(&unfinished).unwrap_or_default();
+    let page = html(&unfinished, Trends::NotKept).unwrap_or_default();
     assert!(page.contains("data-testid=\"unfinished\""));
 }
 
 #[test]
 fn the_page_loads_nothing_and_runs_only_its_own_script() {
-    let page = html(&bad_night()).unwrap_or_default();
+    let page = html(&bad_night(), Trends::NotKept).unwrap_or_default();
     assert!(page.contains("default-src 'none'"));
     assert!(page.contains("script-src 'sha256-"));
     for foreign in ["http://", "https://", "src=\"", "@import", "<link"] {

@@ -1,0 +1,379 @@
+//! The nights of a bench as a laboratory looks at them in the morning: what moved, on the terminal, on the page of the trends and on
+//! that of the last night; and a change that is accepted.
+
+mod nights;
+
+use std::path::{Path, PathBuf};
+
+use skinrig_nightly::{Night, NightExit, Verdict};
+
+use crate::support::{files, only, skinrig, text};
+use nights::Nights;
+
+const EVENTS: &str = "golden/skin/press_events";
+
+/// A page, with slashes as they are: in a page they are escaped too.
+#[track_caller]
+fn read(page: &Path) -> String {
+    std::fs::read_to_string(page)
+        .unwrap()
+        .replace("&#x2f;", "/")
+}
+
+#[track_caller]
+fn has(text: &str, parts: &[&str]) {
+    for part in parts {
+        assert!(text.contains(part), "expected {part:?} in {text}");
+    }
+}
+
+/// What stands in the element with this test id, without what stands in elements in it.
+#[track_caller]
+fn says<'a>(page: &'a str, id: &str) -> &'a str {
+    let after = page.split(&format!("data-testid=\"{id}\"")).nth(1);
+    let after = after.unwrap_or_else(|| panic!("no {id} in {page}"));
+    let (_, text) = after.split_once('>').unwrap();
+    text.split('<').next().unwrap()
+}
+
+/// Asserts that every link of the page leads to a file, or to a place in one; the links.
+#[track_caller]
+fn links(page: &Path) -> Vec<String> {
+    let html = read(page);
+    let hrefs = html.split("href=\"").skip(1);
+    let hrefs: Vec<String> = hrefs
+        .map(|rest| rest.split('"').next().unwrap().to_owned())
+        .collect();
+    for href in &hrefs {
+        let (file, place) = href.split_once('#').unwrap_or((href, ""));
+        let file = match file.strip_prefix("file://") {
+            Some(full) => PathBuf::from(full),
+            None if file.is_empty() => page.to_owned(),
+            None => page.parent().unwrap().join(file),
+        };
+        assert!(file.is_file(), "{href} of {} leads nowhere", page.display());
+        if !place.is_empty() {
+            let html = read(&file);
+            assert!(html.contains(&format!(" id=\"{place}\"")), "{href}");
+        }
+    }
+    hrefs
+}
+
+#[test]
+fn the_terminal_says_what_moved_since_when_and_why() {
+    let nights = Nights::of(40, 36);
+    let told = nights.trend(&["--ascii"]).code(1);
+    has(
+        &told.out,
+        &[
+            &format!("{EVENTS} moved (-20 %)"),
+            "on 2024-02-06",
+            "probable cause: the skin",
+            "alarm 2024-02-08T02-00-00Z-small",
+            "no session: that night has no golden session",
+            "idle/camera1/data_rate",
+        ],
+    );
+    assert!(
+        told.out
+            .lines()
+            .all(|l| l.chars().count() <= 80 && l.is_ascii()),
+        "{}",
+        told.out
+    );
+    let one = nights.trend(&["--series", "idle/*"]).code(1);
+    let table = one.out.split("series  ").last().unwrap();
+    assert!(
+        table.contains("data_rate") && !table.contains("press_events"),
+        "{}",
+        one.out
+    );
+    let json = nights.trend(&["--json"]).code(1).json();
+    let alarm = &json["alarms"][0];
+    assert_eq!(alarm["attribution"]["cause"], "skin");
+    assert_eq!(alarm["since"], serde_json::json!([36, 36]));
+
+    let steady = Nights::of(40, 40).trend(&[]).code(0);
+    has(&steady.out, &["nothing moved in 40 nights (2 series)"]);
+    let few = Nights::of(11, 11).trend(&[]).code(0);
+    has(
+        &few.out,
+        &["too few nights to say what moved: 11 of the 12 that a reference needs"],
+    );
+}
+
+#[test]
+fn what_is_no_history_is_bad_input_and_left_alone() {
+    let nights = Nights::of(3, 3);
+    let lab = &nights.lab;
+    let none = lab.text("none.sqlite");
+    let page = lab.text("page.html");
+    skinrig(&["hil", "trend", &none, "--html", &page])
+        .code(2)
+        .complains(&["expected a history of nights, found nothing", "--rebuild"]);
+    assert!(!lab.path("none.sqlite").exists() && !lab.path("page.html").exists());
+
+    std::fs::write(lab.path("notes.txt"), "name,value\n").unwrap();
+    let notes = lab.text("notes.txt");
+    skinrig(&["hil", "trend", &notes])
+        .code(2)
+        .complains(&["a file that is not SQLite"]);
+    let of_notes = [
+        "hil",
+        "accept",
+        "--all",
+        "--night",
+        "x",
+        "--reason",
+        "r",
+        "--history",
+        &notes,
+    ];
+    skinrig(&of_notes)
+        .code(2)
+        .complains(&["a file that is not SQLite"]);
+    assert_eq!(std::fs::read_to_string(&notes).unwrap(), "name,value\n");
+
+    nights
+        .trend(&["--rig", "another"])
+        .code(2)
+        .complains(&["on another", "small on emulated"]);
+    nights
+        .trend(&["--series", "lamp"])
+        .code(2)
+        .complains(&["found `lamp`", "none of 2"]);
+}
+
+#[test]
+fn an_alarm_links_a_session_that_outlives_its_night_and_replays() {
+    let nights = Nights::new();
+    let session = nights.lab.record("s", &[]);
+    nights.add(0..36, 36, None);
+    nights.add(36..40, 36, Some(&session));
+    let page = nights.lab.path("trends.html");
+    let html = |to: &Path| nights.trend(&["--html", &text(to)]).code(1);
+    let told = html(&page);
+    has(&told.out, &[&text(&page)]);
+    let there = links(&page);
+    let kept = nights.lab.path("nights/alarms/2024-02-08T02-00-00Z-small");
+    let kept = only(&kept, ".session.sqlite");
+    assert!(
+        there.iter().any(|l| l.ends_with(".session.sqlite")),
+        "{there:?}"
+    );
+    assert!(
+        there.contains(&"nights/2024-02-08T02-00-00Z-small/night.html".to_owned()),
+        "{there:?}"
+    );
+    let shown = read(Path::new(&page));
+    has(
+        says(&shown, "headline"),
+        &[EVENTS, "probable cause: the skin"],
+    );
+    assert_eq!(says(&shown, "alarms"), "1 alarm");
+    assert_eq!(says(&shown, "theme"), "Dark");
+
+    // The nights are cleared away, and what the terminal says to do still works.
+    for night in files(&nights.lab.path("nights"), "-small") {
+        std::fs::remove_dir_all(night).unwrap();
+    }
+    let told = html(&page);
+    links(&page);
+    for (command, more) in [("run --replay", &["--no-analysis"][..]), ("verify", &[])] {
+        let line = told.out.lines().map(str::trim);
+        let mut found = line.filter_map(|l| l.strip_prefix(&format!("skinrig {command} ")));
+        let file = found
+            .next()
+            .unwrap_or_else(|| panic!("no {command}: {told:#?}"));
+        assert_eq!(Path::new(file), kept);
+        let sessions = nights.lab.text("replayed");
+        let mut arguments: Vec<&str> = command.split(' ').chain([file]).collect();
+        if !more.is_empty() {
+            arguments.extend(["--sessions", &sessions]);
+            arguments.extend(more);
+        }
+        skinrig(&arguments).code(0);
+    }
+}
+
+#[test]
+fn an_accepted_change_is_learnt_anew_and_says_who_and_why() {
+    let nights = Nights::of(40, 36);
+    let first = "2024-02-06T02-00-00Z-small";
+    let before = std::fs::read(&nights.history).unwrap();
+    for (arguments, why) in [
+        (
+            &["golden/skin/lamp", "--night", first, "--reason", "r"][..],
+            "golden/skin/lamp",
+        ),
+        (
+            &[EVENTS, "--night", "2024-02-31", "--reason", "r"],
+            "the newest is 2024-02-09",
+        ),
+        (
+            &[EVENTS, "--night", first, "--reason", " "],
+            "--reason: expected why",
+        ),
+        (&["--night", first, "--reason", "r"], "<SERIES>"),
+        (
+            &[EVENTS, "--all", "--night", first, "--reason", "r"],
+            "--all",
+        ),
+    ] {
+        nights.accept(arguments).code(2).complains(&[why]);
+    }
+    assert_eq!(std::fs::read(&nights.history).unwrap(), before);
+    nights.trend(&[]).code(1);
+
+    let taken = [
+        EVENTS,
+        "--night",
+        first,
+        "--reason",
+        "a <new> lamp",
+        "--by",
+        "ada",
+    ];
+    let said = nights.accept(&taken).code(0);
+    assert_eq!(
+        said.out.trim(),
+        format!("{EVENTS}: learnt anew from night {first} on")
+    );
+    let page = nights.lab.text("trends.html");
+    let told = nights.trend(&["--html", &page]).code(0);
+    has(
+        &told.out,
+        &["nothing moved in 40 nights; 1 of 2 series are still being learnt"],
+    );
+    let shown = read(Path::new(&page));
+    let (_, accepted) = shown.split_once("data-testid=\"accepted\"").unwrap();
+    has(accepted, &[first, EVENTS, "a &lt;new&gt; lamp", "ada, 20"]);
+    assert_eq!(says(&shown, "alarms"), "no alarm");
+    // The new level is the one that it is held against from now on.
+    nights.add(40..60, 36, None);
+    has(
+        &nights.trend(&[]).code(0).out,
+        &["nothing moved in 60 nights (2 series)"],
+    );
+    nights.add(60..64, 0, None);
+    nights.trend(&[]).code(0);
+
+    let all = [
+        "--all",
+        "--night",
+        "2024-03-01T02-00-00Z-small",
+        "--reason",
+        "new skin",
+    ];
+    let said = nights
+        .accept(&[&["--json"], &all[..]].concat())
+        .code(0)
+        .json();
+    assert!(
+        said["series"].is_null() && said["reason"] == "new skin",
+        "{said}"
+    );
+    has(
+        &nights.trend(&[]).code(0).out,
+        &["too few nights to say what moved: 4 of the 12"],
+    );
+}
+
+#[test]
+fn the_page_of_a_night_says_what_moved_over_the_nights() {
+    let nights = Nights::new();
+    let session = nights.lab.record("s", &[]);
+    nights.add(0..36, 36, None);
+    nights.add(36..40, 36, Some(&session));
+    let (ran, folder) = nights.run(&["--history", &nights.history]);
+    // Its limits are met: an alarm of the trends does not change how it ends.
+    let ran = ran.code(0);
+    let sentence = format!("{EVENTS} moved (-20 %) on 2024-02-06; probable cause: the skin");
+    assert!(
+        ran.out
+            .lines()
+            .all(|l| l.chars().count() <= 80 || l.starts_with('/'))
+    );
+    let words: Vec<&str> = ran.out.split_whitespace().collect();
+    let trends = text(&folder.join("trends.html"));
+    has(&words.join(" "), &[&format!("trend: {sentence}"), &trends]);
+    let page = folder.join("night.html");
+    let there = links(&page);
+    has(
+        &there.join("\n"),
+        &[
+            "trends.html\n",
+            "trends.html#2024-02-08T02-00-00Z-small",
+            "../2024-02-08T02-00-00Z-small/night.html",
+            "../alarms/2024-02-08T02-00-00Z-small/",
+        ],
+    );
+    links(&folder.join("trends.html"));
+    let shown = read(Path::new(&page));
+    assert_eq!(
+        says(&shown, "headline"),
+        "All within limits, but the skin probably moved"
+    );
+    let trends = shown.find("data-testid=\"trends-moved\"").unwrap();
+    assert!(trends < shown.find("id=\"checks\"").unwrap());
+    has(
+        &shown[trends..],
+        &[&sentence, "skinrig run --replay ", "skinrig verify "],
+    );
+    let json = std::fs::read_to_string(folder.join("night.json")).unwrap();
+    let night: Night = serde_json::from_str(&json).unwrap();
+    assert_eq!(
+        (night.verdict, night.exit),
+        (Verdict::Pass, NightExit::Pass)
+    );
+}
+
+#[test]
+fn a_night_without_trends_says_why_and_is_judged_all_the_same() {
+    let nights = Nights::of(10, 10);
+    let shown = |folder: &Path| read(&folder.join("night.html"));
+    let (ran, folder) = nights.run(&[]);
+    ran.code(0);
+    let page = shown(&folder);
+    has(
+        &page,
+        &["data-testid=\"trends-not-kept\"", "--history FILE"],
+    );
+    assert!(!folder.join("trends.html").exists());
+    links(&folder.join("night.html"));
+
+    let (ran, folder) = nights.run(&["--history", &nights.history]);
+    let too_few = "too few nights to say what moved: 10 of the 12";
+    has(&ran.code(0).out, &[too_few]);
+    has(
+        &shown(&folder),
+        &["data-testid=\"trends-learning\"", too_few],
+    );
+
+    std::fs::write(nights.lab.path("notes.txt"), "name,value\n").unwrap();
+    let (ran, folder) = nights.run(&["--history", &nights.lab.text("notes.txt")]);
+    let ran = ran.code(0);
+    assert!(!ran.out.contains("trend"), "{ran:#?}");
+    ran.complains(&[
+        "no trends tonight",
+        "a file that is not SQLite",
+        "--rebuild",
+    ]);
+    let page = shown(&folder);
+    assert_eq!(says(&page, "verdict"), "PASS");
+    has(
+        &page,
+        &[
+            "data-testid=\"trends-untold\"",
+            "a file that is not SQLite",
+            "judged all the same",
+        ],
+    );
+    // It is added when the history is there again.
+    let all = nights.lab.text("nights");
+    nights
+        .trend(&["--rebuild", &all])
+        .code(0)
+        .complains(&["2 nights added"]);
+}

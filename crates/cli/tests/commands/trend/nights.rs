@@ -1,0 +1,160 @@
+//! Nights that were never made: a bench's history, as the library writes it.
+
+use std::path::{Path, PathBuf};
+
+use chrono::{Days, NaiveDate};
+use skinrig_hil::history::append;
+use skinrig_nightly::night::{Attempt, CheckResult, Measurement, NIGHT_VERSION, Part};
+use skinrig_nightly::{Golden, Night, NightExit, Verdict, Versions};
+
+use crate::support::{Lab, Said, program, said, skinrig};
+
+/// Names of the bench and the suite, as the emulated rig file and [`SUITE`] have them.
+const RIG: &str = "emulated";
+/// What needs no device.
+const SUITE: &str = "\
+skinrig_suite: 1
+name: small
+budget: 10 min
+checks:
+  disk: {amount: 1 MB, write_rate: {at_least: 1 kB/s}, free: {at_least: 1 B}}
+";
+
+/// Night number `at`, in which the golden skin gave this share of its events.
+fn night(at: usize, share: f64, golden: Option<&str>) -> Night {
+    let day = NaiveDate::from_ymd_opt(2024, 1, 1).unwrap() + Days::new(at as u64);
+    let wobble = (at * 7 % 5) as f64;
+    let measured = |metric: &str, unit: &str, value: f64| Measurement {
+        metric: metric.to_owned(),
+        value: Some(value),
+        unit: unit.to_owned(),
+        interval: None,
+        n: None,
+        needs: 0,
+        limit: None,
+        verdict: Verdict::Pass,
+        note: None,
+    };
+    let check = |name: &str, subject: &str, measurements: Vec<Measurement>| CheckResult {
+        name: name.to_owned(),
+        title: name.to_owned(),
+        planned_s: 30.0,
+        attempts: vec![Attempt {
+            began_s: 0.0,
+            took_s: 30.0,
+            parts: vec![Part {
+                subject: subject.to_owned(),
+                measurements,
+                verdict: Verdict::Pass,
+            }],
+            evidence: Vec::new(),
+            verdict: Verdict::Pass,
+            cause: None,
+            rule: None,
+        }],
+        skipped: None,
+        verdict: Verdict::Pass,
+        repeats: None,
+        cause: None,
+        rule: None,
+        witnesses: Vec::new(),
+    };
+    let events = share * (1e5 + 1e3 * wobble);
+    Night {
+        version: NIGHT_VERSION,
+        id: format!("{day}T02-00-00Z-small"),
+        suite: "small".to_owned(),
+        suite_sha256: "5".repeat(64),
+        rig: RIG.to_owned(),
+        rig_kind: "emulated".to_owned(),
+        rig_sha256: "6".repeat(64),
+        versions: Versions::default(),
+        started: format!("{day}T02:00:00Z"),
+        took_s: 60.0,
+        planned_s: 60.0,
+        budget_s: 600.0,
+        finished: true,
+        ended_early: None,
+        lease_note: None,
+        checks: vec![
+            check(
+                "golden",
+                "skin",
+                vec![measured("press_events", "ev/s", events)],
+            ),
+            check(
+                "idle",
+                "camera1",
+                vec![measured("data_rate", "B/s", 2e6 + 1e4 * wobble)],
+            ),
+        ],
+        golden: golden.map(|session| Golden {
+            session: session.to_owned(),
+            report: None,
+            results_sha256: None,
+        }),
+        verdict: Verdict::Pass,
+        exit: NightExit::Pass,
+    }
+}
+
+/// Nights in `nights/`, with their history beside them.
+pub struct Nights {
+    pub lab: Lab,
+    pub history: String,
+}
+
+impl Nights {
+    pub fn new() -> Self {
+        let lab = Lab::new();
+        std::fs::create_dir(lab.path("nights")).unwrap();
+        let history = lab.text("nights/history.sqlite");
+        Self { lab, history }
+    }
+
+    /// So many nights, of which those from `change` on gave a fifth less.
+    pub fn of(count: usize, change: usize) -> Self {
+        let all = Self::new();
+        all.add(0..count, change, None);
+        all
+    }
+
+    pub fn add(&self, which: std::ops::Range<usize>, change: usize, session: Option<&Path>) {
+        for at in which {
+            let share = if at < change { 1.0 } else { 0.8 };
+            let name = session.and_then(|s| s.file_name()?.to_str());
+            let night = night(at, share, name);
+            let home = self.lab.path("nights").join(&night.id);
+            std::fs::create_dir(&home).unwrap();
+            std::fs::write(home.join("night.html"), "a page").unwrap();
+            if let Some((session, name)) = session.zip(name) {
+                std::fs::copy(session, home.join(name)).unwrap();
+            }
+            append(Path::new(&self.history), &night, &home).unwrap();
+        }
+    }
+
+    pub fn trend(&self, more: &[&str]) -> Said {
+        skinrig(&[&["hil", "trend", &self.history], more].concat())
+    }
+
+    pub fn accept(&self, more: &[&str]) -> Said {
+        skinrig(&[&["hil", "accept", "--history", &self.history], more].concat())
+    }
+
+    /// A night of one check that needs no device, and its folder.
+    pub fn run(&self, more: &[&str]) -> (Said, PathBuf) {
+        std::fs::write(self.lab.path("suite.yaml"), SUITE).unwrap();
+        let (suite, out) = (self.lab.text("suite.yaml"), self.lab.text("nights"));
+        let rig = "hil/rigs/emulated.yaml";
+        let run = ["hil", "run", &*suite, "--rig", rig, "--out", &*out];
+        let mut command = program(&[&run[..], more].concat());
+        command
+            .env("SKINRIG_EMULATED_LIBDRD", "/nowhere/libdrd.so")
+            .env("SKINRIG_EMULATED_TRIGGER_BOX", "/nowhere/box");
+        let ran = said(command);
+        let folder = ran.out.lines().find(|l| l.starts_with(&out));
+        let folder = PathBuf::from(folder.unwrap_or_else(|| panic!("no folder: {ran:#?}")));
+        (ran, folder)
+    }
+}
