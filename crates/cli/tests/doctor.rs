@@ -36,6 +36,7 @@ fn doctor(cameras: Vec<DeviceConfig>, fault: Option<Fault>) -> (Value, Option<i3
         .current_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("../.."))
         .env("SKINRIG_EMULATED_LIBDRD", arm.library())
         .env("SKINRIG_EMULATED_TRIGGER_BOX", "/nowhere/box")
+        .env("SKINRIG_EMULATED_LAMPS_OFF", "/nowhere/lamps-off")
         .args(["doctor", "--json", "--rig", "hil/rigs/emulated.yaml"])
         .arg("--sessions")
         .arg(folder.path());

@@ -35,10 +35,12 @@ checks:
   settings: {differences: {at_most: 0}}
   disk: {amount: 8 MB, write_rate: {at_least: 100 kB/s}, free: {at_least: 1 MB}}
   trigger_loopback: {trains: 6, lost_pulses: {at_most: 0}, extra_pulses: {at_most: 0}, unread_trains: {at_most: 0}}
+  noise_dark: {duration: 1 s, hot_above: 100 ev/s, rate: {at_least: 1 ev/s, at_most: 1800 ev/s}, hot_pixels: {at_most: 10}}
+  noise_lit: {duration: 1 s, hot_above: 100 ev/s, rate: {at_least: 1800 ev/s, at_most: 10 kev/s}, hot_pixels: {at_most: 10}}
   test_pattern: {duration: 1 s, rate: 500 kev/s, lost: {at_most: 0 B}, gaps: {at_most: 0}}
   robot_state: {faults: {at_most: 0}, creep: {at_most: 0.1 mm}}
   repeatability: {approaches: 2, spread: {at_most: 0.2 mm}, error: {at_most: 0.3 mm}}
-  step_response: {steps: 3, settling: {at_most: 1 s}, error: {at_most: 0.2 mm}}
+  step_response: {steps: 3, settling: {at_most: 500 ms}, error: {at_most: 0.2 mm}}
   depth: {presses: 1, surface: {at_most: 0.6 mm}, error: {at_most: 0.2 mm}}
   force_ceiling: {force: 1 N, depth: 2.5 mm, peak: {at_most: 1.5 N}}
   watchdog_drill: {braked_within: {at_most: 10 s}, drop: {at_most: 50 mm}}
@@ -88,11 +90,22 @@ impl Seen {
 
     /// The value of a metric on a device.
     fn value(&self, name: &str, subject: &str, metric: &str) -> Option<f64> {
+        self.measured(name, subject, metric)?["value"].as_f64()
+    }
+
+    /// The verdict on a metric of a device.
+    fn judged(&self, name: &str, subject: &str, metric: &str) -> &str {
+        let measured = self.measured(name, subject, metric);
+        let verdict = measured.and_then(|m| m["verdict"].as_str());
+        verdict.unwrap_or_else(|| panic!("no {metric} of {subject}: {:#}", self.check(name)))
+    }
+
+    fn measured(&self, name: &str, subject: &str, metric: &str) -> Option<&Value> {
         let attempts = self.check(name)["attempts"].as_array().unwrap();
         let parts = attempts.last()?["parts"].as_array().unwrap();
         let part = parts.iter().find(|p| p["subject"] == subject)?;
         let measured = part["measurements"].as_array().unwrap();
-        measured.iter().find(|m| m["metric"] == metric)?["value"].as_f64()
+        measured.iter().find(|m| m["metric"] == metric)
     }
 }
 
@@ -138,6 +151,18 @@ impl Nights {
         }
     }
 
+    fn write_rig(&self, text: &str) {
+        fs::write(self.folder.path().join("rig.yaml"), text).unwrap();
+    }
+
+    /// Lets the lamps' program for the dark be this one, which touches nothing.
+    fn lamps_obey(&self, program: &str) {
+        let dark = "dark: [touch, \"${SKINRIG_EMULATED_LAMPS_OFF}\"]";
+        let other = RIG.replace(dark, &format!("dark: [\"{program}\"]"));
+        assert_ne!(other, RIG);
+        self.write_rig(&other);
+    }
+
     fn camera(&self, camera: CameraId, order: Order) {
         let remote = self.bench.bus().remote().unwrap();
         remote.order(CAMERA_SERIALS[camera.index()], order).unwrap();
@@ -174,9 +199,11 @@ fn a_fault_in_each_device_makes_the_right_check_fail() {
         return;
     };
     // Each group is made, whatever became of the ones before: one run tells all that is wrong.
-    let groups: [Group; 7] = [
+    let groups: [Group; 9] = [
         ("healthy", |n| healthy(n)),
         ("cameras", |n| cameras(n)),
+        ("limits", |n| limits(n)),
+        ("lamps and data", |n| lamps_and_data(n)),
         ("wires", |n| wires(n)),
         ("robot", |n| robot(n)),
         ("trigger box", trigger_box),
@@ -209,7 +236,7 @@ fn not_initialised(nights: &Nights) {
 }
 
 fn healthy(nights: &Nights) {
-    let all = "identity,settings,disk,trigger_loopback,test_pattern,robot_state,repeatability,step_response,depth,force_ceiling,\
+    let all = "identity,settings,disk,trigger_loopback,noise_dark,noise_lit,test_pattern,robot_state,repeatability,step_response,depth,force_ceiling,\
                watchdog_drill,stop_drill";
     let seen = nights.night(all);
     for name in all.split(',') {
@@ -246,14 +273,55 @@ fn cameras(nights: &Nights) {
         &format!("{serial}    biases: {{bias_diff_on: 400}}\n"),
     );
     assert_ne!(other, RIG);
-    let rig = nights.folder.path().join("rig.yaml");
-    fs::write(&rig, other).unwrap();
+    nights.write_rig(&other);
     nights.camera(CameraId::One, Order::Stick(0x0350));
     let seen = nights.night("settings");
     seen.is(4, "settings", "INVALID", "rig", &[("read_back", "camera1")]);
-    fs::write(&rig, RIG).unwrap();
+    nights.write_rig(RIG);
     nights.camera(CameraId::One, Order::Unplug);
     nights.camera(CameraId::One, Order::Plug);
+}
+
+/// Limits that are broken by devices that answer as they should: nothing explains them, so the rig is to be looked at.
+fn limits(nights: &Nights) {
+    nights.lamps_obey("true");
+    nights.camera(CameraId::One, Order::HotPixels(40));
+    let arm = nights.bench.arm();
+    arm.inject(When::Now, Fault::Friction(800.0)).unwrap();
+    let seen = nights.night("noise_dark,noise_lit,step_response");
+    let judged = |check, subject, metric| seen.judged(check, subject, metric);
+    for camera in ["camera1", "camera2"] {
+        // It is as light as before.
+        assert_eq!(judged("noise_dark", camera, "rate"), "FAIL");
+    }
+    assert_eq!(judged("noise_lit", "camera1", "hot_pixels"), "FAIL");
+    assert_eq!(judged("noise_lit", "camera2", "hot_pixels"), "PASS");
+    let hot = seen.value("noise_lit", "camera1", "hot_pixels");
+    assert!(hot >= Some(40.0) && hot <= Some(46.0), "{hot:?}");
+    assert_eq!(judged("step_response", "robot", "settling"), "FAIL");
+    assert_eq!(judged("step_response", "robot", "error"), "PASS");
+    for check in ["noise_dark", "noise_lit", "step_response"] {
+        seen.is(1, check, "FAIL", "rig", &[]);
+    }
+    arm.clear_faults().unwrap();
+    nights.camera(CameraId::One, Order::HotPixels(0));
+    nights.write_rig(RIG);
+}
+
+/// Lamps whose program fails, and a camera whose buffer is full while the pattern runs.
+fn lamps_and_data(nights: &Nights) {
+    nights.lamps_obey("false");
+    nights.camera(CameraId::Two, Order::Lose(10));
+    let seen = nights.night("noise_dark,test_pattern");
+    seen.is(4, "noise_dark", "INVALID", "rig", &[("state", "computer")]);
+    let rate = seen.value("noise_dark", "camera1", "rate");
+    assert_eq!(rate, None, "nothing is known about the light");
+    let lost = [("data_lost", "camera2")];
+    seen.is(4, "test_pattern", "INVALID", "rig", &lost);
+    assert_eq!(seen.judged("test_pattern", "camera1", "lost"), "PASS");
+    assert_eq!(seen.judged("test_pattern", "camera2", "lost"), "FAIL");
+    nights.camera(CameraId::Two, Order::Lose(0));
+    nights.write_rig(RIG);
 }
 
 fn wires(nights: &Nights) {
@@ -330,8 +398,7 @@ fn trigger_box(nights: &mut Nights) {
         .noise(1, NoisePerMillion::default())
         .unwrap();
     let other = RIG.replace("  port: ", "  firmware: \"9.9.9\"\n  port: ");
-    let rig = nights.folder.path().join("rig.yaml");
-    fs::write(&rig, other).unwrap();
+    nights.write_rig(&other);
     let seen = nights.night("identity");
     seen.is(
         4,
@@ -340,7 +407,7 @@ fn trigger_box(nights: &mut Nights) {
         "rig",
         &[("other_device", "trigger box")],
     );
-    fs::write(&rig, RIG).unwrap();
+    nights.write_rig(RIG);
 }
 
 fn disk(nights: &Nights) {

@@ -207,6 +207,7 @@ impl SimConfig {
     pub fn scene(&self, camera: CameraId) -> SceneConfig {
         SceneConfig {
             seed: crate::random::derive_seed(self.seed, Purpose::Pixels, camera.index() as u64),
+            start: 0,
             outline: self.outline,
             camera_id: camera,
             camera: self.true_geometry().cameras[camera.index()],

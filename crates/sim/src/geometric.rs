@@ -70,6 +70,21 @@ impl Default for GeometricConfig {
     }
 }
 
+impl GeometricConfig {
+    /// The same camera when the lamps are off (assumption): presses make no events, and of the background a third is left, about
+    /// what leakage is of the optical level's noise. Hot pixels need no light.
+    #[must_use]
+    pub fn dark(&self) -> Self {
+        Self {
+            press_per_mm: 0.0,
+            release_per_mm: 0.0,
+            relax_per_mm: 0.0,
+            background_hz: self.background_hz / 3.0,
+            ..self.clone()
+        }
+    }
+}
+
 /// One place where the skin was pressed and still relaxes.
 #[derive(Debug, Clone)]
 struct Site {
@@ -124,7 +139,7 @@ impl GeometricModel {
     #[must_use]
     pub fn new(scene: &SceneConfig, config: &GeometricConfig) -> Self {
         let mut contacts = Stream::new(scene.seed, Purpose::Pixels, 1);
-        let mut events = Stream::new(scene.seed, Purpose::Pixels, 2);
+        let mut events = Stream::new(scene.seed_of_start(), Purpose::Pixels, 2);
         let hot = (0..config.hot_pixels)
             .map(|_| {
                 let x = contacts.between(0.0, f64::from(SENSOR_WIDTH)) as u16;
@@ -132,6 +147,9 @@ impl GeometricModel {
                 (x, y)
             })
             .collect();
+        if scene.start > 0 {
+            contacts = Stream::new(scene.seed_of_start(), Purpose::Pixels, 1);
+        }
         let hot_hz = (1..=config.hot_pixels)
             .map(|k| config.hottest_hz / k as f64)
             .sum();

@@ -5,6 +5,8 @@
 
 use skinrig_model::{CameraId, CameraModel, Point3, Polarity, Skin, SkinOutline};
 
+use crate::random::{Purpose, derive_seed};
+
 /// Where the tip was. Samples lie on a grid of [`GRID_NS`]; the tip moves linearly between two of them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TipSample {
@@ -46,6 +48,8 @@ pub trait PixelModel: Send {
 pub struct SceneConfig {
     /// Seed of everything random in this camera's pixels.
     pub seed: u64,
+    /// How often the camera was started before. Each start has noise of its own; what the pixels are, hot ones among them, stays.
+    pub start: u64,
     /// The skin.
     pub outline: SkinOutline,
     /// Which camera.
@@ -59,4 +63,86 @@ pub struct SceneConfig {
     pub tip_side_mm: f64,
     /// Thickness of the skin, mm (paper: 4).
     pub skin_thickness_mm: f64,
+}
+
+impl SceneConfig {
+    /// Seed of what is drawn anew at every start.
+    #[must_use]
+    pub(crate) const fn seed_of_start(&self) -> u64 {
+        match self.start {
+            0 => self.seed,
+            n => derive_seed(self.seed, Purpose::Pixels, 1_000 + n),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::HashMap;
+
+    use super::*;
+    use crate::SimConfig;
+    use crate::geometric::GeometricModel;
+    use crate::optical::OpticalModel;
+    use skinrig_model::SimLevel;
+
+    /// The events of a press, geometric and optical.
+    fn press(start: u64, lit: bool) -> [Vec<PixelEvent>; 2] {
+        let config = SimConfig::new(3, SimLevel::Geometric);
+        let scene = SceneConfig {
+            start,
+            ..config.scene(CameraId::One)
+        };
+        let lamps = if lit {
+            config.geometric.clone()
+        } else {
+            config.geometric.dark()
+        };
+        let optical = if lit {
+            OpticalModel::new(&scene)
+        } else {
+            OpticalModel::dark(&scene)
+        };
+        let models: [Box<dyn PixelModel>; 2] = [
+            Box::new(GeometricModel::new(&scene, &lamps)),
+            Box::new(optical),
+        ];
+        let tips: Vec<TipSample> = (0..=500)
+            .map(|ms| TipSample {
+                t_ns: ms * GRID_NS,
+                position: Point3::new(5.0, 2.0, (ms as f64 / 100.0 - 2.0).abs().min(2.0) - 1.5),
+            })
+            .collect();
+        models.map(|mut model| {
+            let mut events = Vec::new();
+            model.advance(&tips, &mut events);
+            events
+        })
+    }
+
+    fn hottest(events: &[PixelEvent]) -> Option<(u16, u16)> {
+        let mut counts: HashMap<(u16, u16), u32> = HashMap::new();
+        for e in events {
+            *counts.entry((e.x, e.y)).or_default() += 1;
+        }
+        counts.into_iter().max_by_key(|(_, n)| *n).map(|(at, _)| at)
+    }
+
+    #[test]
+    fn in_the_dark_nobody_sees_a_press_and_hot_pixels_stay() {
+        let (lit, dark) = (press(0, true), press(0, false));
+        for (lit, dark) in lit.iter().zip(&dark) {
+            assert!(5 * dark.len() < lit.len(), "{} {}", dark.len(), lit.len());
+            assert!(dark.len() > 100);
+            assert_eq!(hottest(dark), hottest(lit));
+        }
+    }
+
+    #[test]
+    fn every_start_has_noise_of_its_own_and_the_same_pixels() {
+        for (first, second) in press(0, false).iter().zip(&press(1, false)) {
+            assert_ne!(first, second);
+            assert_eq!(hottest(first), hottest(second));
+        }
+    }
 }

@@ -43,7 +43,8 @@ fn a_bench_takes_no_faults() {
         let mut command = program(&arguments);
         command
             .env("SKINRIG_EMULATED_LIBDRD", "not-there.so")
-            .env("SKINRIG_EMULATED_TRIGGER_BOX", "/dev/not-there");
+            .env("SKINRIG_EMULATED_TRIGGER_BOX", "/dev/not-there")
+            .env("SKINRIG_EMULATED_LAMPS_OFF", "/not-there/lamps-off");
         said(command)
             .code(2)
             .complains(&["only the simulated rig", "robot-slow@hold:1", "next: "]);

@@ -16,6 +16,7 @@ fn on_nothing(leases: &Path, arguments: &[&str]) -> Said {
     command
         .env("SKINRIG_EMULATED_LIBDRD", "/nowhere/libdrd.so")
         .env("SKINRIG_EMULATED_TRIGGER_BOX", "/nowhere/box")
+        .env("SKINRIG_EMULATED_LAMPS_OFF", "/nowhere/lamps-off")
         .env("SKINRIG_LEASES", leases);
     said(command)
 }

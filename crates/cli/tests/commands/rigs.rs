@@ -18,6 +18,7 @@ fn without_devices(arguments: &[&str]) -> Said {
     command
         .env("SKINRIG_EMULATED_LIBDRD", "/nowhere/libdrd.so")
         .env("SKINRIG_EMULATED_TRIGGER_BOX", "/nowhere/box")
+        .env("SKINRIG_EMULATED_LAMPS_OFF", "/nowhere/lamps-off")
         .env("SKINRIG_LIBDRD", "/nowhere/libdrd.so");
     said(command)
 }

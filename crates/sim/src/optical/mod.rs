@@ -70,6 +70,17 @@ impl OpticalModel {
         Self::build(scene, OpticalConfig::default())
     }
 
+    /// The model with the lamps off: no emitter shines, and pixels are too slow to show shot noise. Leakage and hot pixels stay.
+    #[must_use]
+    pub fn dark(scene: &SceneConfig) -> Self {
+        let config = OpticalConfig {
+            emitters: 0,
+            shot_hz: 0.0,
+            ..OpticalConfig::default()
+        };
+        Self::build(scene, config)
+    }
+
     /// The model with other constants.
     ///
     /// # Errors

@@ -79,6 +79,9 @@ impl Noise {
                 pixel
             })
             .collect();
+        if scene.start > 0 {
+            random = Stream::new(scene.seed_of_start(), Purpose::Pixels, 2);
+        }
         let total_hz = leak_total_hz + shot_total_hz + hot.iter().map(|h| h.2).sum::<f64>();
         let mut noise = Self {
             random,

@@ -11,6 +11,7 @@ use crate::scene::{GRID_NS, PixelEvent, PixelModel, SceneConfig, TipSample};
 fn scene(id: CameraId) -> SceneConfig {
     SceneConfig {
         seed: 11,
+        start: 0,
         outline: SkinOutline::PAPER,
         camera_id: id,
         camera: StereoGeometry::PAPER.cameras[id.index()],

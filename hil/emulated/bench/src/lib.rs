@@ -43,6 +43,9 @@ pub const LIBRARY_VARIABLE: &str = "SKINRIG_EMULATED_LIBDRD";
 /// Names the port of the trigger box in a rig file.
 pub const BOX_VARIABLE: &str = "SKINRIG_EMULATED_TRIGGER_BOX";
 
+/// Names the file while which exists the lamps are off, in a rig file.
+pub const LAMPS_VARIABLE: &str = "SKINRIG_EMULATED_LAMPS_OFF";
+
 /// What the bench is.
 #[derive(Debug, Clone)]
 pub struct BenchConfig {
@@ -142,7 +145,7 @@ impl EmulatedBench {
         })
     }
 
-    /// A command that runs beside this bench: its USB bus, its libdrd, its serial port.
+    /// A command that runs beside this bench: its USB bus, its libdrd, its serial port, its lamps.
     ///
     /// # Errors
     /// [`BenchError::Cameras`] when the preload library was not built.
@@ -150,7 +153,8 @@ impl EmulatedBench {
         let mut command = self.bus.command(program)?;
         command
             .env(LIBRARY_VARIABLE, self.arm.library())
-            .env(BOX_VARIABLE, self.trigger_box.port());
+            .env(BOX_VARIABLE, self.trigger_box.port())
+            .env(LAMPS_VARIABLE, self.bus.world().lamps_off());
         Ok(command)
     }
 

@@ -80,9 +80,10 @@ impl Bus {
     /// # Errors
     /// When the configuration contradicts itself or the machine refuses.
     pub fn start(config: &BusConfig) -> Result<Self, BusError> {
+        let bed = TestBed::create()?;
         let inner = Arc::new(Inner {
-            bed: TestBed::create()?,
-            world: Arc::default(),
+            world: Arc::new(World::around(bed.root())),
+            bed,
             sync_line: Arc::default(),
             devices: Mutex::default(),
             closed: AtomicBool::new(false),
@@ -322,6 +323,8 @@ impl Inner {
             Order::Stall => plugged.queues.stall(),
             Order::Cut(bytes) => plugged.queues.cut_next(bytes),
             Order::Garbage(words) => camera?.lock().faults.garbage.extend(words),
+            Order::Lose(words) => camera?.lock().faults.lost_words = words,
+            Order::HotPixels(pixels) => camera?.lock().faults.hot_pixels = pixels,
             Order::Stick(address) => {
                 camera?.lock().faults.stuck.insert(address);
             }

@@ -85,6 +85,10 @@ pub enum Order {
     Cut(usize),
     /// Put these words into the next packet.
     Garbage(Vec<u32>),
+    /// Every packet loses this many words at its end, as when the camera's buffer is full; 0 is well.
+    Lose(usize),
+    /// So many pixels make an event every millisecond, whatever they see; 0 is well.
+    HotPixels(u16),
     /// Writes to this register do not take.
     Stick(u32),
     /// Whether control requests stay unanswered.

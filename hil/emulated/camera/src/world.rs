@@ -1,4 +1,4 @@
-//! What reaches the cameras from outside: edges on their trigger inputs and the position of the robot's tip.
+//! What reaches the cameras from outside: edges on their trigger inputs, the position of the robot's tip, light.
 //!
 //! Times are those of this machine's monotonic clock (`CLOCK_MONOTONIC`), ns, in every process.
 //!
@@ -15,15 +15,22 @@
 //! on a busy machine, writes `time` at least every millisecond of it: cameras then never pass what it has
 //! announced, and its edges keep their exact places. A line that cannot be read is answered with `error: ...` and ends
 //! the connection.
+//!
+//! The lamps are off while there is a file `ROOT/lamps-off`, whatever is in it: `touch` switches them off, `rm -f` on. They shine on
+//! all cameras; a packet that a camera makes later knows.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::io::{BufRead, BufReader, Write};
 use std::os::unix::net::{UnixListener, UnixStream};
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread;
 use std::time::Duration;
 
 use rustix::time::{ClockId, clock_gettime};
+
+/// While there is a file of this name in the bus's folder, the lamps are off.
+const LAMPS_OFF: &str = "lamps-off";
 
 /// How far cameras lag behind the present at least, ns.
 pub const LATENCY_NS: i64 = 2_000_000;
@@ -70,6 +77,7 @@ struct State {
 pub struct World {
     state: Mutex<State>,
     changed: Condvar,
+    lamps_off: PathBuf,
 }
 
 /// The monotonic clock, ns.
@@ -80,6 +88,25 @@ pub fn now_ns() -> i64 {
 }
 
 impl World {
+    /// The world around the bus in this folder.
+    pub(crate) fn around(root: &Path) -> Self {
+        Self {
+            lamps_off: root.join(LAMPS_OFF),
+            ..Self::default()
+        }
+    }
+
+    /// The lamps are off while this file exists.
+    #[must_use]
+    pub fn lamps_off(&self) -> &Path {
+        &self.lamps_off
+    }
+
+    /// Whether light falls on what the cameras see.
+    pub(crate) fn is_lit(&self) -> bool {
+        !self.lamps_off.exists()
+    }
+
     fn lock(&self) -> MutexGuard<'_, State> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }

@@ -214,6 +214,8 @@ pub enum Fault {
     WatchdogTrip,
     /// Something blocks the arm where it is.
     Jammed,
+    /// The joints rub: this much more viscous friction, N per (m/s).
+    Friction(f64),
     /// `drdIsMoving` never becomes false; blocking moves never come back.
     MovingForever,
     /// Every reported position is NaN.

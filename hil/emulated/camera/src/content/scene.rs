@@ -4,7 +4,6 @@ use skinrig_model::{Point3, RigidTransform, Robot, SimLevel, Skin};
 use skinrig_sim::SimConfig;
 use skinrig_sim::geometric::GeometricModel;
 use skinrig_sim::optical::OpticalModel;
-use skinrig_sim::random::{Purpose, derive_seed};
 use skinrig_sim::scene::{GRID_NS, PixelEvent, PixelModel, SceneConfig, TipSample};
 
 use crate::bus::BusError;
@@ -14,14 +13,21 @@ use crate::world::World;
 pub(crate) struct Scene {
     scene: SceneConfig,
     config: SimConfig,
-    starts: u64,
     skin_from_robot: RigidTransform<Skin, Robot>,
     /// Where the tip is before anybody says.
     rest: Point3<Skin>,
-    /// The pixels of this run, and the last sample that they have seen.
-    running: Option<(Box<dyn PixelModel>, TipSample)>,
+    running: Option<Running>,
     /// Events that belong to the next packet.
     ahead: Vec<PixelEvent>,
+}
+
+/// The pixels of this run.
+struct Running {
+    pixels: Box<dyn PixelModel>,
+    /// Whether light falls on what they see.
+    lit: bool,
+    /// The last sample that they have seen.
+    last: TipSample,
 }
 
 impl Scene {
@@ -39,7 +45,6 @@ impl Scene {
             skin_from_robot: robot_from_skin.inverse(),
             rest: config.start,
             config,
-            starts: 0,
             running: None,
             ahead: Vec::new(),
         })
@@ -52,19 +57,21 @@ impl Scene {
             t_ns,
             position: self.tip(world, t_ns),
         };
-        let mut scene = self.scene.clone();
-        if self.starts > 0 {
-            scene.seed = derive_seed(scene.seed, Purpose::Pixels, 1_000 + self.starts);
-        }
-        self.starts += 1;
-        let pixels: Box<dyn PixelModel> = match self.config.level {
-            SimLevel::Optical => Box::new(OpticalModel::new(&scene)),
-            SimLevel::Kinematic | SimLevel::Geometric => {
-                Box::new(GeometricModel::new(&scene, &self.config.geometric))
-            }
-        };
         self.ahead.clear();
-        self.running = Some((pixels, first));
+        self.running = Some(self.begin(world.is_lit(), first));
+    }
+
+    /// Pixels from here on, which are those of before and have noise of their own.
+    fn begin(&mut self, lit: bool, last: TipSample) -> Running {
+        let (scene, geometric) = (&self.scene, &self.config.geometric);
+        let pixels: Box<dyn PixelModel> = match (self.config.level, lit) {
+            (SimLevel::Optical, true) => Box::new(OpticalModel::new(scene)),
+            (SimLevel::Optical, false) => Box::new(OpticalModel::dark(scene)),
+            (_, true) => Box::new(GeometricModel::new(scene, geometric)),
+            (_, false) => Box::new(GeometricModel::new(scene, &geometric.dark())),
+        };
+        self.scene.start += 1;
+        Running { pixels, lit, last }
     }
 
     fn tip(&self, world: &World, t_ns: i64) -> Point3<Skin> {
@@ -74,9 +81,15 @@ impl Scene {
     }
 
     pub fn events(&mut self, world: &World, until_ns: i64, out: &mut Vec<PixelEvent>) {
-        let Some((mut pixels, mut last)) = self.running.take() else {
+        let Some(mut running) = self.running.take() else {
             return;
         };
+        let lit = world.is_lit();
+        if lit != running.lit {
+            // What switching itself makes every pixel do is left out.
+            running = self.begin(lit, running.last);
+        }
+        let mut last = running.last;
         let mut tips = vec![last];
         while last.t_ns < until_ns {
             let t_ns = last.t_ns + GRID_NS;
@@ -85,9 +98,10 @@ impl Scene {
             tips.push(last);
         }
         if tips.len() > 1 {
-            pixels.advance(&tips, &mut self.ahead);
+            running.pixels.advance(&tips, &mut self.ahead);
         }
-        self.running = Some((pixels, last));
+        running.last = last;
+        self.running = Some(running);
         let due = self.ahead.partition_point(|e| e.t_ns < until_ns);
         out.extend(self.ahead.drain(..due));
     }

@@ -47,6 +47,10 @@ pub struct Faults {
     pub failing_reads: bool,
     /// Words to put into the next packet.
     pub garbage: Vec<u32>,
+    /// Words that each packet loses at its end.
+    pub lost_words: usize,
+    /// Pixels that make an event every millisecond.
+    pub hot_pixels: u16,
 }
 
 /// One run of the time base.
@@ -243,6 +247,11 @@ impl Evk1 {
         mem::take(&mut self.lock().faults.garbage)
     }
 
+    /// How many pixels make an event every millisecond.
+    pub fn hot_pixels(&self) -> u16 {
+        self.lock().faults.hot_pixels
+    }
+
     /// Hands a packet of a run over and books it, unless the run has ended meanwhile. What finds no place is lost.
     pub fn send(
         &self,
@@ -261,6 +270,7 @@ impl Evk1 {
         if self.config.pacing == Pacing::RealTime {
             bytes.truncate(self.queues.free() / 4 * 4);
         }
+        bytes.truncate(bytes.len().saturating_sub(4 * model.faults.lost_words));
         let dropped = made - bytes.len();
         let dropped_words = dropped / 4;
         self.queues.push(bytes, end);

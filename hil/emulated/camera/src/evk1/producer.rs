@@ -1,10 +1,11 @@
 //! Makes the stream of one camera: packet by packet, as long as its time base runs.
 
+use std::ops::Range;
 use std::sync::Arc;
 use std::time::Duration;
 
 use skinrig_formats::evt2::{Encoder, TIME_HIGH_CADENCE_US};
-use skinrig_model::{CdEvent, Polarity, TriggerEdge};
+use skinrig_model::{CdEvent, Polarity, SENSOR_HEIGHT, SENSOR_WIDTH, TriggerEdge};
 
 use super::camera::{Evk1, Run};
 use super::pattern::Scan;
@@ -15,6 +16,9 @@ use crate::world::Edge;
 
 /// How often a wait looks whether the run has ended.
 const PATIENCE: Duration = Duration::from_millis(5);
+
+/// A pixel that is made hot fires this often, ns.
+const HOT_EVERY_NS: i64 = 1_000_000;
 
 /// The input that trigger out loops back to.
 const LOOP_BACK: u8 = 6;
@@ -148,6 +152,11 @@ impl<'a> Producer<'a> {
         self.events.clear();
         self.source
             .events(&self.camera.world, self.made_ns, until_ns, &mut self.events);
+        hot_pixels(
+            self.camera.hot_pixels(),
+            self.made_ns..until_ns,
+            &mut self.events,
+        );
         if !gates.pixels {
             self.events.clear();
         }
@@ -252,6 +261,25 @@ impl<'a> Producer<'a> {
             rise_ns += period_ns;
         }
     }
+}
+
+/// Adds the events of `pixels` that fire once a millisecond.
+fn hot_pixels(pixels: u16, span_ns: Range<i64>, events: &mut Vec<PixelEvent>) {
+    if pixels == 0 {
+        return;
+    }
+    let mut t_ns = (span_ns.start + HOT_EVERY_NS - 1) / HOT_EVERY_NS * HOT_EVERY_NS;
+    while t_ns < span_ns.end {
+        // Spread over the sensor by steps that share no factor with its sides.
+        events.extend((0..pixels).map(|n| PixelEvent {
+            t_ns,
+            x: (u32::from(n) * 211 % u32::from(SENSOR_WIDTH)) as u16,
+            y: (u32::from(n) * 97 % u32::from(SENSOR_HEIGHT)) as u16,
+            polarity: Polarity::On,
+        }));
+        t_ns += HOT_EVERY_NS;
+    }
+    events.sort_by_key(|e| e.t_ns);
 }
 
 fn push_edge(encoder: &mut Encoder, edge: TriggerEdge, bytes: &mut Vec<u8>) {

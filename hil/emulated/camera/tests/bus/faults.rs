@@ -126,3 +126,46 @@ fn a_register_may_stick_and_a_request_may_stay_unanswered() {
         },
     );
 }
+
+#[test]
+fn a_buffer_that_is_full_loses_words_and_the_camera_counts_them() {
+    on_bus(
+        "faults::a_buffer_that_is_full_loses_words_and_the_camera_counts_them",
+        bus(),
+        |remote| {
+            let mut camera = running();
+            assert_eq!(camera.read(0x0018), Ok(0));
+            remote.order(SERIAL, Order::Lose(10)).unwrap();
+            while remote.observe(SERIAL).unwrap().counters.dropped_bytes < 400 {
+                camera.transfer().unwrap();
+            }
+            assert!(camera.read(0x0018).unwrap() >= 100);
+            remote.order(SERIAL, Order::Lose(0)).unwrap();
+            camera.stop();
+            let seen = remote.observe(SERIAL).unwrap().counters;
+            assert_eq!(seen.dropped_bytes % 40, 0, "10 words of each packet");
+        },
+    );
+}
+
+#[test]
+fn hot_pixels_fire_once_a_millisecond() {
+    on_bus(
+        "faults::hot_pixels_fire_once_a_millisecond",
+        bus(),
+        |remote| {
+            let mut camera = Camera::open(0);
+            camera.configure(1 << 12);
+            remote.order(SERIAL, Order::HotPixels(2)).unwrap();
+            camera.start();
+            let seen = camera.until(|s| s.last_us > 100_000);
+            camera.stop();
+            for (x, y) in [(0, 0), (211, 97)] {
+                let count = seen.events.iter().filter(|e| (e.x, e.y) == (x, y)).count() as u64;
+                // Noise may add one.
+                assert!(count.abs_diff(seen.last_us / 1_000) <= 2, "{count}");
+            }
+            assert!(seen.events.is_sorted_by_key(|e| e.t_us));
+        },
+    );
+}

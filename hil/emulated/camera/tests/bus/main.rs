@@ -4,5 +4,6 @@
 mod client;
 mod devices;
 mod faults;
+mod light;
 mod stream;
 mod time;

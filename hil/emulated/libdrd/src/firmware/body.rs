@@ -27,6 +27,8 @@ pub struct Body {
     pub contact: Option<Contact>,
     /// Something holds it where it is.
     pub jammed: bool,
+    /// Viscous friction beyond that of the configuration, N per (m/s).
+    pub rub_n_s_m: f64,
     weight: Vector,
 }
 
@@ -39,6 +41,7 @@ impl Body {
             contact_force: ZERO,
             contact: config.contact,
             jammed: false,
+            rub_n_s_m: 0.0,
             weight: gravity(config.gravity_mass_kg, config.tilt_deg),
         }
     }
@@ -60,8 +63,9 @@ impl Body {
         .fold(ZERO, add);
         // Viscous terms implicitly, so that the brake is stable at any strength; then dry friction, which
         // takes away speed and never turns it round.
-        let viscous =
-            config.viscous_friction_n_s_m + if braking { config.brake_n_s_m } else { 0.0 };
+        let viscous = config.viscous_friction_n_s_m
+            + self.rub_n_s_m
+            + if braking { config.brake_n_s_m } else { 0.0 };
         let pushed = add(self.velocity, scale(force, dt / config.inertia_kg));
         let free = scale(pushed, 1.0 / (1.0 + viscous * dt / config.inertia_kg));
         let dry = shorten(free, config.dry_friction_n * dt / config.inertia_kg);

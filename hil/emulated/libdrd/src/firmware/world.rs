@@ -118,6 +118,11 @@ impl World {
     fn step(&mut self, dt: f64) {
         self.let_faults_happen();
         self.body.jammed = self.faults.is(|f| matches!(f, Fault::Jammed));
+        let rub = self.faults.find(|f| match *f {
+            Fault::Friction(n_s_m) => Some(n_s_m),
+            _ => None,
+        });
+        self.body.rub_n_s_m = rub.unwrap_or(0.0);
         self.initialise(dt);
         self.run_loop();
         let live = self.mode == Mode::Force;

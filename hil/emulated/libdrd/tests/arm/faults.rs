@@ -4,7 +4,7 @@ use std::sync::mpsc;
 use std::thread;
 use std::time::Duration;
 
-use drd::{ArmConfig, Contact, Fault, Mode, Setting, When};
+use drd::{ArmConfig, ArmState, Contact, Fault, Mode, Setting, When};
 use skinrig_drd_abi::{ForceOffCause, StatusField};
 
 use crate::support::{Bench, ID, WITHIN};
@@ -222,6 +222,18 @@ fn a_jammed_arm_stays_where_it_is_while_its_set_point_goes_on() {
     assert!(stuck.saturated, "{stuck:?}");
     // SAFETY: a function of the table.
     assert!(unsafe { (bench.sdk.drdIsMoving)(ID) } != 0);
+}
+
+#[test]
+fn an_arm_whose_joints_rub_comes_late_and_arrives() {
+    let bench = high_up();
+    inject(&bench, When::Now, Fault::Friction(800.0));
+    assert!(bench.move_to([0.0125, 0.0, 0.04]) >= 0);
+    let sent = |s: &ArmState| (s.reference_m[2] - 0.04).abs() < 1e-9;
+    let late = bench.arm.wait_until(WITHIN, sent).unwrap();
+    assert!(late.position_m[2] > 0.041, "{late:?}");
+    let there = |s: &ArmState| (s.position_m[2] - 0.04).abs() < 1e-4;
+    bench.arm.wait_until(WITHIN, there).unwrap();
 }
 
 #[test]
