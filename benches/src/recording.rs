@@ -165,6 +165,7 @@ pub fn input() -> SessionInput {
             outline: SkinOutline::PAPER,
             nominal: StereoGeometry::PAPER,
             trigger_channel: None,
+            trigger_delay_us: [0; 2],
         },
         AnalysisSettings::default(),
     );

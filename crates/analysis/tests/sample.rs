@@ -59,6 +59,7 @@ fn schedule(positions: &str) -> SessionInput {
             outline: SkinOutline::PAPER,
             nominal: StereoGeometry::PAPER,
             trigger_channel: None,
+            trigger_delay_us: [0; 2],
         },
         AnalysisSettings::default(),
     );

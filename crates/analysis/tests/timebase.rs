@@ -517,6 +517,7 @@ fn input(s: &InLegs) -> SessionInput {
             outline: SkinOutline::PAPER,
             nominal: StereoGeometry::PAPER,
             trigger_channel: Some(0),
+            trigger_delay_us: [0; 2],
         },
         settings: AnalysisSettings::default(),
     }

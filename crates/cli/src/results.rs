@@ -9,7 +9,7 @@ use skinrig_analysis::reference_code::reference_code;
 use skinrig_analysis::result::{Motion, PressResult};
 use skinrig_analysis::tradeoff::Tradeoff;
 use skinrig_analysis::{Analysis, EarlierAttempt, Keep, LegStart, SessionInput};
-use skinrig_model::{AnalysisSettings, CameraId, HostTime, RigGeometry, RunHeader};
+use skinrig_model::{AnalysisSettings, CameraId, HostTime, RigGeometry, RunHeader, TriggerEdge};
 use skinrig_recorder::{AttemptRow, RecorderError, SessionReader};
 use skinrig_report::{Provenance, ReportInput};
 
@@ -198,7 +198,10 @@ fn session_input(
         planned,
         outcomes,
         earlier,
-        edges: [reader.trigger_edges(one)?, reader.trigger_edges(two)?],
+        edges: [
+            on_time(reader.trigger_edges(one)?, rig.trigger_delay_us[0]),
+            on_time(reader.trigger_edges(two)?, rig.trigger_delay_us[1]),
+        ],
         marks: reader.marks_sent()?,
         box_reports: reader
             .box_reports()?
@@ -358,4 +361,31 @@ pub fn report(args: &ReportArgs, json: bool) -> Outcome {
         outln!("{}", paths.1.display());
     }
     check_limit(&results, None)
+}
+
+/// Edges at the instants at which they reached the camera's input: it stamps them so much later. An edge within that time of
+/// the camera's first microsecond is put on it.
+fn on_time(mut edges: Vec<TriggerEdge>, delay_us: u16) -> Vec<TriggerEdge> {
+    for edge in &mut edges {
+        edge.t_us = edge.t_us.saturating_sub(u64::from(delay_us));
+    }
+    edges
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn edges_are_moved_to_when_they_reached_the_camera() {
+        let edge = |t_us| TriggerEdge {
+            t_us,
+            channel: 0,
+            rising: true,
+        };
+        let edges = || vec![edge(2), edge(1_000_003), edge((1 << 34) + 1)];
+        assert_eq!(on_time(edges(), 0), edges());
+        let moved = vec![edge(0), edge(1_000_000), edge((1 << 34) - 2)];
+        assert_eq!(on_time(edges(), 3), moved);
+    }
 }

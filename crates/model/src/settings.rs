@@ -387,4 +387,7 @@ pub struct RigGeometry {
     pub nominal: StereoGeometry,
     /// The camera trigger channel that carries the marks; `None` when the rig has no trigger line.
     pub trigger_channel: Option<u8>,
+    /// For each camera, how long after an edge at its trigger input it stamps it, whole µs; 0 where nobody measured it.
+    #[serde(default)]
+    pub trigger_delay_us: [u16; 2],
 }

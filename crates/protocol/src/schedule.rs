@@ -423,5 +423,6 @@ fn rig(f: &Field, out: &mut Collector) -> Option<RigGeometry> {
         trigger_channel: f
             .count("trigger_channel")
             .and_then(|n| u8::try_from(n).ok()),
+        trigger_delay_us: [0; 2],
     })
 }

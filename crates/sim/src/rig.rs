@@ -45,6 +45,7 @@ pub fn simulated_rig(config: &SimConfig) -> Rig {
             outline: config.outline,
             nominal: config.nominal,
             trigger_channel: Some(TRIGGER_CHANNEL),
+            trigger_delay_us: [0; 2],
         },
         description_json: describe(config),
     }

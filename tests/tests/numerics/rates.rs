@@ -59,6 +59,7 @@ fn session() -> SessionInput {
             outline: SkinOutline::PAPER,
             nominal: StereoGeometry::PAPER,
             trigger_channel: Some(0),
+            trigger_delay_us: [0; 2],
         },
         AnalysisSettings {
             calibration: CalibrationModel::None,

@@ -193,6 +193,7 @@ pub fn session(seed: u64, wishes: Wishes) -> Session {
             outline: SkinOutline::PAPER,
             nominal,
             trigger_channel: line.then_some(0),
+            trigger_delay_us: [0; 2],
         },
         AnalysisSettings {
             bootstrap_resamples: 0,

@@ -63,6 +63,7 @@ pub fn session() -> (SessionInput, Memory) {
             outline: SkinOutline::PAPER,
             nominal: StereoGeometry::PAPER,
             trigger_channel: Some(0),
+            trigger_delay_us: [0; 2],
         },
         AnalysisSettings {
             bootstrap_resamples: 200,

@@ -164,6 +164,7 @@ fn geometry(rig: &RigFile, outline: SkinOutline) -> RigGeometry {
         },
         // The same on both cameras: the rig file was checked.
         trigger_channel: rig.trigger_box.as_ref().map(|_| one.trigger_channel),
+        trigger_delay_us: [one.trigger_delay_us, two.trigger_delay_us],
     }
 }
 

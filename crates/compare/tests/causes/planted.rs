@@ -152,6 +152,7 @@ fn input(config: &SimConfig, plant: Plant) -> SessionInput {
         outline: config.outline,
         nominal: config.nominal,
         trigger_channel: Some(0),
+        trigger_delay_us: [0; 2],
     };
     let settings = AnalysisSettings {
         bootstrap_resamples: 2,

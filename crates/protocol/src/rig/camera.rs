@@ -88,6 +88,17 @@ fn camera(f: &Field, places: &Places<'_>, out: &mut Collector) -> Option<CameraS
     let trigger_channel = f
         .count("trigger_channel")
         .and_then(|c| u8::try_from(c).ok())?;
+    let delay = f.get("trigger_delay")?;
+    let delay_us = f.quantity("trigger_delay")? * 1e6;
+    if (delay_us - delay_us.round()).abs() > 1e-6 {
+        out.error(
+            delay.span,
+            delay.path.as_str(),
+            "cameras stamp edges in whole microseconds",
+        )
+        .expected("whole microseconds, such as `3 us`")
+        .found(format!("{delay_us} us"));
+    }
     if model == "evk1" && ![0, 6, AUXILIARY].contains(&trigger_channel) {
         out.error(
             channel.span,
@@ -154,6 +165,7 @@ fn camera(f: &Field, places: &Places<'_>, out: &mut Collector) -> Option<CameraS
         overflow_is_loss: f.word("overflow_counter")? == "loss",
         sync,
         trigger_channel,
+        trigger_delay_us: delay_us.round() as u16,
         geometry,
     })
 }

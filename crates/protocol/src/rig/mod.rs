@@ -221,6 +221,8 @@ pub struct CameraSetup {
     pub sync: SyncRole,
     /// The trigger input that the box is wired to.
     pub trigger_channel: u8,
+    /// How long after an edge there the camera stamps it, whole µs.
+    pub trigger_delay_us: u16,
     /// Where it stands, as drawn or measured.
     pub geometry: CameraModel,
 }

@@ -243,6 +243,13 @@ fn what_cannot_be_is_named() {
         "7 and 0",
     );
     finding(
+        "trigger_delay: 0 us",
+        "trigger_delay: 2.5 us",
+        "cameras.camera1.trigger_delay",
+        "cameras stamp edges in whole microseconds",
+        "2.5 us",
+    );
+    finding(
         "serial: \"00001754\"",
         "serial: \"00001754\"\n    model: evk4\n    max_time_high_gap: 1 ms",
         "cameras.camera2.max_time_high_gap",

@@ -132,7 +132,7 @@ pub fn analysis(side: u32, repetitions: u32) -> Analysis {
         legs: Vec::new(),
         contact_timing: Default::default(),
         settings: AnalysisSettings::default(),
-        rig: RigGeometry { outline, nominal: geometry, trigger_channel: Some(0) },
+        rig: RigGeometry { outline, nominal: geometry, trigger_channel: Some(0), trigger_delay_us: [0; 2] },
         geometry,
         counts,
         clocks: [fit(ClockMethod::TriggerMarks, 12.345_6), fit(ClockMethod::EventRates, -3.21)],

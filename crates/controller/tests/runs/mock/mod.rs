@@ -282,6 +282,7 @@ pub fn rig(world: &Shared) -> Rig {
             outline: SkinOutline::PAPER,
             nominal: StereoGeometry::PAPER,
             trigger_channel: Some(0),
+            trigger_delay_us: [0; 2],
         },
         description_json: "{}".into(),
     }

@@ -244,6 +244,12 @@ static CAMERA: Table = Table {
             "0",
             "The trigger input that the box is wired to (EVK1: 0 main, 7 auxiliary, 6 loop-back of its own output).",
         ),
+        default(
+            "trigger_delay",
+            Shape::Quantity(&[Time], Range::between(0.0, 0.001)),
+            "0 us",
+            "How long after an edge at its trigger input the camera stamps it, in whole microseconds: not published, to be measured on your bench. Analyses take it off the camera's edges; the session keeps them as they came.",
+        ),
         required(
             "geometry",
             Shape::Map(&NOMINAL_CAMERA),
