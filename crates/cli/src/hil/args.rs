@@ -89,7 +89,7 @@ pub struct HilRunArgs {
     #[arg(long, value_name = "CHECK", value_delimiter = ',')]
     pub only: Option<Vec<String>>,
 
-    /// The history of nights that this one is added to.
+    /// The history of nights that this one is added to; its page then says what moved over them.
     #[arg(long, value_name = "FILE")]
     pub history: Option<PathBuf>,
 }

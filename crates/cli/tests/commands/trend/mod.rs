@@ -329,6 +329,24 @@ fn the_page_of_a_night_says_what_moved_over_the_nights() {
     );
 }
 
+/// Tonight is the third night of a disk that was a million times faster before: the alarm leads to tonight's own page.
+#[test]
+fn an_alarm_that_is_raised_tonight_leads_to_tonight() {
+    let nights = Nights::new();
+    nights.add_disk(0..40, 38);
+    nights.trend(&[]).code(0);
+    let (ran, folder) = nights.run(&["--history", &nights.history]);
+    has(&ran.code(0).out, &["trend: disk/computer/write_rate moved"]);
+    let page = folder.join("trends.html");
+    assert!(links(&page).contains(&"night.html".to_owned()));
+    links(&folder.join("night.html"));
+    let shown = read(&folder.join("night.html"));
+    assert_eq!(
+        says(&shown, "headline"),
+        "All within limits, but the computer probably moved"
+    );
+}
+
 #[test]
 fn a_night_without_trends_says_why_and_is_judged_all_the_same() {
     let nights = Nights::of(10, 10);

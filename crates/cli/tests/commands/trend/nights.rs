@@ -1,5 +1,6 @@
 //! Nights that were never made: a bench's history, as the library writes it.
 
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use chrono::{Days, NaiveDate};
@@ -20,46 +21,9 @@ checks:
   disk: {amount: 1 MB, write_rate: {at_least: 1 kB/s}, free: {at_least: 1 B}}
 ";
 
-/// Night number `at`, in which the golden skin gave this share of its events.
-fn night(at: usize, share: f64, golden: Option<&str>) -> Night {
+/// Night number `at`, in which these were measured: check, device, metric, unit, value.
+fn night(at: usize, golden: Option<&str>, measured: &[(&str, &str, &str, &str, f64)]) -> Night {
     let day = NaiveDate::from_ymd_opt(2024, 1, 1).unwrap() + Days::new(at as u64);
-    let wobble = (at * 7 % 5) as f64;
-    let measured = |metric: &str, unit: &str, value: f64| Measurement {
-        metric: metric.to_owned(),
-        value: Some(value),
-        unit: unit.to_owned(),
-        interval: None,
-        n: None,
-        needs: 0,
-        limit: None,
-        verdict: Verdict::Pass,
-        note: None,
-    };
-    let check = |name: &str, subject: &str, measurements: Vec<Measurement>| CheckResult {
-        name: name.to_owned(),
-        title: name.to_owned(),
-        planned_s: 30.0,
-        attempts: vec![Attempt {
-            began_s: 0.0,
-            took_s: 30.0,
-            parts: vec![Part {
-                subject: subject.to_owned(),
-                measurements,
-                verdict: Verdict::Pass,
-            }],
-            evidence: Vec::new(),
-            verdict: Verdict::Pass,
-            cause: None,
-            rule: None,
-        }],
-        skipped: None,
-        verdict: Verdict::Pass,
-        repeats: None,
-        cause: None,
-        rule: None,
-        witnesses: Vec::new(),
-    };
-    let events = share * (1e5 + 1e3 * wobble);
     Night {
         version: NIGHT_VERSION,
         id: format!("{day}T02-00-00Z-small"),
@@ -76,18 +40,7 @@ fn night(at: usize, share: f64, golden: Option<&str>) -> Night {
         finished: true,
         ended_early: None,
         lease_note: None,
-        checks: vec![
-            check(
-                "golden",
-                "skin",
-                vec![measured("press_events", "ev/s", events)],
-            ),
-            check(
-                "idle",
-                "camera1",
-                vec![measured("data_rate", "B/s", 2e6 + 1e4 * wobble)],
-            ),
-        ],
+        checks: measured.iter().map(check).collect(),
         golden: golden.map(|session| Golden {
             session: session.to_owned(),
             report: None,
@@ -96,6 +49,50 @@ fn night(at: usize, share: f64, golden: Option<&str>) -> Night {
         verdict: Verdict::Pass,
         exit: NightExit::Pass,
     }
+}
+
+fn check(&(name, subject, metric, unit, value): &(&str, &str, &str, &str, f64)) -> CheckResult {
+    let measurement = Measurement {
+        metric: metric.to_owned(),
+        value: Some(value),
+        unit: unit.to_owned(),
+        interval: None,
+        n: None,
+        needs: 0,
+        limit: None,
+        verdict: Verdict::Pass,
+        note: None,
+    };
+    let part = Part {
+        subject: subject.to_owned(),
+        measurements: vec![measurement],
+        verdict: Verdict::Pass,
+    };
+    CheckResult {
+        name: name.to_owned(),
+        title: name.to_owned(),
+        planned_s: 30.0,
+        attempts: vec![Attempt {
+            began_s: 0.0,
+            took_s: 30.0,
+            parts: vec![part],
+            evidence: Vec::new(),
+            verdict: Verdict::Pass,
+            cause: None,
+            rule: None,
+        }],
+        skipped: None,
+        verdict: Verdict::Pass,
+        repeats: None,
+        cause: None,
+        rule: None,
+        witnesses: Vec::new(),
+    }
+}
+
+/// What changes from night to night in a bench that is well.
+fn wobble(at: usize) -> f64 {
+    (at * 7 % 5) as f64
 }
 
 /// Nights in `nights/`, with their history beside them.
@@ -119,19 +116,41 @@ impl Nights {
         all
     }
 
-    pub fn add(&self, which: std::ops::Range<usize>, change: usize, session: Option<&Path>) {
+    /// Nights of a golden skin and a camera; the skin gives a fifth less from `change` on.
+    pub fn add(&self, which: Range<usize>, change: usize, session: Option<&Path>) {
         for at in which {
             let share = if at < change { 1.0 } else { 0.8 };
+            let events = share * (1e5 + 1e3 * wobble(at));
+            let rate = 2e6 + 1e4 * wobble(at);
             let name = session.and_then(|s| s.file_name()?.to_str());
-            let night = night(at, share, name);
-            let home = self.lab.path("nights").join(&night.id);
-            std::fs::create_dir(&home).unwrap();
-            std::fs::write(home.join("night.html"), "a page").unwrap();
+            let measured = [
+                ("golden", "skin", "press_events", "ev/s", events),
+                ("idle", "camera1", "data_rate", "B/s", rate),
+            ];
+            let home = self.append(&night(at, name, &measured));
             if let Some((session, name)) = session.zip(name) {
                 std::fs::copy(session, home.join(name)).unwrap();
             }
-            append(Path::new(&self.history), &night, &home).unwrap();
         }
+    }
+
+    /// Nights of a disk faster than any, which is a millionth of that from `change` on.
+    pub fn add_disk(&self, which: Range<usize>, change: usize) {
+        for at in which {
+            let share = if at < change { 1.0 } else { 1e-6 };
+            let rate = share * 1e15 * (1.0 + 0.01 * wobble(at));
+            let measured = ("disk", "computer", "write_rate", "B/s", rate);
+            self.append(&night(at, None, &[measured]));
+        }
+    }
+
+    /// Puts a night with its page into the history; its folder.
+    fn append(&self, night: &Night) -> PathBuf {
+        let home = self.lab.path("nights").join(&night.id);
+        std::fs::create_dir(&home).unwrap();
+        std::fs::write(home.join("night.html"), "a page").unwrap();
+        append(Path::new(&self.history), night, &home).unwrap();
+        home
     }
 
     pub fn trend(&self, more: &[&str]) -> Said {
