@@ -173,4 +173,26 @@ mod tests {
         assert!(Scale::new((2.0, 2.0), (0.0, 10.0)).at(2.0).is_finite());
         assert!(Scale::new((f64::NAN, 2.0), (0.0, 10.0)).at(2.0).is_finite());
     }
+
+    /// Ticks end 7 px beside the axis; the label keeps clear of the widest, half its height and more.
+    #[test]
+    fn the_label_at_the_left_stands_clear_of_wide_ticks() {
+        let scale = Scale::new((0.0, 1.0), (100.0, 200.0));
+        let axes = Axes {
+            x: scale,
+            y: scale,
+            x_label: String::new(),
+            y_label: "ev/s".to_owned(),
+            tick_count: (0, 0),
+        };
+        let label_px = |tick: &str| {
+            let mut svg = Svg::new();
+            axes.draw_with(&mut svg, &[], &[(0.5, tick.to_owned())]);
+            let drawn = svg.finish();
+            let (_, rest) = drawn.split_once("translate(").unwrap();
+            rest.split(' ').next().unwrap().parse::<f64>().unwrap()
+        };
+        assert_eq!(label_px("2.5"), 54.0);
+        assert!(label_px("2.600e5") < 100.0 - 7.0 - 7.0 * 6.6 - 7.0);
+    }
 }
