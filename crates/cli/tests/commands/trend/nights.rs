@@ -170,6 +170,7 @@ impl Nights {
         let mut command = program(&[&run[..], more].concat());
         command
             .env("SKINRIG_EMULATED_LIBDRD", "/nowhere/libdrd.so")
+            .env("SKINRIG_EMULATED_LAMPS_OFF", "/nowhere/lamps-off")
             .env("SKINRIG_EMULATED_TRIGGER_BOX", "/nowhere/box");
         let ran = said(command);
         let folder = ran.out.lines().find(|l| l.starts_with(&out));
