@@ -12,6 +12,11 @@ use crate::stream::Geometry;
 /// The fields that make a dvs dictionary.
 pub(super) const FIELDS: [&str; 4] = ["ts", "x", "y", "pol"];
 
+/// How many times smaller than its content deflate can make it (zlib's technical details: 1032).
+const MOST_INFLATED: u64 = 1032;
+/// Chunks of so many bytes are read from a file of any size: 16 MiB, sixteen times the largest that h5py chooses.
+const ALWAYS_HELD: u64 = 16 << 20;
+
 /// An open HDF5 file with at least one dvs dictionary.
 pub struct Container {
     pub(super) path: PathBuf,
@@ -175,7 +180,7 @@ pub(super) fn open_followed(
         expected: "a readable dataset".into(),
         found: error.to_string(),
     };
-    let opened = file.dataset(dataset).map_err(in_dataset)?;
+    let opened = holdable(file.dataset(dataset).map_err(in_dataset)?, path, dataset)?;
     if !matches!(
         opened.datatype().map_err(in_dataset)?,
         DatatypeMessage::Reference { .. }
@@ -184,9 +189,10 @@ pub(super) fn open_followed(
     }
     let references = opened.read_references().map_err(in_dataset)?;
     match references.first().and_then(|r| r.path()) {
-        Some(target) if references.len() == 1 => file
-            .dataset(target.trim_start_matches('/'))
-            .map_err(in_dataset),
+        Some(target) if references.len() == 1 => {
+            let target = file.dataset(target.trim_start_matches('/'));
+            holdable(target.map_err(in_dataset)?, path, dataset)
+        }
         _ => Err(FormatsError::Dataset {
             path: path.into(),
             dataset: dataset.into(),
@@ -194,6 +200,31 @@ pub(super) fn open_followed(
             found: format!("{references:?}"),
         }),
     }
+}
+
+/// The dataset, when its chunks are no larger than this file can fill: a reader makes room for a whole one before it looks into it.
+fn holdable(opened: H5Dataset, path: &Path, dataset: &str) -> Result<H5Dataset, FormatsError> {
+    let file_bytes = std::fs::metadata(path)
+        .map_err(FormatsError::io(path))?
+        .len();
+    let most = MOST_INFLATED.saturating_mul(file_bytes).max(ALWAYS_HELD);
+    let rows = opened.chunk_dims().unwrap_or_default();
+    let bytes = rows
+        .iter()
+        .fold(opened.element_size() as u64, |bytes, rows| {
+            bytes.saturating_mul(*rows as u64)
+        });
+    if bytes <= most {
+        return Ok(opened);
+    }
+    Err(FormatsError::Dataset {
+        path: path.into(),
+        dataset: dataset.into(),
+        expected: format!(
+            "chunks of at most {most} bytes, which a file of {file_bytes} bytes can hold"
+        ),
+        found: format!("chunks of {bytes} bytes"),
+    })
 }
 
 fn scalar(file: &H5File, path: &Path, dataset: &str) -> Result<f64, FormatsError> {
