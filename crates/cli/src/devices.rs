@@ -13,6 +13,7 @@ use skinrig_trigger_box::PortState;
 
 use crate::args::DevicesArgs;
 use crate::exit::{Exit, Outcome};
+use crate::hil::lease::{holder_of, path};
 use crate::rig::bench;
 
 /// How long a trigger box may take to say hello: opening its port resets it.
@@ -416,11 +417,8 @@ fn trigger_boxes(rig: Option<&RigFile>) -> Vec<Line> {
 
 /// Who holds the lease of the bench at this moment.
 fn holder(rig: &RigFile) -> Option<String> {
-    match lease::look(&crate::hil::lease::path(rig)) {
-        Ok(Standing::Held { owner, .. }) => Some(owner.map_or_else(
-            || "somebody who is just taking it".to_owned(),
-            |owner| owner.to_string(),
-        )),
+    match lease::look(&path(rig)) {
+        Ok(Standing::Held { owner, .. }) => Some(holder_of(owner.as_deref())),
         _ => None,
     }
 }

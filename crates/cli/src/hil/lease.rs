@@ -93,15 +93,20 @@ fn all() -> Result<Vec<PathBuf>, Failure> {
     Ok(paths)
 }
 
+/// Who holds a lease; there is no name in the moment before the holder wrote it.
+pub(crate) fn holder_of(owner: Option<&Owner>) -> String {
+    owner.map_or_else(
+        || "somebody who is just taking it".to_owned(),
+        ToString::to_string,
+    )
+}
+
 fn words(standing: &Standing) -> String {
     match standing {
         Standing::Free { last: None } => "free; nobody ever took it".to_owned(),
         Standing::Free { last: Some(last) } => format!("free; last: {last}"),
         Standing::Held { owner, beat_at } => {
-            let who = owner.as_ref().map_or_else(
-                || "somebody who is just taking it".to_owned(),
-                ToString::to_string,
-            );
+            let who = holder_of(owner.as_deref());
             let beat = beat_at.as_ref();
             let beat = beat.map_or(String::new(), |b| format!("; last sign of life {b}"));
             format!("held by {who}{beat}")
