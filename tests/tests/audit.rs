@@ -73,7 +73,7 @@ fn a_camera_that_sleeps_through_half_of_the_presses_is_accused() {
 }
 
 #[test]
-#[ignore = "minutes: its command stands in docs/audit.md"]
+#[ignore = "200 sessions take minutes: SKINRIG_CI_LONG=1 .ci/run, or cargo test --release -p skinrig-tests --test audit -- --ignored"]
 fn of_200_sound_simulated_sessions_at_most_2_raise_an_alarm() {
     let alarms = alarms(0..200);
     println!("{} alarms of 200: {alarms:#?}", alarms.len());

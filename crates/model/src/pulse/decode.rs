@@ -357,7 +357,7 @@ mod tests {
     }
 
     #[test]
-    #[ignore = "minutes: 10^7 trains"]
+    #[ignore = "10^7 trains take minutes: SKINRIG_CI_LONG=1 .ci/run, or cargo test --release -p skinrig-model -- --ignored"]
     fn no_label_is_wrong_in_ten_million_trains() {
         let (right, wrong) = noisy_line(10_000_000, 2);
         assert_eq!(wrong, 0, "{right} read rightly");
