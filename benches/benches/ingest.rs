@@ -53,7 +53,7 @@ fn session(path: &Path, chunk: &[u8]) -> Result<(), Box<dyn Error>> {
     }
     // Returns when everything before it is on the disk.
     let attempt = AttemptId {
-        press: PressId(0),
+        press: PressId::from_index(0),
         number: 1,
     };
     writer.accept(Record::Intent {

@@ -310,7 +310,7 @@ mod linux {
         }
         if let Some(writer) = &mut writer {
             // Returns when everything before it is on the disk.
-            let (press, number) = (PressId(0), 1);
+            let (press, number) = (PressId::from_index(0), 1);
             writer.accept(Record::Intent {
                 attempt: AttemptId { press, number },
                 t: HostTime(0),

@@ -217,7 +217,7 @@ pub fn events(input: &SessionInput) -> [Vec<CdEvent>; 2] {
             let contact_s = timing.contact.0 as f64 * 1e-9 + CLOCK_LEADS_S[k];
             // The dent is seen a little beside its place: there is an error to measure.
             let column = camera.column_of_point(at).unwrap_or(320.0) + 6.0 * random.normal();
-            let place = outcome.attempt.press.0;
+            let place = outcome.attempt.press.index();
             let events_here = if place < 3 {
                 PERIOD_EVENTS / 3
             } else {

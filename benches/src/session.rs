@@ -5,7 +5,8 @@ use std::io::Write;
 use std::path::Path;
 
 use skinrig_model::{
-    PlannedPress, Point2, PressId, PressRole, RigidTransform, RunHeader, StreamFormat,
+    LocationId, PlannedPress, Point2, PressId, PressRole, RepetitionId, RigidTransform, RunHeader,
+    StreamFormat,
 };
 
 /// A header with one press that nobody makes.
@@ -34,10 +35,10 @@ pub fn header() -> RunHeader {
         software: String::new(),
         command_line: String::new(),
         presses: vec![PlannedPress {
-            id: PressId(0),
+            id: PressId::from_index(0),
             role: PressRole::Score,
-            repetition: 0,
-            location: 0,
+            repetition: RepetitionId::default(),
+            location: LocationId::default(),
             at: Point2::new(0.0, 0.0),
             depth_mm: 2.0,
         }],

@@ -338,7 +338,7 @@ impl<'a> Accumulator<'a> {
             let events = &events[start..first_from(events, w.end_us).max(start)];
             let too_many = |most| AnalysisError::TooManyEvents {
                 camera: self.camera,
-                row: w.row,
+                press: PressId::from_index(w.row as u32),
                 most,
             };
             let mut fits = open.grid.add_all(events);

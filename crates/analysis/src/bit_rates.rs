@@ -24,18 +24,18 @@ pub fn bit_rates(analysis: &Analysis) -> Option<BitRates> {
     };
     let press: Vec<(u32, f64)> = presses
         .iter()
-        .map(|(p, views)| (p.location, views.iter().map(|v| v.rate_per_s).sum()))
+        .map(|(p, views)| (p.location.index(), views.iter().map(|v| v.rate_per_s).sum()))
         .collect();
     let idle: Vec<(u32, f64)> = presses
         .iter()
-        .filter_map(|(p, views)| Some((p.location, idle_rate_per_s(views)?)))
+        .filter_map(|(p, views)| Some((p.location.index(), idle_rate_per_s(views)?)))
         .collect();
     let press_events_per_s = estimate(&press);
     let idle_events_per_s = estimate(&idle);
     let length_s = |p: &PressResult| Some(p.timing?.release.0 - p.timing?.contact.0);
     let lengths: Vec<(u32, f64)> = presses
         .iter()
-        .filter_map(|(p, _)| Some((p.location, length_s(p)? as f64 * 1e-9)))
+        .filter_map(|(p, _)| Some((p.location.index(), length_s(p)? as f64 * 1e-9)))
         .collect();
     Some(BitRates {
         bits_per_event: settings.bits_per_event,

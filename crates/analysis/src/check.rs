@@ -27,8 +27,8 @@ pub fn input(input: &SessionInput) -> Result<(), AnalysisError> {
             && found != planned.id
         {
             return Err(AnalysisError::JournalOrder {
-                expected: planned.id.0,
-                found: found.0,
+                expected: planned.id,
+                found,
             });
         }
     }
@@ -37,7 +37,7 @@ pub fn input(input: &SessionInput) -> Result<(), AnalysisError> {
         let numbers = [planned.at.x_mm, planned.at.y_mm, planned.depth_mm];
         if !numbers.iter().all(|n| n.abs() <= MAX_COORDINATE_MM) {
             return Err(AnalysisError::Plan {
-                press: planned.id.0,
+                press: planned.id,
                 found: format!(
                     "({}, {}) mm, depth {} mm",
                     numbers[0], numbers[1], numbers[2]

@@ -45,7 +45,7 @@ impl Closeups {
             let rows = input.planned.iter().zip(&input.outcomes).enumerate();
             rows.filter(|(_, (p, _))| !scored || p.role == PressRole::Score)
                 .filter(|(_, (_, o))| o.as_ref().is_some_and(|o| o.timing.is_some()))
-                .map(|(row, (p, _))| (row, p.id, p.location))
+                .map(|(row, (p, _))| (row, p.id, p.location.index()))
                 .collect()
         };
         let mut candidates = done(true);

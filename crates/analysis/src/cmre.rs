@@ -40,7 +40,7 @@ pub fn cmre(analysis: &Analysis) -> Option<Cmre> {
         .presses
         .iter()
         .filter(|p| p.role == PressRole::Score && p.verdict == PressVerdict::Valid.name());
-    let pairs = counting.filter_map(|p| Some((p.location, p.estimate()?, p.truth?)));
+    let pairs = counting.filter_map(|p| Some((p.location.index(), p.estimate()?, p.truth?)));
     let (mut scores, mut without_score) = (Vec::new(), 0);
     for (location, estimate, truth) in pairs {
         match map.score(estimate, truth) {

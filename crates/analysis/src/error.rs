@@ -1,6 +1,6 @@
 //! What can keep an analysis from giving a result.
 
-use skinrig_model::CameraId;
+use skinrig_model::{CameraId, PressId};
 
 /// Why there is no analysis. Everything else that goes wrong is a row, a count or a warning in the result.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -16,14 +16,12 @@ pub enum AnalysisError {
         outcomes: usize,
     },
     /// An outcome stands in the row of another press.
-    #[error(
-        "expected the outcome of press {expected} in row {expected} of the journal, found that of press {found}"
-    )]
+    #[error("expected the outcome of {expected} in its row of the journal, found that of {found}")]
     JournalOrder {
         /// Press of the row.
-        expected: u32,
+        expected: PressId,
         /// Press that the outcome names.
-        found: u32,
+        found: PressId,
     },
     /// A setting is out of its range.
     #[error("expected {expected} for the analysis setting `{name}`, found {found}")]
@@ -55,11 +53,11 @@ pub enum AnalysisError {
     },
     /// The plan has a number that is none.
     #[error(
-        "expected finite positions and depths in the plan, found {found} for press {press}; check the session's plan"
+        "expected finite positions and depths in the plan, found {found} for {press}; check the session's plan"
     )]
     Plan {
         /// Which press.
-        press: u32,
+        press: PressId,
         /// What was given.
         found: String,
     },
@@ -87,13 +85,13 @@ pub enum AnalysisError {
     },
     /// More events in the windows of presses than a counter holds, or than an estimator that needs them all may keep.
     #[error(
-        "expected at most {most} events in the window of press {row} and those that overlap it, found more ({camera}); shorten the press window or set `thinning`, both below `analysis` in the protocol"
+        "expected at most {most} events in the window of {press} and those that overlap it, found more ({camera}); shorten the press window or set `thinning`, both below `analysis` in the protocol"
     )]
     TooManyEvents {
         /// Which camera.
         camera: CameraId,
-        /// Row of the press in the plan.
-        row: usize,
+        /// The press.
+        press: PressId,
         /// The most that there may be.
         most: usize,
     },

@@ -6,7 +6,9 @@ use sha2::{Digest, Sha256};
 use crate::result::{
     Analysis, CalibrationResult, LocationOutcome, Metrics, PressCounts, PressResult, PressView,
 };
-use skinrig_model::{AnalysisSettings, Point2, PressId, PressRole, StereoGeometry};
+use skinrig_model::{
+    AnalysisSettings, LocationId, Point2, PressId, PressRole, RepetitionId, StereoGeometry,
+};
 
 /// What the digest covers: settings, geometry, table of presses and metrics. Not the absolute times: a session
 /// that is replayed at another hour gives the same results.
@@ -26,8 +28,8 @@ struct Results<'a> {
 struct Row<'a> {
     press: PressId,
     role: PressRole,
-    repetition: u32,
-    location: u32,
+    repetition: RepetitionId,
+    location: LocationId,
     planned: Point2,
     depth_mm: f64,
     truth: Option<Point2>,

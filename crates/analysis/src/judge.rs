@@ -63,7 +63,7 @@ fn rows(input: &SessionInput, seen: [Seen<'_>; 2]) -> Vec<PressResult> {
                 &views,
                 &input.settings,
             );
-            if input.settings.exclude_presses.contains(&planned.id.0) {
+            if input.settings.excludes(planned.id) {
                 judgement = judgement.or_by_hand();
             }
             let mut row = PressResult {

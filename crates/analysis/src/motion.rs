@@ -192,7 +192,7 @@ mod tests {
             release: at(2400),
             clear: at(2999),
         };
-        let mut course = MotionCourse::new([(PressId(7), timing)]);
+        let mut course = MotionCourse::new([(PressId::from_index(7), timing)]);
         let samples: Vec<_> = (0..5000).map(|ms| sample(ms, 0.1)).collect();
         for block in samples.chunks(333) {
             course.push(block);
@@ -203,7 +203,7 @@ mod tests {
         };
         assert_eq!(
             (path.press, path.kept_each, path.samples.len()),
-            (PressId(7), 3, 334)
+            (PressId::from_index(7), 3, 334)
         );
         assert!((path.samples[0].since_contact_s + 0.1).abs() < 1e-12);
         assert_eq!(MotionCourse::new([]).finish(), None);

@@ -8,7 +8,7 @@
 //! rate. Estimates are exact intersections: rays that meet behind a camera have none here.
 
 use skinrig_model::{
-    CalibrationModel, CentroidRule, LensKind, PressRole, PressVerdict, StereoGeometry,
+    CalibrationModel, CentroidRule, LensKind, PressRole, PressVerdict, RepetitionId, StereoGeometry,
 };
 
 use crate::calibrate::calibrate;
@@ -66,7 +66,7 @@ pub fn reference_code(input: &SessionInput, analysis: &Analysis, kept: &Kept) ->
 fn used(input: &SessionInput, analysis: &Analysis) -> Vec<PressResult> {
     let rows = analysis.presses.iter().zip(&input.outcomes);
     let of_first = rows.filter(|(p, outcome)| {
-        p.repetition == 0
+        p.repetition == RepetitionId::default()
             && p.role != PressRole::Sync
             && p.truth.is_some()
             && outcome
@@ -77,7 +77,7 @@ fn used(input: &SessionInput, analysis: &Analysis) -> Vec<PressResult> {
 }
 
 fn is_left_out_by_hand(press: &PressResult, analysis: &Analysis) -> bool {
-    analysis.settings.exclude_presses.contains(&press.press.0)
+    analysis.settings.excludes(press.press)
 }
 
 fn columns(press: &PressResult) -> [Option<f64>; 2] {

@@ -13,7 +13,7 @@ use crate::result::PressResult;
 pub struct Sight {
     /// Which press.
     pub press: PressId,
-    /// Location, from 0.
+    /// Index of its location: a label to group by.
     pub location: u32,
     /// Centroid column in each camera, px.
     pub columns: [f64; 2],
@@ -42,7 +42,7 @@ impl CalibrationSet {
                     let (one, two) = (one?, two?);
                     Some(Sight {
                         press: p.press,
-                        location: p.location,
+                        location: p.location.index(),
                         columns: [one.centroid_u?, two.centroid_u?],
                         truth: p.truth?,
                         cluster_events: one.cluster_events.min(two.cluster_events),
@@ -68,7 +68,7 @@ impl CalibrationSet {
 pub struct Scored {
     /// Which press.
     pub press: PressId,
-    /// Location, from 0.
+    /// Index of its location: a label to group by.
     pub location: u32,
     /// Planned depth, mm.
     pub depth_mm: f64,
@@ -109,7 +109,7 @@ impl ScoreSet {
             attempted
                 .map(|p| Scored {
                     press: p.press,
-                    location: p.location,
+                    location: p.location.index(),
                     depth_mm: p.depth_mm,
                     at: p.truth.unwrap_or(p.planned),
                     valid: is_valid(p),

@@ -348,7 +348,7 @@ mod tests {
         let settings = AnalysisSettings::default();
         let outcome = PressOutcome {
             attempt: skinrig_model::AttemptId {
-                press: skinrig_model::PressId(0),
+                press: skinrig_model::PressId::from_index(0),
                 number: 1,
             },
             verdict: PressVerdict::Valid,

@@ -4,7 +4,9 @@ use skinrig_analysis::calibrate::{affordable_model, calibrate};
 use skinrig_analysis::result::{LocationOutcome, PressResult, PressView};
 use skinrig_analysis::sets::{CalibrationSet, ScoreSet};
 use skinrig_analysis::triangulate::intersect;
-use skinrig_model::{CalibrationModel, Point2, PressId, PressRole, StereoGeometry};
+use skinrig_model::{
+    CalibrationModel, LocationId, Point2, PressId, PressRole, RepetitionId, StereoGeometry,
+};
 
 const PLANTED: [f64; 8] = [
     42.51, -33.337, 41.947, 36.103, -2.388, 0.302, -0.1138, 0.0168,
@@ -28,10 +30,10 @@ fn view(u: f64) -> Option<PressView> {
 
 fn row(id: u32, role: PressRole, truth: Point2, columns: [f64; 2]) -> PressResult {
     PressResult {
-        press: PressId(id),
+        press: PressId::from_index(id),
         role,
-        repetition: 0,
-        location: id,
+        repetition: RepetitionId::default(),
+        location: LocationId::from_index(id),
         planned: truth,
         depth_mm: 2.0,
         truth: Some(truth),

@@ -34,7 +34,7 @@ fn marks(count: usize) -> Vec<SentMark> {
                 } else {
                     MarkKind::Release
                 },
-                press: PressId((i / 2) as u32),
+                press: PressId::from_index((i / 2) as u32),
             },
             t: HostTime((5_000_000_000 + i as i64 * 1_750_111_222) + (noise(i) * 1e6) as i64),
             uncertainty_ns: 1000,

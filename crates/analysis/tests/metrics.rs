@@ -4,16 +4,16 @@ use proptest::prelude::*;
 use skinrig_analysis::metrics::{Exclusions, metrics};
 use skinrig_analysis::result::{LocationOutcome, Metrics, PressResult};
 use skinrig_analysis::sets::ScoreSet;
-use skinrig_model::{Point2, PressId, PressRole, SkinOutline};
+use skinrig_model::{LocationId, Point2, PressId, PressRole, RepetitionId, SkinOutline};
 
 /// A scored press at (10 + location, 2) whose estimate is off by `error`; `None`: no estimate.
 fn row(location: u32, error: Option<(f64, f64)>, verdict: &str) -> PressResult {
     let truth = Point2::new(10.0 + f64::from(location), 2.0);
     PressResult {
-        press: PressId(0),
+        press: PressId::from_index(0),
         role: PressRole::Score,
-        repetition: 0,
-        location,
+        repetition: RepetitionId::default(),
+        location: LocationId::from_index(location),
         planned: truth,
         depth_mm: 2.0,
         truth: Some(truth),

@@ -9,8 +9,8 @@ use skinrig_analysis::calibrate::{Chosen, calibrate, choose};
 use skinrig_analysis::result::{LocationOutcome, PressResult, PressView};
 use skinrig_analysis::sets::CalibrationSet;
 use skinrig_model::{
-    AnalysisSettings, CalibrationModel, LensKind, LensModel, Point2, PressId, PressRole,
-    StereoGeometry,
+    AnalysisSettings, CalibrationModel, LensKind, LensModel, LocationId, Point2, PressId,
+    PressRole, RepetitionId, StereoGeometry,
 };
 
 /// The drawn rig: where calibrations start.
@@ -63,10 +63,10 @@ fn presses(
             };
             let columns = [a, b].map(|u| u + noise_px * noise.normal());
             rows.push(PressResult {
-                press: PressId(rows.len() as u32),
+                press: PressId::from_index(rows.len() as u32),
                 role: PressRole::Calibrate,
-                repetition: 0,
-                location: location as u32,
+                repetition: RepetitionId::default(),
+                location: LocationId::from_index(location as u32),
                 planned: *at,
                 depth_mm: 2.0,
                 truth: Some(*at),

@@ -148,8 +148,8 @@ fn one_event_each_is_always_located_by_a_clustering_that_asks_for_one() {
 fn a_rule_on_the_data_keeps_a_press_in_the_study_and_a_hand_does_not() {
     let (mut input, source) = small();
     let scored = || input.planned.iter().filter(|p| p.role == PressRole::Score);
-    let by_hand: Vec<u32> = scored().take(2).map(|p| p.id.0).collect();
-    input.settings.exclude_presses = by_hand;
+    let by_hand = scored().take(2).map(|p| p.id).collect();
+    input.settings.exclude_press_numbers = by_hand;
     // More cluster events than any press has: all are excluded, and all were done.
     input.settings.min_cluster_events = 100_000;
     let a = analyze(&input, &source).unwrap();
@@ -244,7 +244,7 @@ fn the_published_way_judges_the_first_repetition_and_counts_nothing_as_missing()
     let (_, scored) = analyze_and_keep(&input, &source, Keep::Scored).unwrap();
     assert_eq!(reference_code(&input, &a, &scored).reduction, []);
     // Presses left out by hand are not judged, those that a schedule does not use are not there at all.
-    input.settings.exclude_presses = vec![a.presses[3].press.0];
+    input.settings.exclude_press_numbers = vec![a.presses[3].press];
     if let Some(outcome) = &mut input.outcomes[4] {
         outcome.verdict = skinrig_model::PressVerdict::Excluded("not used".to_owned());
     }

@@ -118,7 +118,7 @@ fn run(mut r: Random, boxed: Clock, cameras: [Clock; 2], c: &Conditions) -> Benc
             ] {
                 let mark = Mark {
                     kind,
-                    press: PressId(second / 2),
+                    press: PressId::from_index(second / 2),
                 };
                 send(contact + after, Label::Mark(mark), &mut trains);
             }

@@ -108,13 +108,13 @@ pub fn plan(args: &PlanArgs, json: bool) -> Outcome {
     let summary = checked.plan.summary();
     if json {
         crate::print_json(&serde_json::json!({
-            "sha256": checked.plan.digest(), "summary": summary, "plan": checked.plan,
+            "sha256": checked.plan.digest(), "summary": summary, "plan": as_read(&checked.plan)?,
         }));
         return Ok(Exit::Ok);
     }
     outln!("{summary}");
     if args.steps {
-        for (number, step) in checked.plan.steps.iter().enumerate() {
+        for (number, step) in (1..).zip(&checked.plan.steps) {
             outln!("{number:>6}  {}", describe_step(step));
         }
     }
@@ -125,6 +125,30 @@ pub fn plan(args: &PlanArgs, json: bool) -> Outcome {
     Ok(Exit::Ok)
 }
 
+/// The plan as JSON for people: presses, repetitions and locations by their numbers. The stored plan, which the digest is of, holds
+/// indices.
+fn as_read(plan: &Plan) -> Result<serde_json::Value, Failure> {
+    let mut value = serde_json::to_value(plan).map_err(Failure::internal)?;
+    let rows = value["presses"].as_array_mut().into_iter().flatten();
+    for (row, press) in rows.zip(&plan.presses) {
+        if let Some(row) = row.as_object_mut() {
+            row.remove("id");
+        }
+        row["press"] = serde_json::json!(press.id);
+        row["repetition"] = serde_json::json!(press.repetition);
+        row["location"] = serde_json::json!(press.location);
+    }
+    let rows = value["steps"].as_array_mut().into_iter().flatten();
+    for (row, step) in rows.zip(&plan.steps) {
+        match step {
+            Step::Press(p) => row["press"] = serde_json::json!(p.press),
+            Step::Begin { repetition } => row["repetition"] = serde_json::json!(repetition),
+            Step::Travel { .. } | Step::Pause { .. } => {}
+        }
+    }
+    Ok(value)
+}
+
 /// One step on one line.
 fn describe_step(step: &Step) -> String {
     let seconds = |d: skinrig_model::HostDuration| format!("{:.3} s", d.as_secs_f64());
@@ -132,7 +156,7 @@ fn describe_step(step: &Step) -> String {
         Step::Begin { repetition: None } => "begin of the sync presses".into(),
         Step::Begin {
             repetition: Some(r),
-        } => format!("begin of repetition {}", r + 1),
+        } => format!("begin of {r}"),
         Step::Travel {
             to,
             speed_mm_s,
@@ -148,9 +172,9 @@ fn describe_step(step: &Step) -> String {
                 .start_after_begin
                 .map_or_else(String::new, |t| format!(", {} after begin", seconds(t)));
             format!(
-                "press {} at ({:.3}, {:.3}) mm, {} mm deep{at}: approach {:.3}, indent {:.3}, retract \
+                "{} at ({:.3}, {:.3}) mm, {} mm deep{at}: approach {:.3}, indent {:.3}, retract \
                  {:.3} mm/s, hold {}, within {}",
-                p.press.0,
+                p.press,
                 p.at.x_mm,
                 p.at.y_mm,
                 p.depth_mm,

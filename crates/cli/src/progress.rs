@@ -128,7 +128,7 @@ fn where_and_when(tracker: &ProgressTracker, waited: Duration) -> String {
     let press = p.press.map_or_else(String::new, |press| {
         let block = match press.role {
             PressRole::Sync => "sync".to_owned(),
-            PressRole::Calibrate | PressRole::Score => format!("rep {}", press.repetition + 1),
+            PressRole::Calibrate | PressRole::Score => format!("rep {}", press.repetition.number()),
         };
         format!("  {block}  ({:.1}, {:.1}) mm", press.at.x_mm, press.at.y_mm)
     });

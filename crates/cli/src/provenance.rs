@@ -159,7 +159,7 @@ fn retaken(reader: &SessionReader) -> Result<Vec<RetakenRow>, RecorderError> {
                 .and_then(PressVerdict::reason)
                 .unwrap_or("no outcome");
             rows.push(RetakenRow {
-                press: planned.id.0,
+                press: planned.id.number(),
                 attempt: attempt.id.number,
                 reason: reason.to_owned(),
             });

@@ -9,7 +9,9 @@ use skinrig_analysis::reference_code::reference_code;
 use skinrig_analysis::result::{Motion, PressResult};
 use skinrig_analysis::tradeoff::Tradeoff;
 use skinrig_analysis::{Analysis, EarlierAttempt, Keep, LegStart, SessionInput};
-use skinrig_model::{AnalysisSettings, CameraId, HostTime, RigGeometry, RunHeader, TriggerEdge};
+use skinrig_model::{
+    AnalysisSettings, CameraId, HostTime, PressId, RigGeometry, RunHeader, TriggerEdge,
+};
 use skinrig_recorder::{AttemptRow, RecorderError, SessionReader};
 use skinrig_report::{Provenance, ReportInput};
 
@@ -20,6 +22,7 @@ use crate::source::SessionEvents;
 
 /// What `RunHeader::rig_json` holds.
 #[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(try_from = "RecordedRig")]
 pub struct RigDocument {
     /// What an analysis needs to know of the rig.
     pub geometry: RigGeometry,
@@ -27,6 +30,36 @@ pub struct RigDocument {
     pub analysis: AnalysisSettings,
     /// Everything worth keeping about the rig.
     pub rig: serde_json::Value,
+}
+
+/// [`RigDocument`] as any version wrote it.
+#[derive(Deserialize)]
+struct RecordedRig {
+    geometry: RigGeometry,
+    analysis: serde_json::Value,
+    rig: serde_json::Value,
+}
+
+impl TryFrom<RecordedRig> for RigDocument {
+    type Error = serde_json::Error;
+
+    fn try_from(recorded: RecordedRig) -> Result<Self, Self::Error> {
+        let mut analysis = recorded.analysis;
+        // Earlier versions counted presses that are left out from 0, under another name.
+        if let Some(settings) = analysis.as_object_mut()
+            && let Some(indices) = settings.remove("exclude_presses")
+        {
+            let indices: Vec<u32> = serde_json::from_value(indices)?;
+            let presses: Vec<_> = indices.into_iter().map(PressId::from_index).collect();
+            let name = "exclude_press_numbers".to_owned();
+            settings.insert(name, serde_json::to_value(presses)?);
+        }
+        Ok(Self {
+            geometry: recorded.geometry,
+            analysis: serde_json::from_value(analysis)?,
+            rig: recorded.rig,
+        })
+    }
 }
 
 /// The results of one session.
@@ -165,14 +198,23 @@ fn settings(
         all.extend(skinrig_protocol::REFERENCE_CODE.map(str::to_owned));
     }
     all.extend_from_slice(choices.overrides);
+    if let Some(old) = choices.overrides.iter().find(|o| {
+        let key = o.trim_start().split('=').next().unwrap_or_default();
+        key.trim_end() == "analysis.exclude_presses"
+    }) {
+        return Err(Failure::input(format!(
+            "--set {old}: expected `analysis.exclude_press_numbers`, which counts presses from 1, found the key of earlier versions, \
+             which counts from 0"
+        )));
+    }
     let text = header.protocol_text.as_bytes();
     let loader = |p: &Path| std::fs::read(p);
     if header.rig_kind == "imported" {
-        skinrig_protocol::schedule::Schedule::parse(&header.protocol_name, text, &all)
+        skinrig_protocol::schedule::Schedule::parse_recorded(&header.protocol_name, text, &all)
             .map(|s| s.analysis)
             .map_err(|found| Failure::findings(&found))
     } else {
-        skinrig_protocol::Protocol::parse(&header.protocol_name, text, &all, &loader)
+        skinrig_protocol::Protocol::parse_recorded(&header.protocol_name, text, &all, &loader)
             .map(|p| p.analysis)
             .map_err(|found| Failure::findings(&found))
     }
@@ -375,6 +417,33 @@ fn on_time(mut edges: Vec<TriggerEdge>, delay_us: u16) -> Vec<TriggerEdge> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn an_older_recording_names_the_presses_that_it_leaves_out_by_index() {
+        let settings = AnalysisSettings {
+            exclude_press_numbers: vec![PressId::from_index(4)],
+            ..AnalysisSettings::default()
+        };
+        let rig = RigGeometry {
+            outline: skinrig_model::SkinOutline::PAPER,
+            nominal: skinrig_model::StereoGeometry::PAPER,
+            trigger_channel: None,
+            trigger_delay_us: [0; 2],
+        };
+        let document = RigDocument {
+            geometry: rig,
+            analysis: settings.clone(),
+            rig: serde_json::Value::Null,
+        };
+        let text = serde_json::to_string(&document).unwrap();
+        let today = "\"exclude_press_numbers\":[5]";
+        assert!(text.contains(today), "{text}");
+        let old = text.replace(today, "\"exclude_presses\":[4]");
+        for text in [text, old] {
+            let read: RigDocument = serde_json::from_str(&text).unwrap();
+            assert_eq!(read.analysis, settings);
+        }
+    }
 
     #[test]
     fn edges_are_moved_to_when_they_reached_the_camera() {

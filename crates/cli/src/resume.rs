@@ -262,7 +262,7 @@ fn protocol_of(found: &Unfinished) -> Result<Protocol, Failure> {
 
 /// What is left of the plan: straight ways where nothing is in them, else those of the plan.
 fn rest_of(protocol: &Protocol, plan: &Plan, wanted: &[bool]) -> Result<Plan, Failure> {
-    let is_wanted = |id: skinrig_model::PressId| wanted.get(id.0 as usize) == Some(&true);
+    let is_wanted = |id: skinrig_model::PressId| wanted.get(id.index() as usize) == Some(&true);
     let straight = plan.remaining(is_wanted, Route::Straight);
     if protocol.check(&straight).is_ok() {
         return Ok(straight);

@@ -51,7 +51,7 @@ fn errors(analysis: &Analysis) -> Result<Sample, skinrig_compare::statistics::Sa
         .filter(|p| p.role == PressRole::Score && p.verdict == PressVerdict::Valid.name());
     Sample::rms(scored.filter_map(|p| {
         let (x, y) = p.error_mm()?;
-        Some((p.location, x.hypot(y)))
+        Some((p.location.index(), x.hypot(y)))
     }))
 }
 

@@ -190,8 +190,8 @@ fn press_rows(reader: &SessionReader) -> Result<Vec<serde_json::Value>, Recorder
         });
         let earlier: Vec<_> = earlier.collect();
         serde_json::json!({
-            "press": planned.id.0, "role": planned.role, "repetition": planned.repetition + 1,
-            "location": planned.location + 1, "x_mm": planned.at.x_mm, "y_mm": planned.at.y_mm,
+            "press": planned.id, "role": planned.role, "repetition": planned.repetition,
+            "location": planned.location, "x_mm": planned.at.x_mm, "y_mm": planned.at.y_mm,
             "depth_mm": planned.depth_mm, "attempts": attempts.len(), "earlier": earlier,
             "verdict": outcome.map_or("open", |o| o.verdict.name()),
             "reason": outcome.and_then(|o| o.verdict.reason()),

@@ -71,7 +71,7 @@ fn filed(session: &Path) -> Result<Value, RecorderError> {
         .iter()
         .map(|o| {
             json!({
-                "press": o.attempt.press.0 + 1, "attempt": o.attempt.number,
+                "press": o.attempt.press, "attempt": o.attempt.number,
                 "verdict": o.verdict.name(), "reason": o.verdict.reason(),
             })
         })

@@ -56,7 +56,7 @@ impl<'a> Journal<'a> {
 
     /// The attempt that comes next at `press`.
     pub(crate) fn next_attempt(&self, press: PressId) -> AttemptId {
-        let before = self.attempts.get(press.0 as usize).copied();
+        let before = self.attempts.get(press.index() as usize).copied();
         AttemptId {
             press,
             number: before.unwrap_or(0) + 1,
@@ -94,7 +94,7 @@ impl<'a> Journal<'a> {
     }
 
     fn set(&mut self, press: PressId, fate: Fate) {
-        if let Some(f) = self.fates.get_mut(press.0 as usize) {
+        if let Some(f) = self.fates.get_mut(press.index() as usize) {
             *f = fate;
         }
     }
@@ -106,7 +106,7 @@ impl<'a> Journal<'a> {
         t: skinrig_model::HostTime,
     ) -> Result<(), ControllerError> {
         self.emit(Record::Intent { attempt, t })?;
-        if let Some(attempts) = self.attempts.get_mut(attempt.press.0 as usize) {
+        if let Some(attempts) = self.attempts.get_mut(attempt.press.index() as usize) {
             *attempts = attempt.number;
         }
         self.set(attempt.press, Fate::Under);
@@ -129,7 +129,7 @@ impl<'a> Journal<'a> {
     pub(crate) fn miss_the_rest(&mut self, reason: &str) -> Result<(), ControllerError> {
         for i in 0..self.fates.len() {
             if self.fates[i] == Fate::Planned {
-                let attempt = self.next_attempt(PressId(i as u32));
+                let attempt = self.next_attempt(PressId::from_index(i as u32));
                 self.emit(Record::Missed(attempt, reason.to_owned()))?;
                 self.fates[i] = Fate::Missed;
             }

@@ -1,7 +1,9 @@
 //! What must fit together before anything is armed: plan, header and rig.
 
 use skinrig_device::{IndenterCapabilities, MotionLimits};
-use skinrig_model::{Point2, Point3, PressHistory, RigidTransform, Robot, RunHeader, Skin};
+use skinrig_model::{
+    Point2, Point3, PressHistory, PressId, RigidTransform, Robot, RunHeader, Skin,
+};
 use skinrig_protocol::plan::{Plan, PressStep, Step};
 use skinrig_protocol::{Surface, TouchSearch};
 
@@ -56,9 +58,10 @@ pub(crate) fn check_plan(
         }
     }
     for (i, press) in plan.presses.iter().enumerate() {
-        if press.id.0 as usize != i {
+        if press.id.index() as usize != i {
             let found = press.id.to_string();
-            return Err(plan_error("presses", format!("press {i}"), found));
+            let expected = PressId::from_index(i as u32).to_string();
+            return Err(plan_error("presses", expected, found));
         }
     }
     let wanted = match histories {
@@ -74,7 +77,7 @@ pub(crate) fn check_plan(
     };
     let mut seen = vec![false; plan.presses.len()];
     let mut above: Option<Point3<Skin>> = None;
-    for (n, step) in plan.steps.iter().enumerate() {
+    for (n, step) in (1..).zip(&plan.steps) {
         let place = |what: &str| format!("step {n}, {what}");
         match step {
             Step::Begin { .. } => {}
@@ -98,7 +101,7 @@ pub(crate) fn check_plan(
             }
             Step::Press(press) => {
                 let name = place(&press.press.to_string());
-                match seen.get_mut(press.press.0 as usize) {
+                match seen.get_mut(press.press.index() as usize) {
                     Some(done) if !*done => *done = true,
                     _ => {
                         return Err(plan_error(
@@ -125,7 +128,7 @@ pub(crate) fn check_plan(
                 if let Surface::Touch(search) = &press.surface {
                     check_search(plan, &name, press.at, search)?;
                 }
-                let planned = &plan.presses[press.press.0 as usize];
+                let planned = &plan.presses[press.press.index() as usize];
                 if planned.at != press.at || planned.depth_mm != press.depth_mm {
                     return Err(plan_error(
                         name,
@@ -163,7 +166,7 @@ pub(crate) fn check_plan(
         let step = |there: bool| if there { "a step" } else { "no step" };
         return Err(plan_error(
             "steps",
-            format!("{} for press {i}", step(wanted[i])),
+            format!("{} for {}", step(wanted[i]), PressId::from_index(i as u32)),
             step(seen[i]),
         ));
     }

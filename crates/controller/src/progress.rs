@@ -121,7 +121,7 @@ impl ProgressTracker {
     }
 
     fn ended(&mut self, press: PressId, fate: Fate) {
-        if let Some(f) = self.fates.get_mut(press.0 as usize) {
+        if let Some(f) = self.fates.get_mut(press.index() as usize) {
             *f = Some(fate);
         }
         self.count();
@@ -147,9 +147,9 @@ impl ProgressTracker {
         match record {
             Record::Started(header) => self.plan(&header.presses),
             Record::Intent { attempt, t } => {
-                let known = self.fates.get(attempt.press.0 as usize);
+                let known = self.fates.get(attempt.press.index() as usize);
                 p.retaken += usize::from(known.is_some_and(Option::is_some));
-                p.press = self.presses.get(attempt.press.0 as usize).copied();
+                p.press = self.presses.get(attempt.press.index() as usize).copied();
                 self.reached(*t);
             }
             Record::Poses(block) => {
@@ -230,7 +230,7 @@ impl ProgressTracker {
     /// Press number (from 1) of how many, for example `12/2500`.
     #[must_use]
     pub fn press_label(&self) -> String {
-        let at = self.progress.press.map_or(0, |p| u64::from(p.id.0) + 1);
+        let at = self.progress.press.map_or(0, |p| p.id.number());
         format!("{at}/{}", self.progress.planned)
     }
 

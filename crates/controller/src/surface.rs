@@ -1,6 +1,6 @@
 //! The check of the surface: touched at the protocol's points, it must lie where the frame says.
 
-use skinrig_model::{HostDuration, Point2, PreflightCheck, PressRole, Record};
+use skinrig_model::{HostDuration, Point2, PreflightCheck, PressRole, Record, RepetitionId};
 use skinrig_protocol::SurfaceCheck;
 use skinrig_protocol::plan::Step;
 
@@ -57,14 +57,14 @@ impl Core<'_> {
         let Some(from) = self.indenter.position() else {
             return Ok(()); // the next look at the robot tells what is wrong with it
         };
-        self.check_surface(&format!("after repetition {}", repetition + 1))?;
+        self.check_surface(&format!("after {repetition}"))?;
         self.above("back from the check of the surface", from.measured.plane())
     }
 
     /// The repetition whose last press is this step.
-    fn repetition_ends(&self, step: usize) -> Option<u32> {
+    fn repetition_ends(&self, step: usize) -> Option<RepetitionId> {
         let planned = |s: &Step| match s {
-            Step::Press(p) => self.plan.presses.get(p.press.0 as usize),
+            Step::Press(p) => self.plan.presses.get(p.press.index() as usize),
             _ => None,
         };
         let this = planned(self.plan.steps.get(step)?).filter(|p| p.role != PressRole::Sync)?;

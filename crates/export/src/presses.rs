@@ -108,10 +108,10 @@ const fn role(role: PressRole) -> &'static str {
 
 /// What was planned and what the rig did.
 fn journal(table: &mut Columns<'_>) {
-    table.int("press", |r| i64::from(r.planned.id.0));
+    table.int("press", |r| i64::from(r.planned.id.number()));
     table.text("role", |r| Some(role(r.planned.role).to_owned()));
-    table.int("repetition", |r| i64::from(r.planned.repetition) + 1);
-    table.int("location", |r| i64::from(r.planned.location) + 1);
+    table.int("repetition", |r| i64::from(r.planned.repetition.number()));
+    table.int("location", |r| i64::from(r.planned.location.number()));
     table.real("x_mm", |r| Some(r.planned.at.x_mm));
     table.real("y_mm", |r| Some(r.planned.at.y_mm));
     table.real("depth_mm", |r| Some(r.planned.depth_mm));

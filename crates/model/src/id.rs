@@ -2,7 +2,8 @@
 
 use std::fmt;
 
-use serde::{Deserialize, Serialize};
+use serde::de::{Error as _, Unexpected};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 /// One of the two event cameras. The paper's camera 1 sits at negative y, camera 2 at positive y of the
 /// skin's right edge (paper, section "Geometric Triangulation").
@@ -52,14 +53,149 @@ impl fmt::Display for CameraId {
     }
 }
 
-/// A planned press: its position in the plan, counted from 0, sync presses included.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-#[serde(transparent)]
-pub struct PressId(pub u32);
+/// Makes a type for one kind of number that people read: it prints itself counted from 1, and is an index from 0 inside.
+macro_rules! numbered {
+    ($(#[$doc:meta])* $name:ident, $word:literal) => {
+        $(#[$doc])*
+        ///
+        /// Shown (`Display`) and serialized with its number, from 1. Where a stored format holds the index instead, the field says so
+        /// with [`as_index`].
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
+        pub struct $name(u32);
 
-impl fmt::Display for PressId {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "press {}", self.0)
+        impl $name {
+            /// The one at `index`, counted from 0.
+            #[must_use]
+            pub const fn from_index(index: u32) -> Self {
+                Self(index)
+            }
+
+            /// The one with `number`, counted from 1; `None` for 0.
+            #[must_use]
+            pub const fn from_number(number: u32) -> Option<Self> {
+                match number.checked_sub(1) {
+                    Some(index) => Some(Self(index)),
+                    None => None,
+                }
+            }
+
+            /// Counted from 0: the position in lists, and what the session file stores.
+            #[must_use]
+            pub const fn index(self) -> u32 {
+                self.0
+            }
+
+            /// Counted from 1: what people read and write.
+            #[must_use]
+            pub const fn number(self) -> u32 {
+                self.0.saturating_add(1)
+            }
+        }
+
+        impl fmt::Display for $name {
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                write!(f, concat!($word, " {}"), self.number())
+            }
+        }
+
+        impl Serialize for $name {
+            fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+                to.serialize_u32(self.number())
+            }
+        }
+
+        impl<'de> Deserialize<'de> for $name {
+            fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+                let number = u32::deserialize(from)?;
+                Self::from_number(number).ok_or_else(|| {
+                    D::Error::invalid_value(Unexpected::Unsigned(0), &"a number from 1")
+                })
+            }
+        }
+
+        impl Indexed for $name {
+            fn from_index(index: u32) -> Self {
+                Self(index)
+            }
+
+            fn index(self) -> u32 {
+                self.0
+            }
+        }
+    };
+}
+
+numbered! {
+    /// A planned press: its position in the plan, sync presses included.
+    PressId, "press"
+}
+
+numbered! {
+    /// A repetition of the path.
+    RepetitionId, "repetition"
+}
+
+numbered! {
+    /// A location of the path, the same in every repetition and depth.
+    LocationId, "location"
+}
+
+/// A number that can be stored as an index, counted from 0.
+pub trait Indexed: Copy {
+    /// The one at `index`.
+    fn from_index(index: u32) -> Self;
+    /// Counted from 0.
+    fn index(self) -> u32;
+}
+
+/// For `#[serde(with = "as_index")]`: the field is stored as an index, counted from 0, as plans always were.
+pub mod as_index {
+    use serde::{Deserialize, Deserializer, Serializer};
+
+    use super::Indexed;
+
+    /// Writes the index.
+    ///
+    /// # Errors
+    /// Those of the serializer.
+    pub fn serialize<T: Indexed, S: Serializer>(id: &T, to: S) -> Result<S::Ok, S::Error> {
+        to.serialize_u32(id.index())
+    }
+
+    /// Reads an index.
+    ///
+    /// # Errors
+    /// Those of the deserializer.
+    pub fn deserialize<'de, T: Indexed, D: Deserializer<'de>>(from: D) -> Result<T, D::Error> {
+        u32::deserialize(from).map(T::from_index)
+    }
+
+    /// The same for a number that may be absent.
+    pub mod option {
+        use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+        use super::Indexed;
+
+        /// Writes the index, or none.
+        ///
+        /// # Errors
+        /// Those of the serializer.
+        pub fn serialize<T: Indexed, S: Serializer>(
+            id: &Option<T>,
+            to: S,
+        ) -> Result<S::Ok, S::Error> {
+            id.map(T::index).serialize(to)
+        }
+
+        /// Reads an index, or none.
+        ///
+        /// # Errors
+        /// Those of the deserializer.
+        pub fn deserialize<'de, T: Indexed, D: Deserializer<'de>>(
+            from: D,
+        ) -> Result<Option<T>, D::Error> {
+            Ok(Option::<u32>::deserialize(from)?.map(T::from_index))
+        }
     }
 }
 
@@ -75,5 +211,41 @@ pub struct AttemptId {
 impl fmt::Display for AttemptId {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} (attempt {})", self.press, self.number)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_that_people_read_count_from_one() {
+        let press = PressId::from_index(0);
+        assert_eq!(press.to_string(), "press 1");
+        assert_eq!(LocationId::from_index(4).to_string(), "location 5");
+        assert_eq!(RepetitionId::from_index(1).to_string(), "repetition 2");
+        assert_eq!(PressId::from_number(1), Some(press));
+        assert_eq!(PressId::from_number(0), None);
+        assert_eq!(serde_json::to_string(&press).unwrap(), "1");
+        assert_eq!(serde_json::from_str::<PressId>("1").unwrap(), press);
+        assert!(serde_json::from_str::<PressId>("0").is_err());
+    }
+
+    #[test]
+    fn a_stored_index_counts_from_zero() {
+        #[derive(Serialize, Deserialize, PartialEq, Debug)]
+        struct Stored {
+            #[serde(with = "as_index")]
+            press: PressId,
+            #[serde(with = "as_index::option")]
+            repetition: Option<RepetitionId>,
+        }
+        let stored = Stored {
+            press: PressId::from_index(6),
+            repetition: Some(RepetitionId::from_index(0)),
+        };
+        let text = r#"{"press":6,"repetition":0}"#;
+        assert_eq!(serde_json::to_string(&stored).unwrap(), text);
+        assert_eq!(serde_json::from_str::<Stored>(text).unwrap(), stored);
     }
 }

@@ -25,7 +25,7 @@ pub mod trigger_box;
 pub use camera::{CameraModel, SENSOR_HEIGHT, SENSOR_WIDTH, StereoGeometry};
 pub use event::{CdEvent, Polarity, TriggerEdge};
 pub use frame::{Point2, Point3, RigidTransform, Robot, Skin};
-pub use id::{AttemptId, CameraId, PressId};
+pub use id::{AttemptId, CameraId, LocationId, PressId, RepetitionId, as_index};
 pub use lens::{LensAngle, LensModel};
 pub use limit::{Limit, Side};
 pub use pose::PoseSample;

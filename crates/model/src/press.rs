@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::frame::Point2;
-use crate::id::{AttemptId, PressId};
+use crate::id::{AttemptId, LocationId, PressId, RepetitionId, as_index};
 use crate::time::HostTime;
 
 /// What a press is for. Presses that calibrate never score.
@@ -18,17 +18,20 @@ pub enum PressRole {
     Score,
 }
 
-/// One press of the plan.
+/// One press of the plan. Stored plans hold its three numbers as indices, counted from 0.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct PlannedPress {
     /// Its place in the plan.
+    #[serde(with = "as_index")]
     pub id: PressId,
     /// What it is for.
     pub role: PressRole,
-    /// Which repetition, from 0. 0 for sync presses.
-    pub repetition: u32,
-    /// Which location of the path, from 0; the same in every repetition and depth. 0 for sync presses.
-    pub location: u32,
+    /// Which repetition; the first for sync presses.
+    #[serde(with = "as_index")]
+    pub repetition: RepetitionId,
+    /// Which location of the path; the first for sync presses.
+    #[serde(with = "as_index")]
+    pub location: LocationId,
     /// Where, skin frame.
     pub at: Point2,
     /// How deep below the touched surface, mm, positive.

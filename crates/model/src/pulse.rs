@@ -55,6 +55,8 @@ const GENERATOR: u32 = 0x9BB;
 pub const SYNC_CODE: u32 = 6;
 /// The largest press id that a mark can carry, and the largest count of a sync train.
 pub const MAX_MARKED_PRESS: u32 = (1 << 17) - 1;
+/// The last press that a mark can name.
+pub const LAST_MARKED_PRESS: PressId = PressId::from_index(MAX_MARKED_PRESS);
 /// How far a measured width or period may be off and still be read, µs.
 pub const TOLERANCE_US: u64 = 40;
 
@@ -126,15 +128,15 @@ impl fmt::Display for MarkKind {
 pub struct Mark {
     /// Which moment.
     pub kind: MarkKind,
-    /// Of which press; at most [`MAX_MARKED_PRESS`].
+    /// Of which press; at most [`LAST_MARKED_PRESS`].
     pub press: PressId,
 }
 
 /// The mark that is sent to test the trigger line before a run. No press has its number: a plan has at most
-/// [`MAX_MARKED_PRESS`] presses, numbered from 0.
+/// [`MAX_MARKED_PRESS`] presses, and theirs come before it.
 pub const LOOPBACK: Mark = Mark {
     kind: MarkKind::Approach,
-    press: PressId(MAX_MARKED_PRESS),
+    press: LAST_MARKED_PRESS,
 };
 
 /// A mark that the trigger box was told to send.
@@ -163,7 +165,7 @@ impl Label {
     #[must_use]
     pub fn data(self) -> Option<u32> {
         let (code, number) = match self {
-            Self::Mark(mark) => (mark.kind.code(), mark.press.0),
+            Self::Mark(mark) => (mark.kind.code(), mark.press.index()),
             Self::Sync(count) => (SYNC_CODE, count),
         };
         (number <= MAX_MARKED_PRESS).then_some((code << 17) | number)
@@ -178,7 +180,7 @@ impl Label {
             code => MarkKind::from_code(code).map(|kind| {
                 Self::Mark(Mark {
                     kind,
-                    press: PressId(number),
+                    press: PressId::from_index(number),
                 })
             }),
         }
@@ -309,7 +311,7 @@ mod tests {
         let mark = |kind, press| {
             PulseTrain::new(Mark {
                 kind,
-                press: PressId(press),
+                press: PressId::from_index(press),
             })
         };
         // Vectors for anyone who sends trains: S, 3 bits of kind, 17 of the number, 11 of check.
@@ -342,7 +344,7 @@ mod tests {
     fn a_press_id_that_does_not_fit_is_refused() {
         let mark = Mark {
             kind: MarkKind::Contact,
-            press: PressId(MAX_MARKED_PRESS + 1),
+            press: PressId::from_index(MAX_MARKED_PRESS + 1),
         };
         assert_eq!(PulseTrain::new(mark), None);
     }

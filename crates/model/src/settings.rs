@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::camera::StereoGeometry;
+use crate::id::PressId;
 use crate::skin::SkinOutline;
 
 /// Which clustered events make the centroid of a press.
@@ -307,8 +308,8 @@ pub struct AnalysisSettings {
     pub min_ray_sine: f64,
     /// Leave estimates outside the skin's outline out of the headline metrics (they are always counted).
     pub exclude_outside: bool,
-    /// Presses left out by hand, by number (from 0, sync presses counted).
-    pub exclude_presses: Vec<u32>,
+    /// Presses left out by hand, sync presses counted.
+    pub exclude_press_numbers: Vec<PressId>,
     /// Which parameters are calibrated.
     pub calibration: CalibrationModel,
     /// The lens that is calibrated.
@@ -339,6 +340,14 @@ pub struct AnalysisSettings {
     pub rate_bin_ms: f64,
 }
 
+impl AnalysisSettings {
+    /// True for a press that is left out by hand.
+    #[must_use]
+    pub fn excludes(&self, press: PressId) -> bool {
+        self.exclude_press_numbers.contains(&press)
+    }
+}
+
 impl Default for AnalysisSettings {
     fn default() -> Self {
         Self {
@@ -360,7 +369,7 @@ impl Default for AnalysisSettings {
             min_response_sigma: 5.0,
             min_ray_sine: 0.05,
             exclude_outside: true,
-            exclude_presses: Vec::new(),
+            exclude_press_numbers: Vec::new(),
             calibration: CalibrationModel::Auto,
             lens: LensKind::Exponential,
             failure_penalty_mm: None,

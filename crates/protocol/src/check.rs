@@ -219,13 +219,13 @@ impl Checker<'_> {
             );
         }
         for (k, press) in self.plan.presses.iter().enumerate() {
-            if press.id.0 as usize != k {
+            if press.id.index() as usize != k {
                 self.press = Some(press.id);
                 self.add(
                     Segment::Plan,
                     "presses are not numbered in order",
-                    k,
-                    press.id.0,
+                    PressId::from_index(k as u32),
+                    press.id,
                     "path",
                 );
                 break;
@@ -280,7 +280,9 @@ impl Checker<'_> {
         deadline: HostDuration,
     ) {
         let clearance = self.plan.limits.clearance_mm;
-        let planned = self.press.and_then(|p| self.plan.presses.get(p.0 as usize));
+        let planned = self
+            .press
+            .and_then(|p| self.plan.presses.get(p.index() as usize));
         let sync = planned.is_some_and(|p| p.role == skinrig_model::PressRole::Sync);
         let key = if sync { "sync.at" } else { "path" };
         self.workspace(segment, to, key);
@@ -415,7 +417,7 @@ impl Checker<'_> {
     fn press(&mut self, press: &PressStep, position: Option<Point3<Skin>>) {
         let limits = self.plan.limits;
         let at = press.at;
-        let planned = self.plan.presses.get(press.press.0 as usize);
+        let planned = self.plan.presses.get(press.press.index() as usize);
         let sync = planned.is_some_and(|p| p.role == skinrig_model::PressRole::Sync);
         let key = if sync { "sync.at" } else { "path" };
         if planned.is_none_or(|p| p.at != at || p.depth_mm != press.depth_mm) {

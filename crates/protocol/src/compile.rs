@@ -6,7 +6,9 @@
 
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
-use skinrig_model::{HostDuration, PlannedPress, Point2, Point3, PressId, PressRole, Skin};
+use skinrig_model::{
+    HostDuration, LocationId, PlannedPress, Point2, Point3, PressId, PressRole, RepetitionId, Skin,
+};
 
 use crate::plan::{Plan, PressStep, Step};
 use crate::protocol::Protocol;
@@ -30,10 +32,10 @@ pub(crate) fn compile(protocol: &Protocol) -> Plan {
         writer.steps.push(Step::Begin { repetition: None });
         for k in 0..sync.count {
             let planned = PlannedPress {
-                id: PressId(0),
+                id: PressId::from_index(0),
                 role: PressRole::Sync,
-                repetition: 0,
-                location: 0,
+                repetition: RepetitionId::default(),
+                location: LocationId::default(),
                 at: sync.at,
                 depth_mm: sync.depth_mm,
             };
@@ -51,7 +53,8 @@ pub(crate) fn compile(protocol: &Protocol) -> Plan {
         rng.jump();
         rng
     });
-    for (repetition, role) in (0u32..).zip(&protocol.roles) {
+    for (index, role) in (0u32..).zip(&protocol.roles) {
+        let repetition = RepetitionId::from_index(index);
         let mut visits = visits.clone();
         if let Some(rng) = &mut shuffle {
             for i in (1..visits.len()).rev() {
@@ -60,7 +63,7 @@ pub(crate) fn compile(protocol: &Protocol) -> Plan {
             }
         }
         let first = visits.first().and_then(|(l, _)| protocol.locations.get(*l));
-        if repetition > 0 {
+        if index > 0 {
             if let Some(first) = first.filter(|_| protocol.return_to_start) {
                 writer.travel(*first);
             }
@@ -77,10 +80,10 @@ pub(crate) fn compile(protocol: &Protocol) -> Plan {
                 continue;
             };
             let planned = PlannedPress {
-                id: PressId(0),
+                id: PressId::from_index(0),
                 role: *role,
                 repetition,
-                location: location as u32,
+                location: LocationId::from_index(location as u32),
                 at,
                 depth_mm,
             };
@@ -150,7 +153,7 @@ impl Writer<'_> {
     }
 
     fn press(&mut self, planned: PlannedPress, start_s: Option<f64>) {
-        let id = PressId(self.presses.len() as u32);
+        let id = PressId::from_index(self.presses.len() as u32);
         let (limits, motion) = (&self.protocol.limits, &self.protocol.motion);
         let depth_mm = planned.depth_mm;
         let mut step = PressStep {

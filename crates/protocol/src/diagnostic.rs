@@ -147,6 +147,8 @@ const MOST_FINDINGS: usize = 100;
 pub(crate) struct Collector {
     /// The texts.
     pub sources: Sources,
+    /// True for the text of a recording, which may be older than today's keys.
+    pub recorded: bool,
     found: Vec<(Span, Diagnostic)>,
 }
 
@@ -192,6 +194,7 @@ impl Collector {
     pub fn new(sources: Sources) -> Self {
         Self {
             sources,
+            recorded: false,
             found: Vec::new(),
         }
     }

@@ -4,7 +4,9 @@
 //! needs and nothing that it must compute: seeds are resolved, orders shuffled, positions absolute.
 
 use serde::{Deserialize, Serialize};
-use skinrig_model::{HostDuration, MarkKind, PlannedPress, Point2, Point3, PressId, Skin};
+use skinrig_model::{
+    HostDuration, MarkKind, PlannedPress, Point2, Point3, PressId, RepetitionId, Skin, as_index,
+};
 
 use crate::area::Surroundings;
 use crate::retakes::Retakes;
@@ -41,7 +43,7 @@ pub struct Plan {
     /// When the run waits by itself. Not written when it never does.
     #[serde(default, skip_serializing_if = "Suspend::is_default")]
     pub suspend: Suspend,
-    /// Every planned press; `presses[i].id == PressId(i)`.
+    /// Every planned press; `presses[i].id == PressId::from_index(i)`, and the stored `id` is `i`.
     pub presses: Vec<PlannedPress>,
     /// What to do, in order.
     pub steps: Vec<Step>,
@@ -109,8 +111,9 @@ pub enum Step {
     /// A repetition begins; its press periods count from this instant. The sync presses, when there are
     /// any, have their own block with `repetition: None`.
     Begin {
-        /// Which repetition, from 0; `None` for the sync block.
-        repetition: Option<u32>,
+        /// Which repetition; `None` for the sync block.
+        #[serde(default, with = "as_index::option")]
+        repetition: Option<RepetitionId>,
     },
     /// Straight motion at clearance height or above.
     Travel {
@@ -134,6 +137,7 @@ pub enum Step {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PressStep {
     /// Which planned press.
+    #[serde(with = "as_index")]
     pub press: PressId,
     /// Where, skin frame.
     pub at: Point2,

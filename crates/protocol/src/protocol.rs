@@ -189,7 +189,21 @@ impl Protocol {
         overrides: &[String],
         loader: Loader<'_>,
     ) -> Result<Self, Diagnostics> {
-        crate::build::protocol(name, bytes, overrides, loader)
+        crate::build::protocol(name, bytes, overrides, loader, false)
+    }
+
+    /// Reads the protocol of a recording, which may use keys that a new one may not (`analysis.exclude_presses`). Otherwise as
+    /// [`Protocol::parse`].
+    ///
+    /// # Errors
+    /// [`Diagnostics`] with every finding at once.
+    pub fn parse_recorded(
+        name: &str,
+        bytes: &[u8],
+        overrides: &[String],
+        loader: Loader<'_>,
+    ) -> Result<Self, Diagnostics> {
+        crate::build::protocol(name, bytes, overrides, loader, true)
     }
 
     /// The plan of this protocol: a pure function of the protocol's text, overrides and named files.

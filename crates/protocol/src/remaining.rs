@@ -90,7 +90,7 @@ impl Plan {
                     if !wanted(p.press) {
                         open = Some(start);
                     }
-                    if let Some(earlier) = earlier.get_mut(p.press.0 as usize) {
+                    if let Some(earlier) = earlier.get_mut(p.press.index() as usize) {
                         *earlier = gone;
                     }
                 }
@@ -101,7 +101,7 @@ impl Plan {
             if let Step::Press(p) = step
                 && let (Some(start), Some(gone)) = (
                     &mut p.start_after_begin,
-                    earlier.get(p.press.0 as usize).copied(),
+                    earlier.get(p.press.index() as usize).copied(),
                 )
             {
                 start.0 -= gone.0;

@@ -3,8 +3,8 @@
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 use skinrig_model::{
-    AnalysisSettings, HostDuration, HostTime, PlannedPress, Point2, PressId, PressRole,
-    PressTiming, RigGeometry, StereoGeometry,
+    AnalysisSettings, HostDuration, HostTime, LocationId, PlannedPress, Point2, PressId, PressRole,
+    PressTiming, RepetitionId, RigGeometry, StereoGeometry,
 };
 
 use crate::build::{calibration_possible, nominal_camera, open, outline, roles, seconds};
@@ -135,15 +135,15 @@ impl ScheduledRoles {
         }
     }
 
-    /// What press `location` (from 0) of `repetition` (from 0) is for.
+    /// What the press at `location` in `repetition` is for.
     #[must_use]
-    pub fn role(&self, repetition: u32, location: u32) -> PressRole {
+    pub fn role(&self, repetition: RepetitionId, location: LocationId) -> PressRole {
         match self {
             Self::Repetitions(roles) => roles
-                .get(repetition as usize)
+                .get(repetition.index() as usize)
                 .copied()
                 .unwrap_or(PressRole::Score),
-            Self::Alternate { every, first, .. } if location % every == *first => {
+            Self::Alternate { every, first, .. } if location.index() % every == *first => {
                 PressRole::Calibrate
             }
             Self::Alternate { .. } => PressRole::Score,
@@ -171,7 +171,29 @@ impl Schedule {
     /// # Errors
     /// [`Diagnostics`] with every finding at once.
     pub fn parse(name: &str, bytes: &[u8], overrides: &[String]) -> Result<Self, Diagnostics> {
+        Self::read(name, bytes, overrides, false)
+    }
+
+    /// Reads the schedule of a recording, which may use keys that a new one may not (`analysis.exclude_presses`).
+    ///
+    /// # Errors
+    /// [`Diagnostics`] with every finding at once.
+    pub fn parse_recorded(
+        name: &str,
+        bytes: &[u8],
+        overrides: &[String],
+    ) -> Result<Self, Diagnostics> {
+        Self::read(name, bytes, overrides, true)
+    }
+
+    fn read(
+        name: &str,
+        bytes: &[u8],
+        overrides: &[String],
+        recorded: bool,
+    ) -> Result<Self, Diagnostics> {
         let (mut out, root) = open(name, bytes, overrides, &SCHEDULE)?;
+        out.recorded = recorded;
         let schedule = root.and_then(|root| {
             let text = String::from_utf8_lossy(bytes).into_owned();
             assemble(&root, &mut out).map(|schedule| Self {
@@ -190,7 +212,7 @@ impl Schedule {
     /// Whether the press is one of those that the schedule uses; sync presses always are.
     #[must_use]
     pub fn is_used(&self, press: &PlannedPress) -> bool {
-        press.role == PressRole::Sync || press.location < self.presses_used
+        press.role == PressRole::Sync || press.location.index() < self.presses_used
     }
 
     /// Every planned press in order, sync presses first, with its press time. `positions` are the rows of the CSV
@@ -216,7 +238,7 @@ impl Schedule {
         }
         let (mut presses, mut times) = (Vec::new(), Vec::new());
         let mut add = |role, repetition, location, at, depth_mm, time_s: f64| {
-            let id = PressId(presses.len() as u32);
+            let id = PressId::from_index(presses.len() as u32);
             presses.push(PlannedPress {
                 id,
                 role,
@@ -232,7 +254,15 @@ impl Schedule {
         if let Some(sync) = &self.sync {
             for k in 0..sync.count {
                 let time = zero + f64::from(k) * sync.interval_s;
-                add(PressRole::Sync, 0, 0, sync.at, sync.depth_mm, time);
+                let (repetition, location) = Default::default();
+                add(
+                    PressRole::Sync,
+                    repetition,
+                    location,
+                    sync.at,
+                    sync.depth_mm,
+                    time,
+                );
                 first = time + sync.pause_after_s;
             }
         }
@@ -243,6 +273,8 @@ impl Schedule {
                 let time = first
                     + f64::from(repetition) * repetition_s
                     + f64::from(location) * self.period_s;
+                let repetition = RepetitionId::from_index(repetition);
+                let location = LocationId::from_index(location);
                 let role = self.roles.role(repetition, location);
                 add(role, repetition, location, *at, self.depth_mm, time);
             }

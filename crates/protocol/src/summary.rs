@@ -89,8 +89,12 @@ impl Plan {
             sync: of(PressRole::Sync),
             calibrate: of(PressRole::Calibrate),
             score: of(PressRole::Score),
-            locations: path.clone().map(|p| p.location + 1).max().unwrap_or(0),
-            repetitions: path.clone().map(|p| p.repetition + 1).max().unwrap_or(0),
+            locations: path.clone().map(|p| p.location.number()).max().unwrap_or(0),
+            repetitions: path
+                .clone()
+                .map(|p| p.repetition.number())
+                .max()
+                .unwrap_or(0),
             depth_mm: [
                 depths().fold(f64::INFINITY, f64::min),
                 depths().fold(0.0, f64::max),

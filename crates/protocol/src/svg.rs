@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use skinrig_model::{Point2, PressRole};
+use skinrig_model::{Point2, PressRole, RepetitionId};
 
 use crate::area::{Area, Surroundings};
 use crate::plan::Plan;
@@ -268,7 +268,7 @@ fn first_visits(plan: &Plan) -> Vec<Point2> {
     let mut seen = std::collections::HashSet::new();
     plan.presses
         .iter()
-        .filter(|p| p.role != PressRole::Sync && p.repetition == 0)
+        .filter(|p| p.role != PressRole::Sync && p.repetition == RepetitionId::default())
         .filter(|p| seen.insert(p.location))
         .map(|p| p.at)
         .collect()

@@ -43,7 +43,7 @@ impl BoxRow {
                 what: "mark",
                 box_us: us(at)?,
                 kind: Some(mark.kind.name()),
-                press: Some(mark.press.0),
+                press: Some(mark.press.index()),
                 ..empty
             },
             BoxReport::Sync { count, at } => Self {
@@ -84,7 +84,7 @@ pub fn report_from(row: &SqliteRow) -> Result<(HostTime, BoxReport), Fault> {
         "mark" => BoxReport::Mark {
             mark: Mark {
                 kind: named(row, "kind", &MarkKind::ALL, MarkKind::name)?,
-                press: PressId(num(row, "press")?),
+                press: PressId::from_index(num(row, "press")?),
             },
             at: at()?,
         },

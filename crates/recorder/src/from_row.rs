@@ -1,9 +1,9 @@
 //! From rows to plain values, each checked.
 
 use skinrig_model::{
-    AttemptId, CameraId, ChunkFacts, HostTime, PlannedPress, Point2, PoseSample, PressId,
-    PressOutcome, PressTiming, PressVerdict, RigidTransform, RunHeader, StreamFormat,
-    press::PressRole,
+    AttemptId, CameraId, ChunkFacts, HostTime, LocationId, PlannedPress, Point2, PoseSample,
+    PressId, PressOutcome, PressTiming, PressVerdict, RepetitionId, RigidTransform, RunHeader,
+    StreamFormat, press::PressRole,
 };
 use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
@@ -61,10 +61,10 @@ pub(crate) fn header_from(row: &SqliteRow) -> Result<RunHeader, Fault> {
 pub(crate) fn planned_from(row: &SqliteRow) -> Result<PlannedPress, Fault> {
     const ROLES: [PressRole; 3] = [PressRole::Sync, PressRole::Calibrate, PressRole::Score];
     Ok(PlannedPress {
-        id: PressId(num(row, "id")?),
+        id: PressId::from_index(num(row, "id")?),
         role: named(row, "role", &ROLES, role_name)?,
-        repetition: num(row, "repetition")?,
-        location: num(row, "location")?,
+        repetition: RepetitionId::from_index(num(row, "repetition")?),
+        location: LocationId::from_index(num(row, "location")?),
         at: Point2::new(real(row, "x_mm")?, real(row, "y_mm")?),
         depth_mm: real(row, "depth_mm")?,
     })
@@ -72,7 +72,7 @@ pub(crate) fn planned_from(row: &SqliteRow) -> Result<PlannedPress, Fault> {
 
 pub(crate) fn attempt_from(row: &SqliteRow) -> Result<AttemptRow, Fault> {
     let id = AttemptId {
-        press: PressId(num(row, "press")?),
+        press: PressId::from_index(num(row, "press")?),
         number: num(row, "number")?,
     };
     let reason = opt_text(row, "reason")?.unwrap_or_default();

@@ -5,8 +5,8 @@ use std::time::Instant;
 
 use sha2::{Digest, Sha256};
 use skinrig_model::{
-    BoxReport, HostTime, PlannedPress, PoseSample, PreflightCheck, PressOutcome, PressVerdict,
-    Record, RunEnd, RunHeader,
+    BoxReport, HostTime, PlannedPress, PoseSample, PreflightCheck, PressId, PressOutcome,
+    PressVerdict, Record, RunEnd, RunHeader,
 };
 use sqlx::sqlite::SqliteConnection;
 
@@ -121,7 +121,7 @@ impl Journal {
                 sqlx::query(
                     "INSERT INTO attempt (press, number, previous, intent_ns) VALUES (?, ?, ?, ?)",
                 )
-                .bind(attempt.press.0)
+                .bind(attempt.press.index())
                 .bind(attempt.number)
                 .bind(previous(attempt.number))
                 .bind(t.0)
@@ -153,7 +153,7 @@ impl Journal {
                 )
                 .bind(mark.t.0)
                 .bind(mark.mark.kind.name())
-                .bind(mark.mark.press.0)
+                .bind(mark.mark.press.index())
                 .bind(mark.uncertainty_ns)
                 .execute(&mut self.conn)
                 .await?;
@@ -175,7 +175,7 @@ impl Journal {
                     "INSERT INTO attempt (press, number, previous, verdict, reason, scheduled)
                      VALUES (?, ?, ?, 'missed', ?, 0)",
                 )
-                .bind(attempt.press.0)
+                .bind(attempt.press.index())
                 .bind(attempt.number)
                 .bind(previous(attempt.number))
                 .bind(reason)
@@ -293,10 +293,10 @@ impl Journal {
             "INSERT INTO press (id, role, repetition, location, x_mm, y_mm, depth_mm)
              VALUES (?, ?, ?, ?, ?, ?, ?)",
         )
-        .bind(press.id.0)
+        .bind(press.id.index())
         .bind(crate::from_row::role_name(press.role))
-        .bind(press.repetition)
-        .bind(press.location)
+        .bind(press.repetition.index())
+        .bind(press.location.index())
         .bind(press.at.x_mm)
         .bind(press.at.y_mm)
         .bind(press.depth_mm)
@@ -349,7 +349,7 @@ impl Journal {
             update = update.bind(number);
         }
         let rows = update
-            .bind(id.press.0)
+            .bind(id.press.index())
             .bind(id.number)
             .execute(&mut self.conn)
             .await?
@@ -500,7 +500,7 @@ impl Journal {
         let totals = crate::query::totals(&mut self.conn).await?;
         let open = totals.presses.open() + totals.sync.open();
         if open > 0 {
-            let first: i64 = sqlx::query_scalar(
+            let first: u32 = sqlx::query_scalar(
                 "SELECT min(id) FROM press WHERE NOT EXISTS (SELECT 1 FROM attempt a WHERE a.press = press.id
                    AND a.verdict IS NOT NULL
                    AND a.number = (SELECT max(number) FROM attempt WHERE press = press.id))",
@@ -509,7 +509,10 @@ impl Journal {
             .await?;
             return Ok(Err((
                 "a verdict for every planned press".into(),
-                format!("{open} without, the first is press {first}"),
+                format!(
+                    "{open} without, the first is {}",
+                    PressId::from_index(first)
+                ),
             )));
         }
         Ok(Ok(totals))

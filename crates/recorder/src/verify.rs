@@ -4,8 +4,8 @@ use std::path::Path;
 
 use sha2::{Digest, Sha256};
 use skinrig_model::{
-    BoxReport, BoxTime, CameraId, ChunkFacts, HostTime, PlannedPress, PressVerdict, RunEnd,
-    RunHeader, StreamFormat, TriggerEdge, press::PressRole,
+    BoxReport, BoxTime, CameraId, ChunkFacts, HostTime, PlannedPress, PressId, PressVerdict,
+    RunEnd, RunHeader, StreamFormat, TriggerEdge, press::PressRole,
 };
 
 mod gaps;
@@ -162,12 +162,10 @@ fn check_header(reader: &SessionReader, report: &mut VerifyReport) -> Option<[St
         &header.plan_sha256,
     );
     check_plan(&header, report);
-    for (expected, press) in (0u32..).zip(&header.presses) {
-        if press.id.0 != expected {
-            report.add(format!(
-                "press: expected id {expected}, found {}",
-                press.id.0
-            ));
+    for (index, press) in (0u32..).zip(&header.presses) {
+        let expected = PressId::from_index(index);
+        if press.id != expected {
+            report.add(format!("presses: expected {expected}, found {}", press.id));
             break;
         }
     }

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use skinrig_analysis::result::{Analysis, Latency, PressResult};
 use skinrig_analysis::triangulate::locate;
-use skinrig_model::{Point2, PressRole};
+use skinrig_model::{LocationId, Point2, PressId, PressRole};
 
 /// True for the presses behind the headline: scored, valid, with a truth and an estimate.
 #[must_use]
@@ -31,8 +31,8 @@ pub fn interval_95(value: f64, standard_error: f64) -> (f64, f64) {
 /// What the map shows at one location.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LocationSummary {
-    /// Location, from 0.
-    pub location: u32,
+    /// Location.
+    pub location: LocationId,
     /// Where it was planned.
     pub planned: Point2,
     /// Presses behind the summary.
@@ -47,7 +47,7 @@ pub struct LocationSummary {
 /// One summary per location with at least one press that [`counts`], by location number.
 #[must_use]
 pub fn locations(analysis: &Analysis) -> Vec<LocationSummary> {
-    let mut groups: BTreeMap<u32, Vec<&PressResult>> = BTreeMap::new();
+    let mut groups: BTreeMap<LocationId, Vec<&PressResult>> = BTreeMap::new();
     for press in analysis.presses.iter().filter(|p| counts(p)) {
         groups.entry(press.location).or_default().push(press);
     }
@@ -153,8 +153,8 @@ pub fn extent(analysis: &Analysis) -> (u32, u32) {
             .iter()
             .filter(|p| p.role != PressRole::Sync)
     };
-    let repetitions = planned().map(|p| p.repetition + 1).max().unwrap_or(0);
-    let locations: BTreeSet<u32> = planned().map(|p| p.location).collect();
+    let repetitions = planned().map(|p| p.repetition.number()).max().unwrap_or(0);
+    let locations: BTreeSet<LocationId> = planned().map(|p| p.location).collect();
     (repetitions, locations.len() as u32)
 }
 
@@ -208,7 +208,7 @@ fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Residual {
     /// Which press.
-    pub press: u32,
+    pub press: PressId,
     /// Its measured position.
     pub truth: Point2,
     /// Located with the geometry that the calibration started from.
@@ -233,7 +233,7 @@ pub fn residuals(analysis: &Analysis) -> Vec<Residual> {
         }
         let start = locate(&calibration.start, &analysis.rig.outline, columns);
         Some(Residual {
-            press: press.press.0,
+            press: press.press,
             truth,
             before: start.estimate().filter(|p| finite(*p)),
             after: press.estimate().filter(|p| finite(*p)),

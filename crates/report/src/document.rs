@@ -8,8 +8,8 @@ use crate::{ReportInput, comparison};
 
 /// Value of the document's `format` field.
 pub const JSON_FORMAT: &str = "skinrig-report";
-/// Version of the document's layout.
-pub const JSON_VERSION: u32 = 1;
+/// Version of the document's layout. 1 counted presses, repetitions and locations from 0, 2 counts them from 1.
+pub const JSON_VERSION: u32 = 2;
 
 /// Fields of the analysis that are bulk data for figures.
 const BULK: [&str; 5] = ["rates", "pictures", "zooms", "activity", "motion"];

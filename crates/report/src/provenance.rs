@@ -131,7 +131,7 @@ pub struct LegRow {
 /// An attempt that another one replaced.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct RetakenRow {
-    /// Which press.
+    /// Which press, from 1.
     pub press: u32,
     /// Which attempt, from 1.
     pub attempt: u32,

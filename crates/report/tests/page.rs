@@ -340,7 +340,11 @@ fn figures_that_disagree_with_the_headline_are_called_out() {
 fn spread_at_a_location_is_the_sample_standard_deviation() {
     let mut analysis = support::analysis(2, 3);
     let mut estimates = [(1.0, 2.0), (3.0, 2.0)].into_iter();
-    for p in analysis.presses.iter_mut().filter(|p| p.location == 1) {
+    for p in analysis
+        .presses
+        .iter_mut()
+        .filter(|p| p.location.index() == 1)
+    {
         if p.role == skinrig_model::PressRole::Score {
             let (x, y) = estimates.next().unwrap();
             p.truth = Some(skinrig_model::Point2::new(0.0, 0.0));
@@ -350,7 +354,7 @@ fn spread_at_a_location_is_the_sample_standard_deviation() {
         }
     }
     let summaries = skinrig_report::derive::locations(&analysis);
-    let here = summaries.iter().find(|l| l.location == 1).unwrap();
+    let here = summaries.iter().find(|l| l.location.index() == 1).unwrap();
     assert!((here.std_mm.unwrap() - 2f64.sqrt()).abs() < 1e-12);
     assert!((here.mean_error_mm - (5f64.sqrt() + 13f64.sqrt()) / 2.0).abs() < 1e-12);
     assert_eq!(here.n, 2);

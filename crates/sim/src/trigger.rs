@@ -124,8 +124,8 @@ impl TriggerBox for SimTriggerBox {
             return Err(DeviceError::Refused {
                 role: DeviceRole::TriggerBox,
                 serial: self.serial.clone(),
-                expected: format!("a press up to {}", skinrig_model::pulse::MAX_MARKED_PRESS),
-                found: mark.press.0.to_string(),
+                expected: format!("up to {}", skinrig_model::pulse::LAST_MARKED_PRESS),
+                found: mark.press.to_string(),
             });
         };
         let (low, high) = (self.config.min_latency_ns, self.config.max_latency_ns);

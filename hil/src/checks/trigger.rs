@@ -34,7 +34,7 @@ pub(super) fn mark(n: u32) -> Mark {
     const STRIDE: u32 = 52_361;
     Mark {
         kind: MarkKind::ALL[n as usize % MarkKind::ALL.len()],
-        press: PressId(n.wrapping_mul(STRIDE) & MAX_MARKED_PRESS),
+        press: PressId::from_index(n.wrapping_mul(STRIDE) & MAX_MARKED_PRESS),
     }
 }
 

@@ -2,9 +2,9 @@
 
 use skinrig_analysis::{EventSource, SessionInput};
 use skinrig_model::{
-    AnalysisSettings, AttemptId, CameraId, CdEvent, HostTime, Mark, MarkKind, PlannedPress, Point2,
-    PressId, PressOutcome, PressRole, PressTiming, PressVerdict, PulseTrain, RigGeometry, SentMark,
-    TriggerEdge,
+    AnalysisSettings, AttemptId, CameraId, CdEvent, HostTime, LocationId, Mark, MarkKind,
+    PlannedPress, Point2, PressId, PressOutcome, PressRole, PressTiming, PressVerdict, PulseTrain,
+    RepetitionId, RigGeometry, SentMark, TriggerEdge,
 };
 
 /// Events in memory.
@@ -108,12 +108,12 @@ pub fn timing(
 
 /// Adds a press to `input`; the answer is its number.
 pub fn press(input: &mut SessionInput, touch: Touch) -> PressId {
-    let id = PressId(input.planned.len() as u32);
+    let id = PressId::from_index(input.planned.len() as u32);
     input.planned.push(PlannedPress {
         id,
         role: touch.role,
-        repetition: touch.repetition,
-        location: touch.location,
+        repetition: RepetitionId::from_index(touch.repetition),
+        location: LocationId::from_index(touch.location),
         at: touch.at,
         depth_mm: touch.depth_mm,
     });

@@ -174,7 +174,7 @@ fn two_places_pressed_twice_calibrate_nothing() {
     input.settings.study_presses = 0;
     for planned in &mut input.planned {
         if planned.role != PressRole::Sync {
-            let first = planned.location < 2;
+            let first = planned.location.index() < 2;
             planned.role = if first {
                 PressRole::Calibrate
             } else {

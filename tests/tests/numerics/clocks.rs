@@ -124,7 +124,7 @@ fn marks(count: u32, period_ns: i64) -> Vec<SentMark> {
             } else {
                 MarkKind::Release
             },
-            press: PressId(i / 2),
+            press: PressId::from_index(i / 2),
         },
         t: HostTime(5_000_000_000 + i64::from(i) * period_ns),
         uncertainty_ns: 500,

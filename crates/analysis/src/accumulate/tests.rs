@@ -101,7 +101,7 @@ fn an_estimator_keeps_so_many_events_of_all_open_windows_and_no_more() {
     assert_eq!(done(Estimator::ColumnMedian, 100), Ok(3));
     let too_many = AnalysisError::TooManyEvents {
         camera: CameraId::Two,
-        row: 1,
+        press: PressId::from_index(1),
         most: 99,
     };
     assert_eq!(done(Estimator::ColumnMedian, 99), Err(too_many));

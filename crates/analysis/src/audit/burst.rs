@@ -1,6 +1,6 @@
 //! Law: events burst while the tip moves in the skin, and only then.
 
-use skinrig_model::CameraId;
+use skinrig_model::{CameraId, PressId};
 
 use super::drift::has_bursts;
 use super::finding;
@@ -27,8 +27,8 @@ pub fn findings(analysis: &Analysis, touches: &[Touch<'_>]) -> Vec<Finding> {
     let [one, two] = CameraId::ALL.map(|camera| {
         let sights = touches.iter().filter(|t| t.done() && t.timing.is_some());
         sights
-            .filter_map(|t| Some((t.press.0, t.sights[camera.index()].response?)))
-            .collect::<Vec<(u32, f64)>>()
+            .filter_map(|t| Some((t.press, t.sights[camera.index()].response?)))
+            .collect::<Vec<(PressId, f64)>>()
     });
     let blind = [&one, &two].map(|seen| blind(seen));
     if let [Some(a), Some(b)] = blind {
@@ -63,7 +63,7 @@ pub fn findings(analysis: &Analysis, touches: &[Touch<'_>]) -> Vec<Finding> {
     match stretches {
         [Some(a), Some(b)] if a.first <= b.last && b.first <= a.last => {
             let evidence = format!(
-                "expected a burst of events in each press, found none in either camera from press {} to press {}",
+                "expected a burst of events in each press, found none in either camera from {} to {}",
                 a.first.max(b.first),
                 a.last.min(b.last)
             );
@@ -78,7 +78,7 @@ pub fn findings(analysis: &Analysis, touches: &[Touch<'_>]) -> Vec<Finding> {
             for (camera, stretch) in CameraId::ALL.into_iter().zip(stretches) {
                 if let Some(s) = stretch {
                     let evidence = format!(
-                        "expected a burst of events in each press, found none of {camera} from press {} to press {}",
+                        "expected a burst of events in each press, found none of {camera} from {} to {}",
                         s.first, s.last
                     );
                     found.push(finding(
@@ -95,7 +95,7 @@ pub fn findings(analysis: &Analysis, touches: &[Touch<'_>]) -> Vec<Finding> {
 }
 
 /// (median response, presses) when the camera sees nothing.
-fn blind(seen: &[(u32, f64)]) -> Option<(f64, usize)> {
+fn blind(seen: &[(PressId, f64)]) -> Option<(f64, usize)> {
     let n = seen.len();
     let usual = median(seen.iter().map(|(_, response)| *response).collect())?;
     (n >= LEAST_PRESSES && usual < LEAST_MEDIAN).then_some((usual, n))
@@ -104,13 +104,13 @@ fn blind(seen: &[(u32, f64)]) -> Option<(f64, usize)> {
 /// Presses without a burst, one after another.
 #[derive(Debug, Clone, Copy)]
 struct Stretch {
-    first: u32,
-    last: u32,
+    first: PressId,
+    last: PressId,
 }
 
 /// The longest stretch without bursts, when it stands out of the rest: the largest sum of consecutive presses when
 /// one without response counts 1 and one with it -[`AGAINST`].
-fn stretch(seen: &[(u32, f64)]) -> Option<Stretch> {
+fn stretch(seen: &[(PressId, f64)]) -> Option<Stretch> {
     let responds = |i: usize| seen[i].1 >= LEAST_RESPONSE;
     let (mut best, mut sum, mut from) = ((0, 0..0), 0, 0);
     for i in 0..seen.len() {

@@ -42,7 +42,7 @@ fn contradiction(input: &SessionInput) -> Option<Finding> {
     spans.sort_unstable();
     let overlapping = spans.windows(2).filter(|w| w[1].0 < w[0].1 || w[0] == w[1]);
     let overlapping = overlapping.count();
-    let distinct: BTreeSet<u32> = input.planned.iter().map(|p| p.id.0).collect();
+    let distinct: BTreeSet<u32> = input.planned.iter().map(|p| p.id.index()).collect();
     let doubled = input.planned.len() - distinct.len();
     if disordered == 0 && negative == 0 && overlapping == 0 && doubled == 0 {
         return None;

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use skinrig_model::CameraId;
+use skinrig_model::{CameraId, LocationId, RepetitionId};
 
 use super::finding;
 use super::statistics::median;
@@ -28,8 +28,8 @@ pub fn findings(touches: &[Touch<'_>]) -> Vec<Finding> {
 }
 
 fn disagreement(touches: &[Touch<'_>], camera: CameraId) -> Option<Finding> {
-    let mut first: BTreeMap<(u32, u64), (u32, f64)> = BTreeMap::new();
-    let mut moves: BTreeMap<u32, Vec<f64>> = BTreeMap::new();
+    let mut first: BTreeMap<(LocationId, u64), (RepetitionId, f64)> = BTreeMap::new();
+    let mut moves: BTreeMap<RepetitionId, Vec<f64>> = BTreeMap::new();
     for touch in touches
         .iter()
         .filter(|t| t.role != skinrig_model::PressRole::Sync)
@@ -60,9 +60,8 @@ fn disagreement(touches: &[Touch<'_>], camera: CameraId) -> Option<Finding> {
         let error = MEDIAN_ERROR * scatter / (n as f64).sqrt();
         if moved.abs() > LEAST_MOVE_PX && moved.abs() > SIGMAS * error {
             let evidence = format!(
-                "expected centroids at the same columns in each repetition, found repetition {} moved by {moved:.1} ± {error:.1} px \
-                 ({camera}, n {n})",
-                repetition + 1
+                "expected centroids at the same columns in each repetition, found {repetition} moved by {moved:.1} ± {error:.1} px \
+                 ({camera}, n {n})"
             );
             return Some(finding(
                 Law::RepetitionsAgree,
@@ -74,9 +73,8 @@ fn disagreement(touches: &[Touch<'_>], camera: CameraId) -> Option<Finding> {
         let within = median(moves.iter().map(|m| m.abs()).collect())?;
         if within > LEAST_MOVE_PX && within > MOST_SHARE * between {
             let evidence = format!(
-                "expected repetitions of a place to agree, found repetition {} off by {within:.1} px in the median, where \
-                 places differ by {between:.1} px from their middle ({camera}, n {n})",
-                repetition + 1
+                "expected repetitions of a place to agree, found {repetition} off by {within:.1} px in the median, where \
+                 places differ by {between:.1} px from their middle ({camera}, n {n})"
             );
             return Some(finding(
                 Law::RepetitionsAgree,

@@ -1,7 +1,8 @@
 //! The presses as the audit sees them: where the tip was, what each camera saw, and whether it could see it.
 
 use skinrig_model::{
-    CameraId, Point2, PressId, PressOutcome, PressRole, PressTiming, PressVerdict,
+    CameraId, LocationId, Point2, PressId, PressOutcome, PressRole, PressTiming, PressVerdict,
+    RepetitionId,
 };
 
 use crate::input::SessionInput;
@@ -19,10 +20,10 @@ pub struct Touch<'a> {
     pub press: PressId,
     /// What for.
     pub role: PressRole,
-    /// Repetition, from 0.
-    pub repetition: u32,
-    /// Location, from 0, and planned depth: what a repetition repeats.
-    pub place: (u32, u64),
+    /// Repetition.
+    pub repetition: RepetitionId,
+    /// Location and planned depth: what a repetition repeats.
+    pub place: (LocationId, u64),
     /// Planned position.
     pub planned: Point2,
     /// Planned depth, mm.

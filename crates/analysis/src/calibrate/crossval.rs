@@ -145,7 +145,7 @@ mod tests {
                 .cameras
                 .map(|c| c.column_of_point(truth).unwrap() + 3.0 * seeded::signed_unit(&mut noise));
             out.push(Sight {
-                press: PressId(i),
+                press: PressId::from_index(i),
                 location: i % 30,
                 columns,
                 truth,

@@ -271,7 +271,7 @@ mod tests {
     fn sights() -> Vec<Sight> {
         (0u32..12)
             .map(|i| Sight {
-                press: PressId(i),
+                press: PressId::from_index(i),
                 location: i,
                 columns: [180.0 + 25.0 * f64::from(i), 410.0 - 9.0 * f64::from(i)],
                 truth: Point2::new(10.0, f64::from(i)),

@@ -158,7 +158,7 @@ mod tests {
                 let truth = Point2::new(at[0], at[1]);
                 let column = |c: skinrig_model::CameraModel| c.column_of_point(truth).unwrap();
                 Sight {
-                    press: PressId(i),
+                    press: PressId::from_index(i),
                     location: i,
                     columns: planted
                         .cameras

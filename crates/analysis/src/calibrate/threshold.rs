@@ -105,7 +105,7 @@ mod tests {
         let sights = rows.iter().enumerate().map(|(i, (events, _))| {
             let angle = std::f64::consts::TAU * i as f64 / rows.len() as f64;
             Sight {
-                press: PressId(i as u32),
+                press: PressId::from_index(i as u32),
                 location: i as u32,
                 columns: [320.0; 2],
                 truth: Point2::new(30.0 * angle.cos(), 30.0 * angle.sin()),

@@ -120,7 +120,8 @@ fn probed_places(analysis: &Analysis) -> (Vec<Point2>, u32) {
         let used = p.verdict != "excluded" || p.rule.as_deref().is_some_and(is_rule_on_data);
         p.role != PressRole::Sync && p.verdict != missed.name() && used
     });
-    let mut locations: Vec<(u32, Point2)> = probed.map(|p| (p.location, p.planned)).collect();
+    let mut locations: Vec<(u32, Point2)> =
+        probed.map(|p| (p.location.index(), p.planned)).collect();
     locations.sort_by_key(|l| l.0);
     locations.dedup_by_key(|l| l.0);
     let count = locations.len() as u32;

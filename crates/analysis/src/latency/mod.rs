@@ -147,7 +147,7 @@ fn usable<'a>(
             row: kept.row,
             label: Label {
                 press: kept.press,
-                location: press.location,
+                location: press.location.index(),
             },
             spans: Spans::of(&sights, neighbours[kept.row]?, background)?,
             sights,

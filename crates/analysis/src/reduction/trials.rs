@@ -25,7 +25,7 @@ impl<'a> Attempt<'a> {
     pub fn new(row: &PressResult, kept: &'a KeptPress) -> Option<Self> {
         Some(Self {
             press: row.press,
-            location: row.location,
+            location: row.location.index(),
             truth: row.truth?,
             views: &kept.views,
         })
@@ -141,8 +141,10 @@ impl Trials<'_> {
         let mut left = [Vec::new(), Vec::new()];
         for seed in 0..reduction.seeds {
             for (k, left) in left.iter_mut().enumerate() {
-                let stream =
-                    STREAMS | u64::from(seed) << 33 | u64::from(attempt.press.0) << 1 | k as u64;
+                let stream = STREAMS
+                    | u64::from(seed) << 33
+                    | u64::from(attempt.press.index()) << 1
+                    | k as u64;
                 let mut rng = seeded::generator(self.settings.seed, stream);
                 thinners[k].thin(&mut rng, self.kinds, reduction.max_power, left);
             }

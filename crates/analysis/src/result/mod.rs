@@ -25,8 +25,8 @@ pub use reference::{ReferenceCode, ReferenceReduction};
 
 use serde::{Deserialize, Serialize};
 use skinrig_model::{
-    AnalysisSettings, CameraId, Point2, PressId, PressRole, PressTiming, RigGeometry,
-    StereoGeometry,
+    AnalysisSettings, CameraId, LocationId, Point2, PressId, PressRole, PressTiming, RepetitionId,
+    RigGeometry, StereoGeometry,
 };
 
 /// Version of this layout and of the algorithms behind it; part of every result.
@@ -256,10 +256,10 @@ pub struct PressResult {
     pub press: PressId,
     /// What for.
     pub role: PressRole,
-    /// Repetition, from 0.
-    pub repetition: u32,
-    /// Location, from 0.
-    pub location: u32,
+    /// Repetition.
+    pub repetition: RepetitionId,
+    /// Location.
+    pub location: LocationId,
     /// Planned position.
     pub planned: Point2,
     /// Planned depth, mm.

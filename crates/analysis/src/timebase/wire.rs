@@ -66,7 +66,7 @@ mod tests {
         for k in 0..n {
             let mark = Mark {
                 kind: MarkKind::ALL[k as usize % 5],
-                press: PressId(k * 977),
+                press: PressId::from_index(k * 977),
             };
             let us = 5_000_000 + u64::from(k) * 40_000;
             reports.push(BoxReport::Mark {

@@ -51,7 +51,7 @@ fn detector() -> Detector {
 
 fn label(press: u32) -> Label {
     Label {
-        press: PressId(press),
+        press: PressId::from_index(press),
         location: press,
     }
 }

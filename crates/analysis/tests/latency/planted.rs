@@ -252,7 +252,7 @@ fn the_published_choice_takes_its_background_after_the_press_and_pads_with_zeros
     let none = studied(&analysis, &kept);
     assert_eq!((none.trials, none.unusable), (1, 24));
     for press in &mut analysis.presses {
-        let shift = HostDuration::from_secs_f64(2.0 * f64::from(press.press.0));
+        let shift = HostDuration::from_secs_f64(2.0 * f64::from(press.press.index()));
         let timing = press.timing.as_mut().unwrap();
         timing.contact += shift;
         timing.release += shift;

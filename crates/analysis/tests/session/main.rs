@@ -60,7 +60,7 @@ fn a_planted_session_comes_out_with_its_clocks_geometry_and_places() {
     }
     assert_eq!((a.pictures.len(), a.zooms.len()), (12, 6));
     for picture in &a.pictures {
-        let view = a.presses[picture.press.0 as usize].views[picture.camera.index()].unwrap();
+        let view = a.presses[picture.press.index() as usize].views[picture.camera.index()].unwrap();
         let sum = |f: fn(&skinrig_analysis::result::PicturePixel) -> u32| {
             picture.pixels.iter().map(f).sum::<u32>()
         };
@@ -488,7 +488,11 @@ fn a_rule_groups_what_the_reason_tells_apart() {
 fn several_depths_are_also_scored_one_by_one() {
     let (mut input, source) = session();
     assert_eq!(analyze(&input, &source).unwrap().depths, []);
-    for planned in input.planned.iter_mut().filter(|p| p.location % 2 == 0) {
+    for planned in input
+        .planned
+        .iter_mut()
+        .filter(|p| p.location.index() % 2 == 0)
+    {
         planned.depth_mm = 1.0;
     }
     let a = analyze(&input, &source).unwrap();
@@ -516,7 +520,7 @@ fn pictures_are_spread_over_the_places() {
         planned.role = PressRole::Score;
     }
     let a = analyze(&input, &source).unwrap();
-    let mut places: Vec<u32> = a
+    let mut places: Vec<skinrig_model::LocationId> = a
         .pictures
         .iter()
         .filter(|p| p.camera == CameraId::One)
@@ -573,11 +577,11 @@ fn presses_named_by_hand_are_rows_with_that_rule() {
         .iter()
         .find(|p| p.role == PressRole::Score)
         .unwrap();
-    input.settings.exclude_presses = vec![scored.id.0];
+    input.settings.exclude_press_numbers = vec![scored.id];
     let a = analyze(&input, &source).unwrap();
     assert_eq!((a.counts.valid, a.counts.excluded), (49, 1));
     assert_eq!(
-        a.presses[scored.id.0 as usize].rule.as_deref(),
+        a.presses[scored.id.index() as usize].rule.as_deref(),
         Some("by hand")
     );
     assert_eq!(a.scored.rmse_mm.n, 24);

@@ -134,7 +134,7 @@ fn settings_of(subject: &Subject) -> Option<AnalysisSettings> {
 /// True when the settings locate presses alike: what studies and intervals do is no cause.
 fn same_numbers(a: &AnalysisSettings, b: &AnalysisSettings) -> bool {
     let plain = |s: &AnalysisSettings| AnalysisSettings {
-        exclude_presses: Vec::new(),
+        exclude_press_numbers: Vec::new(),
         ..only_locating(s.clone())
     };
     plain(a) == plain(b)
@@ -165,9 +165,9 @@ fn again(found: &inputs::Found, settings: &AnalysisSettings) -> Result<Subject, 
         let Opened {
             mut input, events, ..
         } = open(path, Choices::default())?;
-        let own = input.settings.exclude_presses.clone();
+        let own = input.settings.exclude_press_numbers.clone();
         input.settings = AnalysisSettings {
-            exclude_presses: own,
+            exclude_press_numbers: own,
             seed: settings.seed,
             ..only_locating(settings.clone())
         };

@@ -17,7 +17,9 @@ use skinrig_formats::hdf5::Container;
 use skinrig_formats::inspect::FileKind;
 use skinrig_formats::positions::{LengthUnit, PositionTable};
 use skinrig_formats::raw::RawReader;
-use skinrig_model::{CameraId, DeviceIdentity, HostDuration, Point2, RigidTransform, StreamFormat};
+use skinrig_model::{
+    CameraId, DeviceIdentity, HostDuration, LocationId, Point2, RigidTransform, StreamFormat,
+};
 use skinrig_protocol::Schedule;
 use skinrig_sim::SimClock;
 
@@ -141,15 +143,11 @@ fn plausible(path: &Path, schedule: &Schedule, points: &[Point2]) -> Result<(), 
     let next =
         "next: is `csv.unit` of the schedule the unit of this file, and `rig.outline` this skin?";
     let outline = schedule.rig.outline;
-    if let Some((row, p)) = points
-        .iter()
-        .enumerate()
-        .find(|(_, p)| !outline.contains(**p))
-    {
+    if let Some((row, p)) = (0u32..).zip(points).find(|(_, p)| !outline.contains(**p)) {
         return Err(Failure::input(format!(
-            "{}: press {} at ({:.3}, {:.3}) mm: expected a place on the skin, found one beside it\n  {next}",
+            "{}: {} at ({:.3}, {:.3}) mm: expected a place on the skin, found one beside it\n  {next}",
             path.display(),
-            row + 1,
+            LocationId::from_index(row),
             p.x_mm,
             p.y_mm
         )));

@@ -173,9 +173,9 @@ impl Live {
             missed: p.missed,
             retaken: p.retaken,
             press: p.press.map(|press| LivePress {
-                number: press.id.0 + 1,
+                number: press.id.number(),
                 role: press.role,
-                repetition: press.repetition + 1,
+                repetition: press.repetition.number(),
                 at_mm: [press.at.x_mm, press.at.y_mm],
             }),
             tip_mm: p.tip.map(|(at, z_mm)| [at.x_mm, at.y_mm, z_mm]),

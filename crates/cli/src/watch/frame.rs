@@ -186,7 +186,7 @@ impl Follower {
         }
         drop(reader);
         let told = |(planned, outcome): &(&PlannedPress, &PressOutcome)| Latest {
-            press: planned.id.0 + 1,
+            press: planned.id.number(),
             attempt: outcome.attempt.number,
             at_mm: [planned.at.x_mm, planned.at.y_mm],
             verdict: outcome.verdict.name().to_owned(),

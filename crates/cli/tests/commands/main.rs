@@ -15,6 +15,7 @@ mod import;
 mod import_refusals;
 mod interrupt;
 mod json;
+mod numbering;
 mod operator;
 mod options;
 mod pipeline;

@@ -280,7 +280,7 @@ fn exports_hold_exactly_what_was_recorded_and_inspect_reads_them() {
     };
     assert_eq!(rows.len(), 10);
     for (i, (planned, attempts)) in reader.presses().unwrap().iter().enumerate() {
-        assert_eq!(cell(i, "press"), planned.id.0.to_string());
+        assert_eq!(cell(i, "press"), planned.id.number().to_string());
         let x_mm: f64 = cell(i, "x_mm").parse().unwrap();
         assert_eq!(x_mm, planned.at.x_mm);
         assert_eq!(cell(i, "verdict"), "valid");

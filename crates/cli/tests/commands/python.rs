@@ -69,10 +69,10 @@ fn presses(session: &Path, analysis: &Analysis) -> Truth {
         let last = attempts.last().unwrap().outcome.as_ref().unwrap();
         put("session_id", json!(id));
         put("prototype", json!(header.prototype));
-        put("press", json!(planned.id.0));
+        put("press", json!(planned.id));
         put("role", json!(planned.role));
-        put("repetition", json!(planned.repetition + 1));
-        put("location", json!(planned.location + 1));
+        put("repetition", json!(planned.repetition));
+        put("location", json!(planned.location));
         put("x_mm", json!(planned.at.x_mm));
         put("y_mm", json!(planned.at.y_mm));
         put("depth_mm", json!(planned.depth_mm));

@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use serde::{Deserialize, Serialize};
+use skinrig_model::LocationId;
 
 /// What a metric is made of: how values of presses become one number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -50,18 +51,18 @@ pub struct Count {
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum SampleFault {
     /// A value that is no number.
-    #[error("expected finite values, found {found} at location {location}")]
+    #[error("expected finite values, found {found} at {location}")]
     NotFinite {
         /// Where.
-        location: u32,
+        location: LocationId,
         /// What.
         found: f64,
     },
     /// An exposure that is none.
-    #[error("expected exposures above 0, found {found} at location {location}")]
+    #[error("expected exposures above 0, found {found} at {location}")]
     Exposure {
         /// Where.
-        location: u32,
+        location: LocationId,
         /// What.
         found: f64,
     },
@@ -213,6 +214,7 @@ impl Sample {
                 return Ok(());
             }
             let found = count.exposure;
+            let location = LocationId::from_index(location);
             Err(SampleFault::Exposure { location, found })
         })?;
         for counts in clusters.values_mut() {
@@ -250,6 +252,7 @@ const fn check(location: u32, found: f64) -> Result<(), SampleFault> {
     if found.is_finite() {
         Ok(())
     } else {
+        let location = LocationId::from_index(location);
         Err(SampleFault::NotFinite { location, found })
     }
 }

@@ -171,7 +171,7 @@ fn values_that_are_none_make_no_sample() {
     let found = Sample::count_rate([(1, never)]);
     assert!(matches!(
         found,
-        Err(SampleFault::Exposure { location: 1, .. })
+        Err(SampleFault::Exposure { location, .. }) if location.index() == 1
     ));
     assert!(matches!(
         Sample::taxels(-1.0, []),

@@ -70,8 +70,8 @@ impl Told {
         let n = self.report.planned as u32;
         for press in 0..n {
             let ends = self.records.iter().filter(|r| match r {
-                Record::Outcome(o) => o.attempt.press.0 == press,
-                Record::Missed(a, reason) => a.press.0 == press && !reason.is_empty(),
+                Record::Outcome(o) => o.attempt.press.index() == press,
+                Record::Missed(a, reason) => a.press.index() == press && !reason.is_empty(),
                 _ => false,
             });
             assert_eq!(ends.count(), 1, "{case}: press {press} ends once");
@@ -79,9 +79,9 @@ impl Told {
         let position = |wanted: &dyn Fn(&Record) -> bool| self.records.iter().position(wanted);
         for press in 0..n {
             let outcome =
-                position(&|r| matches!(r, Record::Outcome(o) if o.attempt.press.0 == press));
+                position(&|r| matches!(r, Record::Outcome(o) if o.attempt.press.index() == press));
             let intent = position(
-                &|r| matches!(r, Record::Intent { attempt, .. } if attempt.press.0 == press),
+                &|r| matches!(r, Record::Intent { attempt, .. } if attempt.press.index() == press),
             );
             assert_eq!(outcome.is_some(), intent.is_some(), "{case}: press {press}");
             assert!(intent <= outcome, "{case}: intent before outcome");
@@ -222,7 +222,7 @@ fn check_order(train_ms: i64) {
             Record::Poses(block) => seen_to = block.last().map_or(seen_to, |p| p.t),
             Record::Chunk(c) => bytes_to[c.camera.index()] = c.host_time,
             Record::MarkSent(sent) => {
-                counts[sent.mark.press.0 as usize] += 1;
+                counts[sent.mark.press.index() as usize] += 1;
                 line_until = sent.t + HostDuration::from_millis(train_ms);
             }
             Record::Intent { attempt, .. } => moved_for = Some(attempt.press),
@@ -235,7 +235,8 @@ fn check_order(train_ms: i64) {
                 assert!(bytes_to.iter().all(|t| *t >= line_until));
                 assert!(seen_to >= clear && bytes_to.iter().all(|t| *t >= clear));
                 assert_eq!(
-                    counts[o.attempt.press.0 as usize], 3,
+                    counts[o.attempt.press.index() as usize],
+                    3,
                     "marks of {}",
                     o.attempt
                 );

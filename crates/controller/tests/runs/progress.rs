@@ -68,7 +68,7 @@ fn rates_count_the_events_between_chunks() {
 fn marks_are_seen_across_chunks_and_strays_are_not() {
     let mark = Mark {
         kind: MarkKind::Contact,
-        press: PressId(77),
+        press: PressId::from_index(77),
     };
     let mut edges = vec![TriggerEdge {
         t_us: 10,

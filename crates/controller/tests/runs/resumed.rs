@@ -21,7 +21,7 @@ fn retaking(per_press: u32, per_session: u32) -> Plan {
 /// Press and number of each intent, with its time in ms.
 fn intents(told: &Told) -> Vec<(u32, u32, i64)> {
     let intent = |r: &Record| match r {
-        Record::Intent { attempt, t } => Some((attempt.press.0, attempt.number, t.0 / MS)),
+        Record::Intent { attempt, t } => Some((attempt.press.index(), attempt.number, t.0 / MS)),
         _ => None,
     };
     told.records.iter().filter_map(intent).collect()
@@ -30,7 +30,7 @@ fn intents(told: &Told) -> Vec<(u32, u32, i64)> {
 /// Press, number and verdict of each outcome.
 fn outcomes(told: &Told) -> Vec<(u32, u32, &'static str)> {
     let outcome = |r: &Record| match r {
-        Record::Outcome(o) => Some((o.attempt.press.0, o.attempt.number, o.verdict.name())),
+        Record::Outcome(o) => Some((o.attempt.press.index(), o.attempt.number, o.verdict.name())),
         _ => None,
     };
     told.records.iter().filter_map(outcome).collect()
@@ -40,7 +40,7 @@ fn outcomes(told: &Told) -> Vec<(u32, u32, &'static str)> {
 fn chunk_of_the_second_press() -> u64 {
     let good = run_plan(&plan(), faults(), START, Sink::default());
     let mut records = good.records.iter().skip_while(
-        |r| !matches!(r, Record::Intent { attempt, .. } if attempt.press == PressId(1)),
+        |r| !matches!(r, Record::Intent { attempt, .. } if attempt.press == PressId::from_index(1)),
     );
     records
         .find_map(|r| match r {
@@ -129,7 +129,9 @@ fn the_protocol_limits_how_often() {
 fn what_the_skin_did_is_not_taken_again() {
     let good = run_plan(&plan(), faults(), START, Sink::default());
     let at_depth = good.records.iter().find_map(|r| match r {
-        Record::Outcome(o) if o.attempt.press == PressId(1) => o.timing.map(|t| t.at_depth.0 / MS),
+        Record::Outcome(o) if o.attempt.press == PressId::from_index(1) => {
+            o.timing.map(|t| t.at_depth.0 / MS)
+        }
         _ => None,
     });
     let at_depth = at_depth.unwrap_or_default();
@@ -198,7 +200,7 @@ fn resume(plan: &Plan, rest: &Plan, histories: &[PressHistory], faults: Faults) 
 
 fn rest_of(plan: &Plan, histories: &[PressHistory]) -> Plan {
     let wanted = plan.wanted(histories);
-    plan.remaining(|id| wanted[id.0 as usize], Route::Straight)
+    plan.remaining(|id| wanted[id.index() as usize], Route::Straight)
 }
 
 fn cut_off_in_the_second_press() -> [PressHistory; 3] {
@@ -251,7 +253,7 @@ fn sync_presses_come_again_and_stay_valid_when_they_do_not() {
         .records
         .iter()
         .filter_map(|r| match r {
-            Record::Missed(attempt, _) => Some((attempt.press.0, attempt.number)),
+            Record::Missed(attempt, _) => Some((attempt.press.index(), attempt.number)),
             _ => None,
         })
         .collect();
@@ -291,6 +293,6 @@ fn a_plan_that_is_not_what_is_left_is_refused() {
     refused(&rest, &[], "expected those of 3 presses, found 0");
     let mut less = rest.clone();
     less.steps
-        .retain(|s| !matches!(s, Step::Press(p) if p.press == PressId(2)));
+        .retain(|s| !matches!(s, Step::Press(p) if p.press == PressId::from_index(2)));
     refused(&less, &histories, "expected a step for press 2");
 }

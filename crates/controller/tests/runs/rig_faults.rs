@@ -52,8 +52,8 @@ impl Told {
         assert_eq!(r.planned, r.valid + r.invalid + r.missed, "{case}: {r:?}");
         for press in 0..r.planned as u32 {
             let ends = self.records.iter().filter(|record| match record {
-                Record::Outcome(o) => o.attempt.press.0 == press,
-                Record::Missed(a, reason) => a.press.0 == press && !reason.is_empty(),
+                Record::Outcome(o) => o.attempt.press.index() == press,
+                Record::Missed(a, reason) => a.press.index() == press && !reason.is_empty(),
                 _ => false,
             });
             assert_eq!(ends.count(), 1, "{case}: press {press} ends once");
@@ -102,13 +102,13 @@ fn instants(plan: &Plan, seed: u64) -> Vec<(String, When)> {
     ];
     for record in &good.records {
         let Record::Outcome(o) = record else { continue };
-        let Some(t) = o.timing.filter(|_| o.attempt.press.0 < 2) else {
+        let Some(t) = o.timing.filter(|_| o.attempt.press.index() < 2) else {
             continue;
         };
         let middle = |a: HostTime, b: HostTime| When::At(HostTime(i64::midpoint(a.0, b.0)));
         for (phase, when) in [
             ("approach", middle(t.approach, t.contact)),
-            ("contact", When::Contact(o.attempt.press.0)),
+            ("contact", When::Contact(o.attempt.press.index())),
             ("indentation", middle(t.contact, t.at_depth)),
             ("hold", middle(t.at_depth, t.retract)),
             ("retraction", middle(t.retract, t.release)),

@@ -13,8 +13,9 @@ pub fn paced_plan() -> Plan {
     let mut plan = plan();
     for step in &mut plan.steps {
         if let Step::Press(p) = step {
-            p.start_after_begin =
-                Some(HostDuration::from_millis(500 + 2000 * i64::from(p.press.0)));
+            p.start_after_begin = Some(HostDuration::from_millis(
+                500 + 2000 * i64::from(p.press.index()),
+            ));
             p.deadline = HostDuration::from_millis(1900);
         }
     }
@@ -56,7 +57,7 @@ fn presses_on_the_simulated_rig_are_valid_and_reproducible() {
             Record::Outcome(o) => {
                 outcomes += 1;
                 assert_eq!(o.verdict, PressVerdict::Valid, "{o:?}");
-                let planned = plan.presses[o.attempt.press.0 as usize];
+                let planned = plan.presses[o.attempt.press.index() as usize];
                 let off = o.measured_at.map(|at| at.distance_mm(planned.at));
                 assert!(
                     off.is_some_and(|d| d > 0.0 && d < 0.03),

@@ -51,10 +51,9 @@ fn a_tip_that_gives_way_during_the_hold_is_invalid() {
 #[test]
 fn lost_bytes_invalidate_their_press() {
     let good = run(faults());
-    let second = good
-        .records
-        .iter()
-        .position(|r| matches!(r, Record::Intent { attempt, .. } if attempt.press == PressId(1)));
+    let second = good.records.iter().position(
+        |r| matches!(r, Record::Intent { attempt, .. } if attempt.press == PressId::from_index(1)),
+    );
     let chunk = good
         .records
         .iter()

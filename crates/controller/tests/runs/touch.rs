@@ -234,7 +234,7 @@ fn a_further_leg_checks_the_surface_before_it_presses() {
         };
         let histories = vec![done, cut_off, PressHistory::default()];
         let wanted = plan.wanted(&histories);
-        let rest = plan.remaining(|id| wanted[id.0 as usize], Route::Straight);
+        let rest = plan.remaining(|id| wanted[id.index() as usize], Route::Straight);
         let mut rig = simulated_rig(&SimConfig::new(5, SimLevel::Kinematic));
         rig.robot_from_skin.translation_mm[2] -= off_mm;
         let header = RunHeader {

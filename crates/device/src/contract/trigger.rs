@@ -1,6 +1,6 @@
 //! What every trigger box must do.
 
-use skinrig_model::{HostDuration, HostTime, Mark, SentMark};
+use skinrig_model::{HostDuration, HostTime, Mark, PressId, SentMark};
 
 use super::{TICK, pass};
 use crate::{Clock, DeviceError, TriggerBox};
@@ -23,7 +23,7 @@ pub fn trigger_box(
         "trigger box: a train takes time"
     );
     let mut impossible = marks[0];
-    impossible.press.0 = skinrig_model::pulse::MAX_MARKED_PRESS + 1;
+    impossible.press = PressId::from_index(skinrig_model::pulse::MAX_MARKED_PRESS + 1);
     expect_error!(
         device.send(impossible),
         DeviceError::Refused { .. },

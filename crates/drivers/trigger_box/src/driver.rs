@@ -6,7 +6,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use skinrig_device::{DeviceError, RealClock, TriggerBox, TriggerCapabilities};
-use skinrig_model::pulse::MAX_MARKED_PRESS;
+use skinrig_model::pulse::LAST_MARKED_PRESS;
 use skinrig_model::{
     BoxReport, DeviceIdentity, DeviceRole, HostDuration, Mark, PulseTrain, SentMark,
 };
@@ -249,10 +249,7 @@ impl TriggerBox for SerialTriggerBox {
     /// the instant that is told.
     fn send(&mut self, mark: Mark) -> Result<SentMark, DeviceError> {
         if PulseTrain::new(mark).is_none() {
-            return Err(self.refused(
-                format!("a press up to {MAX_MARKED_PRESS}"),
-                mark.press.0.to_string(),
-            ));
+            return Err(self.refused(format!("up to {LAST_MARKED_PRESS}"), mark.press.to_string()));
         }
         match self.ask(Command::Send(mark))? {
             Done::Sent(sent) => Ok(sent),

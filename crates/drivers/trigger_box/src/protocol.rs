@@ -124,7 +124,7 @@ impl Request {
         match self {
             Self::Arm { silence_ms } => body.extend_from_slice(&silence_ms.to_le_bytes()),
             Self::Mark { number, mark } => {
-                let data = (mark.kind.code() << 17) | mark.press.0;
+                let data = (mark.kind.code() << 17) | mark.press.index();
                 body.extend_from_slice(&number.to_le_bytes());
                 body.extend_from_slice(&data.to_le_bytes());
             }
@@ -400,7 +400,7 @@ impl Events {
             let kind = match word >> 24 {
                 1 => EventKind::Mark(Mark {
                     kind: MarkKind::from_code(code >> 17)?,
-                    press: PressId(code & MAX_MARKED_PRESS),
+                    press: PressId::from_index(code & MAX_MARKED_PRESS),
                 }),
                 2 if code >> 17 == SYNC_CODE => EventKind::Sync(code & MAX_MARKED_PRESS),
                 3 => EventKind::Input { rising: false },
@@ -543,7 +543,7 @@ mod tests {
 
         #[test]
         fn requests_carry_their_number_and_fit_a_frame(id in any::<u16>(), number in any::<u32>(), press in 0..=MAX_MARKED_PRESS) {
-            let mark = Mark { kind: MarkKind::Release, press: PressId(press) };
+            let mark = Mark { kind: MarkKind::Release, press: PressId::from_index(press) };
             let body = Request::Mark { number, mark }.encode(id);
             prop_assert_eq!(&body[..2], &[PROTOCOL_VERSION, 4]);
             prop_assert_eq!(u16::from_le_bytes([body[2], body[3]]), id);

@@ -274,7 +274,7 @@ fn open() -> (Line, SerialTriggerBox) {
 fn mark(press: u32) -> Mark {
     Mark {
         kind: MarkKind::Contact,
-        press: PressId(press),
+        press: PressId::from_index(press),
     }
 }
 

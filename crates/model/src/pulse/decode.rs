@@ -219,7 +219,7 @@ mod tests {
     fn mark(press: u32) -> Label {
         Label::Mark(Mark {
             kind: MarkKind::Contact,
-            press: PressId(press),
+            press: PressId::from_index(press),
         })
     }
 

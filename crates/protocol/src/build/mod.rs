@@ -135,8 +135,10 @@ pub(crate) fn protocol(
     bytes: &[u8],
     overrides: &[String],
     loader: Loader<'_>,
+    recorded: bool,
 ) -> Result<Protocol, Diagnostics> {
     let (mut out, root) = open(name, bytes, overrides, &PROTOCOL)?;
+    out.recorded = recorded;
     let folder = Path::new(name).parent().unwrap_or(Path::new(""));
     let mut protocol = root.and_then(|root| {
         let protocol = assemble(&root, folder, loader, &mut out)?;

@@ -2,8 +2,8 @@
 
 use skinrig_model::{
     AlignmentSettings, AnalysisSettings, Background, CalibrationModel, CentroidRule, CmreSettings,
-    Estimator, LatencySettings, LensKind, Precision, ReducedLatencySettings, ReductionSettings,
-    ThresholdRule, WindowAnchor,
+    Estimator, LatencySettings, LensKind, Precision, PressId, ReducedLatencySettings,
+    ReductionSettings, ThresholdRule, WindowAnchor,
 };
 
 use crate::diagnostic::Collector;
@@ -83,7 +83,7 @@ pub(crate) fn analysis(f: &Field, out: &mut Collector) -> Option<AnalysisSetting
         min_response_sigma: f.number("min_response_sigma")?,
         min_ray_sine: f.number("min_ray_sine")?,
         exclude_outside: f.flag("exclude_outside")?,
-        exclude_presses: presses(f.get("exclude_presses")?)?,
+        exclude_press_numbers: excluded(f, out)?,
         calibration: match f.word("calibration")? {
             "none" => CalibrationModel::None,
             "positions" => CalibrationModel::Positions,
@@ -113,7 +113,35 @@ pub(crate) fn analysis(f: &Field, out: &mut Collector) -> Option<AnalysisSetting
     })
 }
 
-fn presses(f: &Field) -> Option<Vec<u32>> {
+/// Presses left out by hand: by number, counted from 1; in recordings of earlier versions by index, counted from 0.
+fn excluded(f: &Field, out: &mut Collector) -> Option<Vec<PressId>> {
+    let given = numbers(f.get("exclude_press_numbers")?)?.into_iter();
+    let mut presses: Vec<PressId> = given.map(PressId::from_number).collect::<Option<_>>()?;
+    let Some(list) = f.get("exclude_presses") else {
+        return Some(presses);
+    };
+    let indices = numbers(list)?.into_iter();
+    let recorded: Vec<PressId> = indices.map(PressId::from_index).collect();
+    if !out.recorded {
+        let same: Vec<String> = recorded.iter().map(|p| p.number().to_string()).collect();
+        out.error(
+            list.span,
+            list.path.as_str(),
+            "this key counts presses from 0",
+        )
+        .expected("`exclude_press_numbers`, which counts them from 1 as everything else does")
+        .found("`exclude_presses` of earlier versions")
+        .help(format!(
+            "write `exclude_press_numbers: [{}]`",
+            same.join(", ")
+        ));
+        return None;
+    }
+    presses.extend(recorded);
+    Some(presses)
+}
+
+fn numbers(f: &Field) -> Option<Vec<u32>> {
     let number = |item: &Field| match item.value {
         Value::Whole(n) => u32::try_from(n).ok(),
         _ => None,

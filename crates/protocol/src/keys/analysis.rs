@@ -103,14 +103,23 @@ pub(crate) static ANALYSIS: Table = Table {
             "A press with fewer clustered events than this in either camera is excluded; the least value of a calibrated threshold; 0 turns a fixed rule off.",
         ),
         default(
-            "exclude_presses",
+            "exclude_press_numbers",
             Shape::List {
                 of: &PRESS,
                 min: 0,
                 max: 100_000,
             },
             "[]",
-            "Presses left out by hand, by their number in the report (from 0, sync presses counted).",
+            "Presses left out by hand, by their number in the report and everywhere else (from 1, sync presses counted).",
+        ),
+        optional(
+            "exclude_presses",
+            Shape::List {
+                of: &PRESS_INDEX,
+                min: 0,
+                max: 100_000,
+            },
+            "In recordings of earlier versions only: presses left out by hand, counted from 0. New files use `exclude_press_numbers`.",
         ),
         default(
             "min_response_sigma",
@@ -264,7 +273,8 @@ pub(crate) const CALIBRATIONS: &[Word] = &[
     ),
 ];
 
-pub(crate) static PRESS: Shape = count(0, 10_000_000);
+pub(crate) static PRESS: Shape = count(1, 10_000_000);
+pub(crate) static PRESS_INDEX: Shape = count(0, 10_000_000);
 
 pub(crate) const ANCHORS: &[Word] = &[
     (

@@ -31,7 +31,7 @@ fn absent_settings_are_the_documented_defaults() {
         "analysis.calibration=positions_skews",
         "analysis.window_anchor=middle",
         "analysis.cluster_threshold=fixed",
-        "analysis.exclude_presses=[4, 17]",
+        "analysis.exclude_press_numbers=[4, 17]",
         "analysis.lens=stereographic",
         "analysis.failure_penalty=30 mm",
         "analysis.within=2.5 mm",
@@ -124,7 +124,7 @@ fn depths_run_the_path_once_each() {
     let first: Vec<_> = plan
         .presses
         .iter()
-        .filter(|p| p.repetition == 0 && p.role != PressRole::Sync)
+        .filter(|p| p.repetition.index() == 0 && p.role != PressRole::Sync)
         .collect();
     assert_eq!(first.len(), 162);
     assert!(first[..81].iter().all(|p| p.depth_mm == 2.0));
@@ -143,8 +143,8 @@ fn between_repetitions_the_tip_returns_and_waits() {
                 matches!(
                     s,
                     Step::Begin {
-                        repetition: Some(1)
-                    }
+                        repetition: Some(r)
+                    } if r.number() == 2
                 )
             })
             .unwrap();
@@ -173,7 +173,7 @@ fn press(plan: &mut Plan, number: u32) -> &mut skinrig_protocol::PressStep {
     plan.steps
         .iter_mut()
         .find_map(|s| match s {
-            Step::Press(p) if p.press.0 == number => Some(p),
+            Step::Press(p) if p.press.index() == number => Some(p),
             _ => None,
         })
         .unwrap()
@@ -188,7 +188,7 @@ fn every_kind_of_damage_is_found() {
         "{depth:?}"
     );
     assert!(
-        depth[0].to_string().starts_with("press 7, "),
+        depth[0].to_string().starts_with("press 8, "),
         "{}",
         depth[0]
     );
@@ -285,8 +285,8 @@ fn keep_outs_hold_for_presses_and_for_travel_between_them() {
     );
     assert!(tall.len() >= 3, "{tall:?}");
     assert_eq!(
-        tall[0].press.unwrap().0,
-        3 + 9,
+        tall[0].press.unwrap().number(),
+        3 + 10,
         "the tenth press of the path is behind the wall"
     );
     assert_eq!(
@@ -320,7 +320,10 @@ fn the_way_from_home_is_checked() {
 fn pinned_shuffle() {
     // The documented generator, pinned: a change would silently reorder everyone's campaigns.
     let plan = demo(&["order.shuffled.seed=3", "motion.period=3s"]).compile();
-    let order: Vec<u32> = plan.presses[3..11].iter().map(|p| p.location).collect();
+    let order: Vec<u32> = plan.presses[3..11]
+        .iter()
+        .map(|p| p.location.index())
+        .collect();
     insta::assert_debug_snapshot!("shuffle_seed_3", order);
 }
 
@@ -371,7 +374,7 @@ proptest! {
         let mut orders = Vec::new();
         for repetition in 0..3 {
             let order: Vec<u32> = plan.presses.iter()
-                .filter(|p| p.repetition == repetition && p.role != PressRole::Sync).map(|p| p.location).collect();
+                .filter(|p| p.repetition.index() == repetition && p.role != PressRole::Sync).map(|p| p.location.index()).collect();
             let mut sorted = order.clone();
             sorted.sort_unstable();
             prop_assert_eq!(sorted, (0..81).collect::<Vec<_>>());

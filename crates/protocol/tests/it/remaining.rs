@@ -101,7 +101,7 @@ proptest! {
         let protocol = shipped_protocol(name);
         let plan = protocol.compile();
         let wanted = |id: PressId| {
-            let mixed = (seed ^ u64::from(id.0)).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+            let mixed = (seed ^ u64::from(id.index())).wrapping_mul(0x9e37_79b9_7f4a_7c15);
             (mixed >> 32) % 8 < eighths
         };
         for route in [Route::Straight, Route::AsPlanned] {
@@ -122,7 +122,7 @@ proptest! {
                     // What the plan leaves between this press and the one after it, wanted or not.
                     all.get(at + 1).map(|next| HostDuration(start(next).0 - start(all[at]).0))
                 };
-                if plan.presses[block[0].press.0 as usize].role != PressRole::Sync {
+                if plan.presses[block[0].press.index() as usize].role != PressRole::Sync {
                     prop_assert_eq!(start(block[0]), HostDuration::ZERO);
                 }
                 for pair in block.windows(2) {

@@ -33,15 +33,19 @@ fn times_of_the_published_recording() {
     assert_eq!(ns(times[3 + 9 * 289]) - ns(times[3]), 9 * 871_000_000_000);
     let press = planned[3 + 289];
     assert_eq!(
-        (press.repetition, press.location, press.role),
-        (1, 0, PressRole::Score)
+        (
+            press.repetition.number(),
+            press.location.number(),
+            press.role
+        ),
+        (2, 1, PressRole::Score)
     );
     assert_eq!(planned[3].role, PressRole::Calibrate);
     assert!(
         planned
             .iter()
             .enumerate()
-            .all(|(k, p)| p.id.0 as usize == k)
+            .all(|(k, p)| p.id.index() as usize == k)
     );
     let timing = schedule.phases.at(times[3]);
     assert_eq!(

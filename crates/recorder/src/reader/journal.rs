@@ -106,7 +106,7 @@ impl SessionReader {
             Ok(SentMark {
                 mark: Mark {
                     kind: named(row, "kind", &MarkKind::ALL, MarkKind::name)?,
-                    press: PressId(num(row, "press")?),
+                    press: PressId::from_index(num(row, "press")?),
                 },
                 t: HostTime(int(row, "t_ns")?),
                 uncertainty_ns: int(row, "uncertainty_ns")?,

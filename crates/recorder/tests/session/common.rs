@@ -120,14 +120,14 @@ pub fn header(presses: u32) -> RunHeader {
         command_line: "skinrig run".into(),
         presses: (0..presses)
             .map(|i| PlannedPress {
-                id: PressId(i),
+                id: PressId::from_index(i),
                 role: if i == 0 {
                     PressRole::Sync
                 } else {
                     PressRole::Score
                 },
-                repetition: 0,
-                location: i.saturating_sub(1),
+                repetition: RepetitionId::default(),
+                location: LocationId::from_index(i.saturating_sub(1)),
                 at: Point2::new(f64::from(i) * 0.1, -4.0),
                 depth_mm: 2.0,
             })
@@ -185,12 +185,12 @@ pub fn records(presses: u32) -> Vec<Record> {
     let mut out = vec![Record::Started(Box::new(header(presses)))];
     let mut ids: Vec<AttemptId> = (0..presses - 1)
         .map(|i| AttemptId {
-            press: PressId(i),
+            press: PressId::from_index(i),
             number: 1,
         })
         .collect();
     ids.push(AttemptId {
-        press: PressId(presses - 2),
+        press: PressId::from_index(presses - 2),
         number: 2,
     });
     let t = attempts(&ids, &mut out);
@@ -204,7 +204,7 @@ pub fn records(presses: u32) -> Vec<Record> {
         text: "tip cleaned".into(),
     });
     let last = AttemptId {
-        press: PressId(presses - 1),
+        press: PressId::from_index(presses - 1),
         number: 1,
     };
     out.push(Record::Missed(last, "stopped before it".into()));
@@ -229,7 +229,7 @@ pub fn further_leg(known: &[PressHistory]) -> Vec<Record> {
         .zip(known)
         .filter(|(press, history)| *press == 0 || history.verdict != Some(PressVerdict::Valid))
         .map(|(press, history)| AttemptId {
-            press: PressId(press),
+            press: PressId::from_index(press),
             number: history.attempts + 1,
         })
         .collect();

@@ -81,7 +81,7 @@ fn a_sync_press_made_validly_twice_within_one_leg_is_found() {
     let started = Record::Started(Box::new(header(1)));
     let twice = [1, 2].into_iter().flat_map(|number| {
         let attempt = AttemptId {
-            press: PressId(0),
+            press: PressId::from_index(0),
             number,
         };
         let t = HostTime(i64::from(number) * 20_000_000);

@@ -66,7 +66,7 @@ fn comes_back(reader: &SessionReader, leg: &LegRow, told: &[Record]) {
     assert!(chunks > 0);
     let presses = reader.presses().unwrap();
     for mut told in outcomes {
-        let attempts = &presses[told.attempt.press.0 as usize].1;
+        let attempts = &presses[told.attempt.press.index() as usize].1;
         let attempt = &attempts[told.attempt.number as usize - 1];
         let timing = told.timing.as_mut().unwrap();
         assert_eq!(
@@ -401,10 +401,10 @@ proptest! {
         let reader = SessionReader::open(&path).unwrap();
         if let Some(id) = cut_off.first() {
             let presses = reader.presses().unwrap();
-            let attempt = &presses[id.press.0 as usize].1[id.number as usize - 1];
+            let attempt = &presses[id.press.index() as usize].1[id.number as usize - 1];
             let verdict = &attempt.outcome.as_ref().unwrap().verdict;
             prop_assert_eq!(verdict, &PressVerdict::cut_off(1));
-            let known = &reader.history().unwrap()[id.press.0 as usize];
+            let known = &reader.history().unwrap()[id.press.index() as usize];
             prop_assert!(known.attempts > id.number || known.verdict.is_none());
         }
 

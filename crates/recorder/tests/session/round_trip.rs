@@ -232,7 +232,7 @@ fn wrong_order_is_refused_and_a_failed_write_stays_failed() {
     writer.accept(note()).unwrap();
     // An outcome without its intent.
     let id = AttemptId {
-        press: PressId(1),
+        press: PressId::from_index(1),
         number: 1,
     };
     let orphan = Record::Outcome(crate::common::outcome(id, 0, PressVerdict::Valid));
@@ -285,7 +285,7 @@ fn lost_chunks_and_nan_positions_are_never_taken() {
         writer.accept(Record::Note { t, text }).unwrap();
         writer.accept(record).unwrap();
         let id = AttemptId {
-            press: PressId(0),
+            press: PressId::from_index(0),
             number: 1,
         };
         let intent = Record::Intent {

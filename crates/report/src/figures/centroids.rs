@@ -5,7 +5,7 @@ use crate::ReportInput;
 use crate::axes::{Axes, Scale};
 use crate::svg::dots;
 use skinrig_analysis::result::PressResult;
-use skinrig_model::SENSOR_WIDTH;
+use skinrig_model::{PressId, SENSOR_WIDTH};
 
 /// Centroid column of every press against its number, one panel per camera (as the paper's figure
 /// "centroids", panels A and B).
@@ -38,7 +38,7 @@ pub fn centroid_tracks(input: &ReportInput<'_>) -> Figure {
     let range = |pick: fn(f64, f64) -> f64, start: f64| {
         presses
             .iter()
-            .map(|p| f64::from(p.press.0))
+            .map(|p| f64::from(p.press.number()))
             .fold(start, pick)
     };
     let (first, last) = (
@@ -65,20 +65,20 @@ pub fn centroid_tracks(input: &ReportInput<'_>) -> Figure {
         let class = format!("dots c{}", camera + 1);
         let (valid, others): (Vec<_>, Vec<_>) =
             seen(camera).partition(|(p, _)| p.verdict == "valid");
-        let numbers = |of: &[(&PressResult, f64)]| of.iter().map(|(p, _)| p.press.0).collect();
-        let points = valid.iter().map(|(p, u)| px(p.press.0, *u));
-        let all: Vec<u32> = numbers(&valid);
+        let numbers = |of: &[(&PressResult, f64)]| of.iter().map(|(p, _)| p.press).collect();
+        let points = valid.iter().map(|(p, u)| px(p.press.number(), *u));
+        let all: Vec<PressId> = numbers(&valid);
         press_path(svg, &class, &dots(points), &all);
         let mut squares = String::new();
         for (p, u) in &others {
-            let (x, y) = px(p.press.0, *u);
+            let (x, y) = px(p.press.number(), *u);
             squares.push_str(&format!(
                 "M{} {}h6v6h-6Z",
                 crate::svg::Px(x - 3.0),
                 crate::svg::Px(y - 3.0)
             ));
         }
-        let all: Vec<u32> = numbers(&others);
+        let all: Vec<PressId> = numbers(&others);
         press_path(svg, "other", &squares, &all);
         if counts[camera] == 0 {
             svg.text(

@@ -147,7 +147,7 @@ fn histogram(errors: &[f64], end: f64) -> (Vec<u32>, f64) {
 pub fn error_scatter(input: &ReportInput<'_>) -> Figure {
     let counted = input.analysis.presses.iter().filter(|p| derive::counts(p));
     let (numbers, errors): (Vec<_>, Vec<_>) = counted
-        .filter_map(|p| Some((p.press.0, p.error_mm()?)))
+        .filter_map(|p| Some((p.press, p.error_mm()?)))
         .unzip();
     let m = &input.analysis.scored;
     let caption = format!(

@@ -38,7 +38,7 @@ fn discs(
             "circle",
             &[
                 ("class", &"press"),
-                ("data-location", &l.location),
+                ("data-location", &l.location.number()),
                 ("cx", &Px(x)),
                 ("cy", &Px(y)),
                 ("r", &Px(r)),
@@ -166,7 +166,7 @@ pub fn skin_map(input: &ReportInput<'_>) -> Figure {
         if let (Some(t), Some(e)) = (p.truth, p.estimate()) {
             vectors.push_str(&polyline([layout.px(t), layout.px(e)], false));
             tips.push(layout.px(e));
-            numbers.push(p.press.0);
+            numbers.push(p.press);
         }
     }
     let dense = if counted.len() > 600 { " dense" } else { "" };
@@ -178,7 +178,7 @@ pub fn skin_map(input: &ReportInput<'_>) -> Figure {
     let disc = |p: &PressResult| locations.iter().any(|l| l.location == p.location);
     for p in others.iter().filter(|p| p.timing.is_some() || !disc(p)) {
         let (x, y) = layout.px(p.truth.unwrap_or(p.planned));
-        numbers.push(p.press.0);
+        numbers.push(p.press);
         squares.push_str(&polyline(
             [
                 (x - 5.0, y - 5.0),

@@ -39,6 +39,8 @@ pub use reduction::reduction;
 pub use residuals::residuals;
 pub use threshold::threshold;
 
+use skinrig_model::PressId;
+
 use crate::ReportInput;
 use crate::format::or_missing;
 use crate::svg::{Attributes, Px, Svg, plain_css, polyline};
@@ -197,14 +199,15 @@ impl<'a> Canvas<'a> {
 const LINKED: (&str, &dyn std::fmt::Display) = ("data-linked", &"");
 
 /// A path with one piece (`M...`) for each of these presses, which the page's filter can take out.
-fn press_path(svg: &mut Svg, class: &str, data: &str, presses: &[u32]) {
+fn press_path(svg: &mut Svg, class: &str, data: &str, presses: &[PressId]) {
     if data.is_empty() {
         return;
     }
-    let runs = presses.chunk_by(|a, b| a.checked_add(1) == Some(*b));
+    let runs = presses.chunk_by(|a, b| a.index() + 1 == b.index());
     let runs = runs.map(|run| match run {
-        [one] => one.to_string(),
-        run => format!("{}-{}", run[0], run[run.len() - 1]),
+        [one] => one.number().to_string(),
+        [first, .., last] => format!("{}-{}", first.number(), last.number()),
+        [] => String::new(),
     });
     svg.leaf(
         "path",

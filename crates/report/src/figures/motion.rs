@@ -120,12 +120,7 @@ pub fn pose_presses(input: &ReportInput<'_>) -> Option<Figure> {
         let svg = &mut canvas.svg;
         upper.draw(svg);
         lower.draw(svg);
-        svg.text(
-            (left, 42.0),
-            "panel",
-            "start",
-            &format!("press {}", press.press.0),
-        );
+        svg.text((left, 42.0), "panel", "start", &press.press.to_string());
         for axes in [&upper, &lower] {
             svg.line("ref2", (x.at(0.0), axes.y.px.1), (x.at(0.0), axes.y.px.0));
         }

@@ -53,7 +53,7 @@ pub fn press_pictures(input: &ReportInput<'_>) -> Option<Figure> {
         for camera in 0..2 {
             let Some(p) = pictures
                 .iter()
-                .find(|p| p.press.0 == *press && p.camera.index() == camera)
+                .find(|p| p.press == *press && p.camera.index() == camera)
             else {
                 continue;
             };
@@ -65,7 +65,7 @@ pub fn press_pictures(input: &ReportInput<'_>) -> Option<Figure> {
                 .analysis
                 .presses
                 .iter()
-                .find(|r| r.press.0 == *press)
+                .find(|r| r.press == *press)
                 .and_then(|r| r.views[camera]);
             strip(&mut canvas, p, (x, y), k, view);
         }
@@ -108,7 +108,7 @@ fn strip(
         (at.0, at.1 - 11.0),
         "panel",
         "start",
-        &format!("press {} · camera {}", p.press.0, p.camera.number()),
+        &format!("{} · {}", p.press, p.camera),
     );
     svg.leaf(
         "rect",
@@ -191,7 +191,7 @@ mod tests {
             clustered,
         };
         let picture = PressPicture {
-            press: skinrig_model::PressId(1),
+            press: skinrig_model::PressId::from_index(1),
             camera: skinrig_model::CameraId::One,
             rows: (10, 11),
             pixels: vec![

@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use skinrig_analysis::result::{RateSeries, RateZoom};
+use skinrig_model::PressId;
 
 use super::{Canvas, Figure, LINKED, nice_above, press_path};
 use crate::ReportInput;
@@ -66,8 +67,8 @@ pub fn event_rates(input: &ReportInput<'_>) -> Figure {
         s.start_s = 0.0;
     }
     let presses = input.analysis.presses.iter();
-    let (pressed, contacts): (Vec<u32>, Vec<f64>) = presses
-        .filter_map(|p| Some((p.press.0, p.timing?.contact.as_secs_f64())))
+    let (pressed, contacts): (Vec<PressId>, Vec<f64>) = presses
+        .filter_map(|p| Some((p.press, p.timing?.contact.as_secs_f64())))
         .unzip();
     let ends = series
         .iter()
@@ -186,7 +187,7 @@ pub fn event_rates(input: &ReportInput<'_>) -> Figure {
 #[must_use]
 pub fn press_rates(input: &ReportInput<'_>) -> Option<Figure> {
     let zooms = &input.analysis.zooms;
-    let mut presses: Vec<u32> = zooms.iter().map(|z| z.press.0).collect();
+    let mut presses: Vec<PressId> = zooms.iter().map(|z| z.press).collect();
     presses.sort_unstable();
     presses.dedup();
     presses.truncate(6);
@@ -207,10 +208,10 @@ pub fn press_rates(input: &ReportInput<'_>) -> Option<Figure> {
     );
     let column = (1240.0 - 66.0 - 14.0) / presses.len() as f64;
     for camera in 0..2 {
-        let here = |press: u32| {
+        let here = |press: PressId| {
             zooms
                 .iter()
-                .find(|z| z.press.0 == press && z.camera.index() == camera)
+                .find(|z| z.press == press && z.camera.index() == camera)
         };
         let most = highest(
             presses
@@ -241,12 +242,7 @@ pub fn press_rates(input: &ReportInput<'_>) -> Option<Figure> {
             let svg = &mut canvas.svg;
             axes.draw(svg);
             if camera == 0 {
-                svg.text(
-                    (left, top - 20.0),
-                    "panel",
-                    "start",
-                    &format!("press {press}"),
-                );
+                svg.text((left, top - 20.0), "panel", "start", &press.to_string());
             }
             for t in [0.0, z.release_s] {
                 if (z.start_s..=axes.x.data.1).contains(&t) {

@@ -7,6 +7,7 @@ mod traces;
 
 use serde_json::{Map, Value, json};
 use skinrig_analysis::result::{Analysis, CalibrationResult};
+use skinrig_model::PressId;
 
 use crate::ReportInput;
 use crate::derive;
@@ -99,7 +100,7 @@ fn presses(a: &Analysis) -> Table {
         rows.iter().map(move |p| rounded(f(p), 3))
     };
     let mut table = Table::new()
-        .column("press", rows.iter().map(|p| json!(p.press.0)))
+        .column("press", rows.iter().map(|p| json!(p.press)))
         .column("role", rows.iter().map(|p| json!(p.role)))
         .column("repetition", rows.iter().map(|p| json!(p.repetition)))
         .column("location", rows.iter().map(|p| json!(p.location)))
@@ -174,8 +175,8 @@ fn presses(a: &Analysis) -> Table {
 /// The errors behind the distribution, ascending.
 fn errors(a: &Analysis) -> Table {
     let counted = a.presses.iter().filter(|p| derive::counts(p));
-    let mut rows: Vec<(f64, u32)> = counted
-        .filter_map(|p| Some((derive::error_norm_mm(p)?, p.press.0)))
+    let mut rows: Vec<(f64, PressId)> = counted
+        .filter_map(|p| Some((derive::error_norm_mm(p)?, p.press)))
         .collect();
     rows.sort_by(|a, b| a.0.total_cmp(&b.0));
     Table::new()
@@ -231,7 +232,7 @@ fn press_rates(a: &Analysis) -> Table {
     };
     let at = |v: &[f32], k: usize| rounded(v.get(k).map(|r| f64::from(*r)), 0);
     Table::new()
-        .column("press", bins().map(|(z, _)| json!(z.press.0)))
+        .column("press", bins().map(|(z, _)| json!(z.press)))
         .column("camera", bins().map(|(z, _)| json!(z.camera.number())))
         .column(
             "since_contact_s",
@@ -249,11 +250,11 @@ fn pictures(a: &Analysis) -> Table {
     let pixels = || {
         a.pictures
             .iter()
-            .filter(|p| shown.contains(&p.press.0))
+            .filter(|p| shown.contains(&p.press))
             .flat_map(|p| p.pixels.iter().map(move |q| (p, q)))
     };
     Table::new()
-        .column("press", pixels().map(|(p, _)| json!(p.press.0)))
+        .column("press", pixels().map(|(p, _)| json!(p.press)))
         .column("camera", pixels().map(|(p, _)| json!(p.camera.number())))
         .column("u_px", pixels().map(|(_, q)| json!(q.u)))
         .column("v_px", pixels().map(|(_, q)| json!(q.v)))
@@ -266,8 +267,8 @@ fn pictures(a: &Analysis) -> Table {
 }
 
 /// The first presses (by number) that have pictures.
-pub(crate) fn pictured(a: &Analysis) -> Vec<u32> {
-    let mut presses: Vec<u32> = a.pictures.iter().map(|p| p.press.0).collect();
+pub(crate) fn pictured(a: &Analysis) -> Vec<PressId> {
+    let mut presses: Vec<PressId> = a.pictures.iter().map(|p| p.press).collect();
     presses.sort_unstable();
     presses.dedup();
     presses.truncate(PICTURED_PRESSES);

@@ -160,7 +160,7 @@ fn course(l: &Latency) -> Table {
 fn onsets(l: &Latency) -> Table {
     let onset = l.onsets.iter().map(|(_, t)| rounded(*t, 3));
     Table::new()
-        .column("press", l.onsets.iter().map(|(p, _)| json!(p.0)))
+        .column("press", l.onsets.iter().map(|(p, _)| json!(p)))
         .column("onset_after_contact_ms", onset)
 }
 

@@ -52,7 +52,7 @@ fn course(motion: &Motion) -> Table {
 fn presses(motion: &Motion) -> Table {
     let samples = || {
         let presses = motion.presses.iter();
-        presses.flat_map(|p| p.samples.iter().map(move |s| (p.press.0, s)))
+        presses.flat_map(|p| p.samples.iter().map(move |s| (p.press, s)))
     };
     let mut table = Table::new()
         .column("press", samples().map(|(p, _)| json!(p)))

@@ -79,13 +79,17 @@ fn packed_columns_hold_every_cell() {
         let columns = table["columns"].as_array().unwrap();
         unpacked(&table["data"][columns.iter().position(|c| c == name).unwrap()])
     };
-    let repetitions: Vec<u32> = analysis.presses.iter().map(|p| p.repetition).collect();
+    let repetitions: Vec<u32> = analysis
+        .presses
+        .iter()
+        .map(|p| p.repetition.number())
+        .collect();
     assert_eq!(
         serde_json::json!(at("repetition")),
         serde_json::json!(repetitions)
     );
     let roles: Vec<_> = analysis.presses.iter().map(|p| p.role).collect();
     assert_eq!(serde_json::json!(at("role")), serde_json::json!(roles));
-    let numbers: Vec<u32> = analysis.presses.iter().map(|p| p.press.0).collect();
+    let numbers: Vec<u32> = analysis.presses.iter().map(|p| p.press.number()).collect();
     assert_eq!(serde_json::json!(at("press")), serde_json::json!(numbers));
 }

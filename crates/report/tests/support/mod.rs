@@ -84,7 +84,7 @@ pub fn analysis(side: u32, repetitions: u32) -> Analysis {
     };
     let of_first = presses
         .iter()
-        .filter(|p| p.role != PressRole::Sync && p.repetition == 0);
+        .filter(|p| p.role != PressRole::Sync && p.repetition.index() == 0);
     let places: Vec<Point2> = of_first.map(|p| p.planned).collect();
     let scored = metrics(&presses, true);
     let scored_without_exclusions = metrics(&presses, false);
@@ -300,10 +300,10 @@ fn press(
     };
     let views = [view(0, noise), view(1, noise)];
     PressResult {
-        press: PressId(id),
+        press: PressId::from_index(id),
         role,
-        repetition,
-        location,
+        repetition: RepetitionId::from_index(repetition),
+        location: LocationId::from_index(location),
         planned: at,
         depth_mm: 2.0,
         truth: (!missed).then_some(truth),
@@ -437,7 +437,7 @@ fn zoom(noise: &mut Noise, press: u32, camera: CameraId) -> RateZoom {
             .collect()
     };
     RateZoom {
-        press: PressId(press),
+        press: PressId::from_index(press),
         camera,
         start_s: -0.5,
         bin_s: 0.01,

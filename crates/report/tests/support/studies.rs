@@ -67,7 +67,7 @@ pub fn latency(noise: &mut Noise, presses: &[PressResult]) -> Latency {
         .take(300)
         .map(|p| {
             let onset = 18.0 + 5.0 * noise.normal() + 12.0 * noise.uniform().powi(3);
-            let onset = match p.press.0 % 97 {
+            let onset = match p.press.index() % 97 {
                 5 => None,
                 6 => Some(-41.0),
                 _ => Some(onset),
@@ -378,7 +378,7 @@ pub fn motion() -> Motion {
             })
             .collect(),
         presses: vec![PressMotion {
-            press: PressId(9),
+            press: PressId::from_index(9),
             kept_each: 2,
             samples: samples
                 .map(|t| TipSample {

@@ -52,8 +52,8 @@ impl TriggerBox for ReplayedTriggerBox {
             return Err(DeviceError::Refused {
                 role: DeviceRole::TriggerBox,
                 serial,
-                expected: format!("a press up to {}", skinrig_model::pulse::MAX_MARKED_PRESS),
-                found: mark.press.0.to_string(),
+                expected: format!("up to {}", skinrig_model::pulse::LAST_MARKED_PRESS),
+                found: mark.press.to_string(),
             });
         }
         let show = |m: Mark| format!("{} of {}", m.kind, m.press);

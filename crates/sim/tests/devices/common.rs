@@ -96,7 +96,7 @@ pub fn press_all(rig: &mut Rig, places: &[Point2], ticks: &[i64]) -> Result<Take
         if let Some(trigger) = &mut rig.trigger_box {
             let mark = Mark {
                 kind: MarkKind::Approach,
-                press: PressId(n as u32),
+                press: PressId::from_index(n as u32),
             };
             take.marks.push(trigger.send(mark)?);
         }

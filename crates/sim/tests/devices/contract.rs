@@ -95,7 +95,7 @@ fn trigger_boxes_keep_the_contract() {
         .into_iter()
         .map(|kind| Mark {
             kind,
-            press: PressId(17),
+            press: PressId::from_index(17),
         })
         .collect();
     let marks = &marks;

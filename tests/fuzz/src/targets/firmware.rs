@@ -58,7 +58,7 @@ fn drive(bytes: &[u8]) {
     };
     let mark = Mark {
         kind: MarkKind::Contact,
-        press: PressId(1),
+        press: PressId::from_index(1),
     };
     let _ = driver.arm();
     let _ = driver.send(mark);

@@ -9,16 +9,16 @@ pub fn plan() -> Plan {
         .iter()
         .enumerate()
         .map(|(i, (x, y))| PlannedPress {
-            id: PressId(i as u32),
+            id: PressId::from_index(i as u32),
             role: PressRole::Score,
-            repetition: 0,
-            location: i as u32,
+            repetition: RepetitionId::default(),
+            location: LocationId::from_index(i as u32),
             at: Point2::new(*x, *y),
             depth_mm: 2.0,
         })
         .collect();
     let mut steps = vec![Step::Begin {
-        repetition: Some(0),
+        repetition: Some(RepetitionId::default()),
     }];
     for (i, p) in presses.iter().enumerate() {
         steps.push(Step::Travel {

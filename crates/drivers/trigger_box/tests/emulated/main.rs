@@ -93,7 +93,7 @@ fn open(board: &EmulatedBox, clock: RealClock) -> SerialTriggerBox {
 fn mark(k: u32) -> Mark {
     Mark {
         kind: MarkKind::ALL[k as usize % 5],
-        press: PressId(k.wrapping_mul(7919) % (1 << 17)),
+        press: PressId::from_index(k.wrapping_mul(7919) % (1 << 17)),
     }
 }
 
