@@ -13,6 +13,7 @@ use crate::metrics::{Exclusions, metrics, penalised};
 use crate::result::{Analysis, ClockFit, Metrics, Penalised, PressView};
 use crate::segment::{Window, windows};
 use crate::sets::ScoreSet;
+use crate::untimed::{self, Untimed};
 
 /// A session whose presses can be located in many ways.
 pub struct Replay<'a> {
@@ -21,6 +22,8 @@ pub struct Replay<'a> {
     clocks: [ClockFit; 2],
     /// Rows of the plan that take part.
     rows: Vec<usize>,
+    /// Of all rows of the plan, those that a camera's clock does not time.
+    untimed: [Vec<Option<Untimed>>; 2],
 }
 
 /// What one way of locating gave.
@@ -60,6 +63,7 @@ impl<'a> Replay<'a> {
             kept,
             clocks: [one, two],
             rows,
+            untimed: untimed::of_session(input),
         })
     }
 
@@ -143,17 +147,18 @@ impl<'a> Replay<'a> {
             delays.iter().sum::<f64>() / count,
         );
         let input = self.part(settings);
-        let pick = |k: usize| -> (Vec<Option<PressView>>, Vec<bool>) {
+        let pick = |k: usize| -> (Vec<Option<PressView>>, (Vec<bool>, Vec<Option<Untimed>>)) {
             self.rows
                 .iter()
-                .map(|row| (views[k][*row], lost[k][*row]))
+                .map(|row| (views[k][*row], (lost[k][*row], self.untimed[k][*row])))
                 .unzip()
         };
         let (one, two) = (pick(0), pick(1));
-        let seen = [&one, &two].map(|(views, data_lost)| Seen {
+        let seen = [&one, &two].map(|(views, (data_lost, untimed))| Seen {
             has_clock: true,
             views,
             data_lost,
+            untimed,
         });
         let judged = judge(&input, seen, &mut Vec::new());
         let scores = ScoreSet::from_presses(&judged.presses, &input.outcomes);
