@@ -147,18 +147,14 @@ impl<'a> Replay<'a> {
             delays.iter().sum::<f64>() / count,
         );
         let input = self.part(settings);
-        let pick = |k: usize| -> (Vec<Option<PressView>>, (Vec<bool>, Vec<Option<Untimed>>)) {
-            self.rows
-                .iter()
-                .map(|row| (views[k][*row], (lost[k][*row], self.untimed[k][*row])))
-                .unzip()
-        };
-        let (one, two) = (pick(0), pick(1));
-        let seen = [&one, &two].map(|(views, (data_lost, untimed))| Seen {
+        let views = views.map(|of| self.of_rows(&of));
+        let lost = lost.map(|of| self.of_rows(&of));
+        let untimed = [0, 1].map(|k| self.of_rows(&self.untimed[k]));
+        let seen = [0, 1].map(|k| Seen {
             has_clock: true,
-            views,
-            data_lost,
-            untimed,
+            views: &views[k],
+            data_lost: &lost[k],
+            untimed: &untimed[k],
         });
         let judged = judge(&input, seen, &mut Vec::new());
         let scores = ScoreSet::from_presses(&judged.presses, &input.outcomes);
@@ -181,6 +177,11 @@ impl<'a> Replay<'a> {
             events_per_press,
             delay_ms,
         }
+    }
+
+    /// What holds for the rows that take part, out of what holds for all.
+    fn of_rows<T: Copy>(&self, all: &[T]) -> Vec<T> {
+        self.rows.iter().map(|row| all[*row]).collect()
     }
 
     /// The rows that take part, as a session of their own.
