@@ -20,7 +20,8 @@ use crate::result::{
 };
 use crate::segment::{Window, windows};
 use crate::sets::ScoreSet;
-use crate::timebase::{Ties, TimeBase};
+use crate::timebase::{Tie, Ties, TimeBase};
+use crate::untimed::{self, Untimed};
 use crate::{audit, bit_rates, caveats, check, cmre, coverage, latency, legs, reduction, verdict};
 
 /// Windows that share less than this, µs, only touch: their ends are rounded.
@@ -57,11 +58,10 @@ pub fn analyze_and_keep(
     let legs = legs::clocks(input, base.as_ref());
     let pressed = spans(input).into_iter().map(|s| s.contact_us);
     let nominal = legs::nominal_only(&input.legs, &legs, pressed);
-    let base_clock = |k: usize| base.as_ref().and_then(|b| b.clocks[k]);
     let [one, two] = std::thread::scope(|scope| {
         let second =
-            scope.spawn(|| camera_pass(input, source, CameraId::Two, &plan, base_clock(1)));
-        let first = camera_pass(input, source, CameraId::One, &plan, base_clock(0));
+            scope.spawn(|| camera_pass(input, source, CameraId::Two, &plan, base.as_ref()));
+        let first = camera_pass(input, source, CameraId::One, &plan, base.as_ref());
         let second = match second.join() {
             Ok(result) => result,
             Err(panic) => std::panic::resume_unwind(panic),
@@ -136,19 +136,18 @@ pub fn analyze_and_keep(
         ));
     }
     let counts = verdict::count(&presses);
+    let mut alignment = base.map_or_else(
+        || uncertified([one.clock, two.clock]),
+        |base| base.alignment,
+    );
+    alignment.warnings.extend(nominal);
     let mut analysis = Analysis {
         version: ANALYSIS_VERSION,
         settings: input.settings.clone(),
         rig: input.rig,
         geometry,
         counts,
-        alignment: Alignment {
-            warnings: nominal,
-            ..base.map_or_else(
-                || uncertified([one.clock, two.clock]),
-                |base| base.alignment,
-            )
-        },
+        alignment,
         clocks: [one.clock, two.clock],
         legs,
         contact_timing: contact_timing(input, scheduled),
@@ -187,6 +186,7 @@ pub(crate) fn time_base(input: &SessionInput) -> Option<TimeBase> {
         reports: &input.box_reports,
         edges: [&input.edges[0], &input.edges[1]],
         channel: input.rig.trigger_channel?,
+        recorded: [&input.recorded[0], &input.recorded[1]],
         legs: &input.legs,
         used_at_us: &used_at_us,
     };
@@ -244,6 +244,7 @@ struct CameraResult {
     /// Per row of the plan.
     views: Vec<Option<PressView>>,
     data_lost: Vec<bool>,
+    untimed: Vec<Option<Untimed>>,
     pictures: Vec<PressPicture>,
     zooms: Vec<RateZoom>,
     kept: Vec<KeepPlan>,
@@ -257,6 +258,7 @@ impl CameraResult {
             has_clock: self.clock.is_some(),
             views: &self.views,
             data_lost: &self.data_lost,
+            untimed: &self.untimed,
         }
     }
 }
@@ -296,10 +298,11 @@ fn camera_pass(
     source: &dyn EventSource,
     camera: CameraId,
     plan: &Closeups,
-    base_clock: Option<ClockFit>,
+    base: Option<&TimeBase>,
 ) -> Result<CameraResult, AnalysisError> {
     let settings = &input.settings;
     let k = camera.index();
+    let base_clock = base.and_then(|b| b.clocks[k]);
     let mut warnings: Vec<String> = Vec::new();
     let mut rates = Some(RateHistogram::new(rate_bin_us(settings)));
     let mut activity = None;
@@ -310,6 +313,15 @@ fn camera_pass(
         .trigger_channel
         .filter(|_| base_clock.is_none())
         .and_then(by_marks);
+    let untimed = untimed::rows(input, camera, base, marks.as_ref());
+    let by_marks = |u: &&Untimed| u.tie == Tie::Mark;
+    let far = untimed.iter().flatten().filter(by_marks).count();
+    if far > 0 {
+        warnings.push(format!(
+            "{far} presses are more than {} s from the nearest trigger mark that was seen: they are not timed",
+            input.settings.alignment.max_tie_distance_us * 1e-6
+        ));
+    }
     let clock = if base_clock.is_some() {
         base_clock
     } else if let Some(found) = marks {
@@ -421,6 +433,7 @@ fn camera_pass(
         rates: series,
         views: by_row(input.planned.len(), collected.views),
         data_lost: lost_rows(input.planned.len(), &list, &input.gaps[k]),
+        untimed,
         pictures: collected.pictures,
         zooms: collected.zooms,
         kept: collected.kept,

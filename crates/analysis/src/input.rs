@@ -33,6 +33,9 @@ pub struct SessionInput {
     pub box_reports: Vec<BoxReport>,
     /// Camera-time intervals `(from_us, to_us)` in which bytes of that camera were lost.
     pub gaps: [Vec<(u64, u64)>; 2],
+    /// Camera-time intervals `(from_us, to_us)` in which each camera was recording, leg by leg: from the first time of its stream to
+    /// the last. Empty where that is not known: it is then taken to have recorded all along.
+    pub recorded: [Vec<(u64, u64)>; 2],
     /// RMS interval between the two pose samples around a contact, µs; `None` when not known.
     pub pose_interval_us: Option<f64>,
     /// RMS standard error of the instant at which the measured pose crossed the surface, µs; `None` when not known.

@@ -1,12 +1,13 @@
 //! From what the cameras saw of the presses to where each was, by the rules of the settings.
 
-use skinrig_model::{PressRole, PressVerdict};
+use skinrig_model::{CameraId, PressRole, PressVerdict};
 
 use crate::calibrate::{Calibrated, calibrated};
 use crate::check;
 use crate::input::SessionInput;
 use crate::result::{LocationOutcome, PressResult, PressView};
 use crate::triangulate::locate;
+use crate::untimed::Untimed;
 use crate::verdict;
 
 /// What one camera saw, by rows of the plan.
@@ -16,6 +17,8 @@ pub struct Seen<'a> {
     pub views: &'a [Option<PressView>],
     /// Rows with bytes lost in their window.
     pub data_lost: &'a [bool],
+    /// Rows that this camera's clock does not time.
+    pub untimed: &'a [Option<Untimed>],
 }
 
 /// Every planned press with its verdict, and the geometry that located it.
@@ -65,6 +68,11 @@ fn rows(input: &SessionInput, seen: [Seen<'_>; 2]) -> Vec<PressResult> {
             );
             if input.settings.excludes(planned.id) {
                 judgement = judgement.or_by_hand();
+            }
+            for camera in CameraId::ALL {
+                if let Some(untimed) = seen[camera.index()].untimed[i] {
+                    judgement = judgement.or_untimed(camera, untimed);
+                }
             }
             let mut row = PressResult {
                 press: planned.id,

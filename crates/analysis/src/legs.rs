@@ -64,6 +64,18 @@ pub(crate) fn edges_of<'a>(
     &edges[start..end]
 }
 
+/// When a camera was recording in one leg, 0 for the first, on its own clock, µs.
+pub(crate) fn recorded_of(
+    recorded: &[(u64, u64)],
+    legs: &[LegStart],
+    leg: usize,
+    camera: usize,
+) -> Vec<(u64, u64)> {
+    let of = |t_us: u64| legs.partition_point(|next| next.camera_us[camera] <= t_us);
+    let spans = recorded.iter().copied();
+    spans.filter(|(from, _)| of(*from) == leg).collect()
+}
+
 /// The leg that a host time belongs to, 0 for the first.
 pub(crate) fn leg_at(legs: &[LegStart], t: HostTime) -> usize {
     legs.partition_point(|leg| leg.origin <= t)
@@ -140,6 +152,11 @@ fn move_camera(input: &mut SessionInput, k: usize, moves: &[i64]) {
     }
     for (from, to) in &mut input.gaps[k] {
         (*from, *to) = (moved(*from), moved(*to));
+    }
+    for (from, to) in &mut input.recorded[k] {
+        // All of it is of the leg in which it begins.
+        let by = moves[begins.partition_point(|begin| begin <= from)];
+        (*from, *to) = (from.saturating_add_signed(by), to.saturating_add_signed(by));
     }
     for (leg, by) in input.legs.iter_mut().zip(&moves[1..]) {
         leg.camera_us[k] = moved(leg.camera_us[k]);

@@ -48,6 +48,7 @@ pub mod sums;
 pub mod timebase;
 pub mod tradeoff;
 pub mod triangulate;
+mod untimed;
 pub mod verdict;
 mod width;
 

@@ -3,7 +3,7 @@
 //! Every planned press gets exactly one verdict:
 //! - *missed*: never attempted, from the journal;
 //! - *invalid*: what happened is not what was planned (journal), or the data cannot say: bytes lost in the window,
-//!   a camera without clock, no measured times or position;
+//!   a camera without clock or with none that reaches the press, no measured times or position;
 //! - *excluded*: done and recorded, but left out by a rule that names itself. A press that the cameras did not
 //!   see, or whose rays do not meet on the skin, is a failure of the skin: excluded from the error metrics, and
 //!   still in the denominator of the located rate;
@@ -15,6 +15,7 @@ use skinrig_model::{AnalysisSettings, CameraId, PressOutcome, PressRole, PressVe
 
 use crate::check;
 use crate::result::{Estimate, LocationOutcome, PressCounts, PressResult, PressView};
+use crate::untimed::Untimed;
 
 /// A verdict and the rule behind it.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -51,6 +52,18 @@ impl Judgement {
         match self.verdict {
             PressVerdict::Missed(_) | PressVerdict::Invalid(_) => self,
             _ => Self::excluded("by hand".to_owned(), "left out by hand".to_owned()),
+        }
+    }
+
+    /// Invalid because a camera's clock is not known at the press, unless it is missed or invalid anyway.
+    #[must_use]
+    pub(crate) fn or_untimed(self, camera: CameraId, untimed: Untimed) -> Self {
+        match self.verdict {
+            PressVerdict::Missed(_) | PressVerdict::Invalid(_) => self,
+            _ => Self {
+                verdict: PressVerdict::Invalid(format!("not timed: {untimed} ({camera})")),
+                rule: Some(format!("not timed ({camera})")),
+            },
         }
     }
 

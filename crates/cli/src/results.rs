@@ -251,6 +251,7 @@ fn session_input(
             .map(|(_, said)| said)
             .collect(),
         gaps: [reader.gaps(one)?, reader.gaps(two)?],
+        recorded: [reader.recorded(one)?, reader.recorded(two)?],
         pose_interval_us,
         crossing_se_us,
         legs,

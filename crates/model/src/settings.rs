@@ -246,6 +246,10 @@ pub struct AlignmentSettings {
     pub max_spurious: f64,
     /// Least share of held-out trains in the 95 % interval stated for them.
     pub min_coverage: f64,
+    /// A press further than this from the nearest tie of a clock (train or mark that the camera saw, exchange with the box) is
+    /// not timed by that clock, µs: beyond it, a rate that changes by 20 ppm, as a cheap crystal's does over tens of kelvins,
+    /// moves the clock by more than `max_camera_interval_us`.
+    pub max_tie_distance_us: f64,
     /// The robot's poses are stamped late by at most this, µs: one interval of a 1 kHz stream. Stated, not measured.
     pub robot_delay_us: f64,
 }
@@ -260,6 +264,7 @@ impl Default for AlignmentSettings {
             max_lost: 0.3,
             max_spurious: 0.15,
             min_coverage: 0.85,
+            max_tie_distance_us: 2_500_000.0,
             robot_delay_us: 1_000.0,
         }
     }

@@ -38,6 +38,7 @@ pub fn session(rig: RigGeometry, settings: AnalysisSettings) -> SessionInput {
         edges: [Vec::new(), Vec::new()],
         marks: Vec::new(),
         gaps: [Vec::new(), Vec::new()],
+        recorded: [Vec::new(), Vec::new()],
         box_reports: Vec::new(),
         pose_interval_us: None,
         crossing_se_us: None,

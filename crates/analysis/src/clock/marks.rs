@@ -23,6 +23,8 @@ pub struct MarksFit {
     pub fit: ClockFit,
     /// Remarks for the reader.
     pub warnings: Vec<String>,
+    /// Host times of the marks that the fit stands on, ascending, µs.
+    pub seen_us: Vec<f64>,
 }
 
 /// Fits a camera's clock from the edges on its trigger channel and the marks that were sent.
@@ -108,6 +110,9 @@ pub fn fit_marks(edges: &[TriggerEdge], channel: u8, sent: &[SentMark]) -> Optio
         n: line.n() as u32,
         rejected: (decoded.marks.len().max(pairs.len()) - line.n()) as u32,
     };
+    let used = pairs.iter().zip(&line.used).filter(|(_, used)| **used);
+    let mut seen_us: Vec<f64> = used.map(|(pair, _)| pair.host_us).collect();
+    seen_us.sort_by(f64::total_cmp);
     let mut warnings = Vec::new();
     if line.rms_us > SUSPICIOUS_RMS_US {
         warnings.push(format!(
@@ -135,5 +140,9 @@ pub fn fit_marks(edges: &[TriggerEdge], channel: u8, sent: &[SentMark]) -> Optio
             decoded.stray_edges
         ));
     }
-    Some(MarksFit { fit, warnings })
+    Some(MarksFit {
+        fit,
+        warnings,
+        seen_us,
+    })
 }

@@ -173,13 +173,16 @@ pub struct ClockResidual {
     pub used: bool,
 }
 
-/// Edges on the trigger input of one camera, from the first train that it saw to the last.
+/// Edges on the trigger input of one camera: of all trains that the box sent while the camera was recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct LineCounts {
     /// Trains that the box sent.
     pub trains_sent: u32,
     /// Trains of which enough was seen to time them.
     pub trains_seen: u32,
+    /// Further trains, sent while this camera was not recording: neither seen nor lost.
+    #[serde(default)]
+    pub trains_unrecorded: u32,
     /// Edges that the box sent.
     pub sent: u64,
     /// Edges seen where the box sent them.

@@ -30,7 +30,7 @@ use skinrig_model::{
 };
 
 /// Version of this layout and of the algorithms behind it; part of every result.
-pub const ANALYSIS_VERSION: u32 = 6;
+pub const ANALYSIS_VERSION: u32 = 7;
 
 /// The result of analysing one session.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -11,7 +11,7 @@ use skinrig_model::TriggerEdge;
 use skinrig_model::pulse::{PulseTrain, ReadTrain, read_trains};
 
 use super::epochs::{Epoch, Sent};
-use super::piecewise::{Piecewise, Point};
+use super::piecewise::{Piecewise, Point, WANDER};
 use crate::clock::line::median;
 use crate::result::LineCounts;
 
@@ -51,6 +51,8 @@ pub struct CameraFromBox {
     /// Standard deviation of the rising edges about their own train's mean, µs, and how many edges it stands on; no edge is left
     /// out.
     pub jitter: Option<(f64, u64)>,
+    /// Box times of the trains that the map stands on, ascending, µs.
+    pub ties_us: Vec<f64>,
     /// Edges sent, seen, lost, doubled, spurious.
     pub counts: LineCounts,
     /// Anchors that the others contradict.
@@ -58,11 +60,36 @@ pub struct CameraFromBox {
 }
 
 impl CameraFromBox {
+    /// From a box time to that of the nearest train that the map stands on, µs.
+    pub fn tie_distance_us(&self, box_us: f64) -> f64 {
+        distance_us(&self.ties_us, box_us)
+    }
+
     /// Half width of the 95 % interval of the map at a box time, µs: 1.96 standard errors, and what no number of edges
     /// averages out: edges come late by an unknown mean, of the size of their scatter (less than 2 standard deviations for
-    /// any delay that is spread evenly or dies away), and the box shows whole µs.
+    /// any delay that is spread evenly or dies away), and the box shows whole µs. Before the first train and after the last the
+    /// rate may have changed by [`WANDER`].
     pub fn interval_us(&self, box_us: f64) -> f64 {
-        1.96 * self.map.standard_error(box_us) + 2.0 * self.edge_sigma_us + 0.5
+        1.96 * self.map.standard_error(box_us)
+            + 2.0 * self.edge_sigma_us
+            + 0.5
+            + WANDER * beyond_us(&self.ties_us, box_us)
+    }
+}
+
+/// From `at` to the nearest of `ties`, which ascend.
+pub fn distance_us(ties: &[f64], at: f64) -> f64 {
+    let k = ties.partition_point(|t| *t < at);
+    let near = &ties[k.saturating_sub(1)..(k + 1).min(ties.len())];
+    near.iter()
+        .fold(f64::INFINITY, |d, t| d.min((t - at).abs()))
+}
+
+/// How far `at` is before the first or after the last of `ties`, which ascend; 0 between them.
+pub fn beyond_us(ties: &[f64], at: f64) -> f64 {
+    match (ties.first(), ties.last()) {
+        (Some(first), Some(last)) => (first - at).max(at - last).max(0.0),
+        _ => f64::INFINITY,
     }
 }
 
@@ -88,8 +115,9 @@ impl Edges {
         }
     }
 
-    /// The map of one epoch, or why there is none.
-    pub fn map(&mut self, epoch: &Epoch) -> Result<CameraFromBox, String> {
+    /// The map of one epoch, or why there is none. `recorded`: when the camera was recording, on its own clock, µs; empty when that
+    /// is not known.
+    pub fn map(&mut self, epoch: &Epoch, recorded: &[(u64, u64)]) -> Result<CameraFromBox, String> {
         let anchors = anchors(&self.trains, &epoch.trains);
         let Some(reference_us) = anchors.first().map(|a| a.1) else {
             return Err(format!(
@@ -117,6 +145,7 @@ impl Edges {
         let contradicted = (points.len() - map.n()) as u32;
         let mut matched = Vec::new();
         let mut instants = Vec::new();
+        let mut seen_us = Vec::new();
         for near_us in NEAR_US {
             matched = self.look(&epoch.trains, &map, reference_us, near_us);
             instants = matched.iter().map(Matched::instant).collect::<Vec<_>>();
@@ -133,11 +162,18 @@ impl Edges {
                 .collect();
             map = Piecewise::fit(&seen, SPACING_US, FLOOR_US)
                 .ok_or_else(|| format!("only {} trains were seen", seen.len()))?;
+            seen_us = seen.iter().map(|p| p.from_us).collect();
         }
+        let used = seen_us.into_iter().zip(&map.used).filter(|(_, u)| **u);
+        let ties_us = used.map(|(at, _)| at).collect();
         let edge_sigma_us = edge_sigma_us(&matched);
         let whole_pulses = matched.iter().map(|m| m.whole_pulses).collect();
         let jitter = jitter(&matched);
-        let counts = self.count(&epoch.trains, &matched, &map, reference_us);
+        let spans: Vec<(f64, f64)> = recorded
+            .iter()
+            .map(|(from, to)| (relative(*from, reference_us), relative(*to, reference_us)))
+            .collect();
+        let counts = self.count(&matched, &spans, reference_us);
         Ok(CameraFromBox {
             map,
             reference_us,
@@ -146,6 +182,7 @@ impl Edges {
             edge_sigma_us,
             whole_pulses,
             jitter,
+            ties_us,
             counts,
             contradicted,
         })
@@ -162,8 +199,10 @@ impl Edges {
         sent.iter()
             .map(|train| {
                 let start = map.value(train.box_us);
+                let end = train.box_us + PulseTrain::DURATION_US as f64;
                 let mut out = Matched {
                     start_us: start,
+                    end_us: map.value(end),
                     ..Matched::default()
                 };
                 let mut rose = false;
@@ -206,42 +245,44 @@ impl Edges {
             .min_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))
     }
 
-    /// Counts over the trains from the first to the last that were seen, and strikes out their edges.
+    /// Counts over all trains that were seen or sent while the camera was recording, and strikes out their edges. What is before the
+    /// first train that was seen, or after the last, is lost like any other.
     fn count(
         &mut self,
-        sent: &[Sent],
         matched: &[Matched],
-        map: &Piecewise,
+        recorded: &[(f64, f64)],
         reference_us: u64,
     ) -> LineCounts {
-        let seen = |m: &Matched| m.rises.len() >= LEAST_RISES;
-        let (Some(first), Some(last)) = (
-            matched.iter().position(seen),
-            matched.iter().rposition(seen),
-        ) else {
-            return LineCounts::default();
+        let seen = |m: &&Matched| m.rises.len() >= LEAST_RISES;
+        let is_recorded = |m: &&Matched| {
+            let holds = |(from, to): &(f64, f64)| *from <= m.start_us && m.end_us <= *to;
+            recorded.is_empty() || recorded.iter().any(holds)
         };
-        let within = &matched[first..=last];
+        let counted = || matched.iter().filter(|m| seen(m) || is_recorded(m));
+        let trains = counted().count();
         let mut counts = LineCounts {
-            trains_sent: within.len() as u32,
-            trains_seen: within.iter().filter(|m| seen(m)).count() as u32,
-            sent: within.len() as u64 * EDGES_PER_TRAIN,
+            trains_sent: trains as u32,
+            trains_seen: counted().filter(seen).count() as u32,
+            trains_unrecorded: (matched.len() - trains) as u32,
+            sent: trains as u64 * EDGES_PER_TRAIN,
             ..LineCounts::default()
         };
-        for index in within.iter().flat_map(|m| &m.edges) {
+        let (Some(first), Some(last)) = (counted().next(), counted().next_back()) else {
+            return counts;
+        };
+        for index in counted().flat_map(|m| &m.edges) {
             if !std::mem::replace(&mut self.used[*index], true) {
                 counts.seen += 1;
             }
         }
         counts.lost = counts.sent - counts.seen;
-        let end_us = map.value(sent[last].box_us + PulseTrain::DURATION_US as f64);
+        let within = first.start_us - NEAR_US[0]..=last.end_us;
         let (mut rise, mut fall) = (None, None);
         for (edge, used) in self.all.iter().zip(&mut self.used) {
             let at_us = relative(edge.t_us, reference_us);
             let before = if edge.rising { &mut rise } else { &mut fall };
             let double = before.is_some_and(|t| edge.t_us - t <= DOUBLE_US);
-            let inside = (within[0].start_us - NEAR_US[0]..=end_us).contains(&at_us);
-            if inside && !*used {
+            if within.contains(&at_us) && !*used {
                 *used = true;
                 *(if double {
                     &mut counts.doubled
@@ -261,8 +302,9 @@ const EDGES_PER_TRAIN: u64 = 2 * skinrig_model::pulse::PULSES_PER_TRAIN;
 /// What was found of a train.
 #[derive(Debug, Default)]
 struct Matched {
-    /// Where its first edge should be.
+    /// Where its first edge should be, and its last may be.
     start_us: f64,
+    end_us: f64,
     /// Edges found.
     edges: Vec<usize>,
     /// How much later than it should be each of the rising edges is: falling ones may have another delay.

@@ -5,8 +5,9 @@
 //! latest `sent` and the earliest `received`, each measured from the fit. No assumption is made on how a delay divides into
 //! its two ways.
 
+use super::edges::{beyond_us, distance_us};
 use super::epochs::Tie;
-use super::piecewise::{Piecewise, Point};
+use super::piecewise::{Piecewise, Point, WANDER};
 
 /// The quickest exchange in each such span of box time makes a point of the fit, µs.
 const QUICKEST_OF_US: f64 = 5e6;
@@ -26,6 +27,8 @@ pub struct HostFromBox {
     pub knots: Vec<(f64, f64, f64)>,
     /// The fit behind it.
     pub fit: Piecewise,
+    /// Box times of the exchanges, ascending, µs.
+    pub ties_us: Vec<f64>,
     /// False when exchanges contradict each other: the clock jumped, or an exchange is wrong.
     pub consistent: bool,
 }
@@ -49,6 +52,7 @@ impl HostFromBox {
         Some(Self {
             knots,
             fit,
+            ties_us: ties.iter().map(|t| t.box_us).collect(),
             consistent,
         })
     }
@@ -68,10 +72,13 @@ impl HostFromBox {
         let k = self.knots.partition_point(|knot| knot.0 <= box_us);
         let near = self.knots[k.saturating_sub(1)..].iter().take(2);
         let half = near.fold(0.0f64, |m, knot| m.max(knot.2));
-        let (first, last) = (self.knots[0].0, self.knots[self.knots.len() - 1].0);
-        // Beyond the exchanges nothing bounds the rate but the fit's own error.
-        let beyond = (first - box_us).max(box_us - last).max(0.0);
-        half + beyond * (SHAPE + 2.0 * self.fit.drift_se)
+        // Beyond the exchanges nothing bounds the rate but the fit's own error and what a crystal does.
+        half + beyond_us(&self.ties_us, box_us) * (WANDER + 2.0 * self.fit.drift_se)
+    }
+
+    /// From a box time to that of the nearest exchange, µs.
+    pub fn tie_distance_us(&self, box_us: f64) -> f64 {
+        distance_us(&self.ties_us, box_us)
     }
 }
 

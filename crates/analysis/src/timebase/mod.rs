@@ -12,6 +12,7 @@ mod piecewise;
 mod residuals;
 mod wire;
 
+pub(crate) use self::edges::distance_us;
 pub use self::wire::{Wire, WireTrain, wire};
 
 use skinrig_model::{AlignmentSettings, BoxReport, HostTime, TriggerEdge};
@@ -22,7 +23,7 @@ use self::held_out::coverage;
 use self::host::HostFromBox;
 use self::piecewise::{Piecewise, Point};
 use crate::clock::line::{self, Pair};
-use crate::legs::{LegLine, LegStart, edges_of, leg_at};
+use crate::legs::{LegLine, LegStart, edges_of, leg_at, recorded_of};
 use crate::metrics::quantile;
 use crate::result::{
     Alignment, AlignmentStatus, ClockFit, ClockMap, ClockMethod, Knot, LineCounts, MapName,
@@ -44,10 +45,23 @@ pub struct Ties<'a> {
     pub edges: [&'a [TriggerEdge]; 2],
     /// The channel that carries the trains.
     pub channel: u8,
+    /// Camera-time intervals in which each camera was recording, µs; empty where that is not known.
+    pub recorded: [&'a [(u64, u64)]; 2],
     /// Where further legs of the session begin.
     pub legs: &'a [LegStart],
     /// Host instants at which the time base is used, µs: contacts and releases.
     pub used_at_us: &'a [f64],
+}
+
+/// What ties one clock to another at an instant.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Tie {
+    /// The host asked the trigger box for its time.
+    Exchange,
+    /// A camera saw a train that the box reports.
+    Train,
+    /// A camera saw a mark that the host sent.
+    Mark,
 }
 
 /// The time base of a session.
@@ -105,7 +119,8 @@ impl TimeBase {
         for leg in 0..=ties.legs.len() {
             // Edges of one leg say nothing of trains of another.
             let edges = |k: usize| edges_of(ties.edges[k], ties.legs, leg, k);
-            lines.push([0, 1].map(|k| Edges::new(edges(k), ties.channel)));
+            let recorded = |k: usize| recorded_of(ties.recorded[k], ties.legs, leg, k);
+            lines.push([0, 1].map(|k| (Edges::new(edges(k), ties.channel), recorded(k))));
         }
         for epoch in epochs(ties.reports, ties.legs) {
             let mut found = Vec::new();
@@ -130,7 +145,7 @@ impl TimeBase {
             status: AlignmentStatus::Valid,
             violations: Vec::new(),
             warnings: Vec::new(),
-            maps: base.maps(ties.used_at_us, limits),
+            maps: base.maps(&base.timed(ties.used_at_us, limits), limits),
             lines: [0, 1].map(|k| base.counts(k)).to_vec(),
             resets,
             camera_from_host: [0, 1].map(|k| base.knots(k)),
@@ -149,6 +164,9 @@ impl TimeBase {
         }
         if !ties.used_at_us.is_empty() {
             violations.extend(beyond(&alignment, limits));
+            for k in 0..2 {
+                base.judge_untimed(k, ties, limits, &mut alignment.warnings, &mut violations);
+            }
         }
         if !violations.is_empty() {
             alignment.status = if ties.used_at_us.is_empty() {
@@ -167,6 +185,21 @@ impl TimeBase {
     #[must_use]
     pub fn camera_us(&self, camera: usize, host_us: f64) -> Option<(f64, f64)> {
         self.at(host_us)?.camera_us(camera, host_us)
+    }
+
+    /// From a host time to the nearest exchange with the box, or to the nearest train that the camera saw when that is further, µs;
+    /// `None` when that camera's clock is not known then.
+    #[must_use]
+    pub fn tie_distance_us(&self, camera: usize, host_us: f64) -> Option<(Tie, f64)> {
+        let piece = self.at(host_us)?;
+        let box_us = piece.host.box_us(host_us);
+        let train = piece.cameras[camera].as_ref()?.tie_distance_us(box_us);
+        let exchange = piece.host.tie_distance_us(box_us);
+        Some(if train > exchange {
+            (Tie::Train, train)
+        } else {
+            (Tie::Exchange, exchange)
+        })
     }
 
     /// One line through camera over host time at the trains of one leg, 0 for the first.
@@ -208,11 +241,65 @@ impl TimeBase {
         self.pieces.iter().min_by(|a, b| off(a).total_cmp(&off(b)))
     }
 
+    /// The instants that no clock is too far from to time them.
+    fn timed(&self, used_at_us: &[f64], limits: &AlignmentSettings) -> Vec<f64> {
+        let far = |k: usize, at: f64| self.is_untimed(k, at, limits);
+        let each = used_at_us.iter().copied();
+        each.filter(|at| !far(0, *at) && !far(1, *at)).collect()
+    }
+
+    fn is_untimed(&self, k: usize, host_us: f64, limits: &AlignmentSettings) -> bool {
+        let tie = self.tie_distance_us(k, host_us);
+        tie.is_some_and(|(_, distance)| distance > limits.max_tie_distance_us)
+    }
+
+    /// Warns of contacts and releases that the clock of camera `k` does not time. Too many while it was recording make the session
+    /// invalid; that it was not recording is no fault of a clock.
+    fn judge_untimed(
+        &self,
+        k: usize,
+        ties: &Ties<'_>,
+        limits: &AlignmentSettings,
+        warnings: &mut Vec<String>,
+        violations: &mut Vec<String>,
+    ) {
+        let is_recorded = |host_us: f64| {
+            let leg = leg_at(ties.legs, HostTime((host_us * 1e3) as i64));
+            let spans = recorded_of(ties.recorded[k], ties.legs, leg, k);
+            let at = self.camera_us(k, host_us).map_or(f64::NAN, |(at, _)| at);
+            let holds = |(from, to): &(u64, u64)| (*from as f64..=*to as f64).contains(&at);
+            ties.recorded[k].is_empty() || spans.iter().any(holds)
+        };
+        let far = ties.used_at_us.iter().copied();
+        let far: Vec<f64> = far.filter(|at| self.is_untimed(k, *at, limits)).collect();
+        if far.is_empty() {
+            return;
+        }
+        let all = ties.used_at_us.len();
+        let limit_s = limits.max_tie_distance_us * 1e-6;
+        warnings.push(format!(
+            "camera {}: {} of {all} contacts and releases are more than {limit_s} s from the nearest train that it saw or the nearest \
+             exchange with the box: their presses are not timed",
+            k + 1,
+            far.len()
+        ));
+        let lost = far.iter().filter(|at| is_recorded(**at)).count() as f64 / all as f64;
+        if lost > limits.max_lost {
+            violations.push(format!(
+                "camera {} from host, contacts and releases without a tie within {limit_s} s: expected at most {} %, found {:.1} %",
+                k + 1,
+                (1e5 * limits.max_lost).round() / 1e3,
+                100.0 * lost
+            ));
+        }
+    }
+
     fn counts(&self, k: usize) -> LineCounts {
         let each = self.pieces.iter().filter_map(|p| p.cameras[k].as_ref());
         each.fold(LineCounts::default(), |sum, c| LineCounts {
             trains_sent: sum.trains_sent + c.counts.trains_sent,
             trains_seen: sum.trains_seen + c.counts.trains_seen,
+            trains_unrecorded: sum.trains_unrecorded + c.counts.trains_unrecorded,
             sent: sum.sent + c.counts.sent,
             seen: sum.seen + c.counts.seen,
             lost: sum.lost + c.counts.lost,
@@ -308,7 +395,10 @@ impl TimeBase {
     }
 }
 
-fn piece(epoch: &Epoch, lines: &mut [Edges; 2], violations: &mut Vec<String>) -> Option<Piece> {
+/// The edges of a camera in one leg, and when it was recording.
+type Line = (Edges, Vec<(u64, u64)>);
+
+fn piece(epoch: &Epoch, lines: &mut [Line; 2], violations: &mut Vec<String>) -> Option<Piece> {
     let Some(host) = HostFromBox::new(&epoch.ties) else {
         violations.push(format!(
             "host from box: expected exchanges of time to fit a clock, found {} that do not",
@@ -322,9 +412,9 @@ fn piece(epoch: &Epoch, lines: &mut [Edges; 2], violations: &mut Vec<String>) ->
     let (first, last) = (epoch.ties.first()?, epoch.ties.last()?);
     let [one, two] = lines;
     let mut number = 0;
-    let cameras = [one, two].map(|line| {
+    let cameras = [one, two].map(|(line, recorded)| {
         number += 1;
-        line.map(epoch)
+        line.map(epoch, recorded)
             .map_err(|why| {
                 violations.push(format!(
                     "camera {number} from box: expected a clock, found none: {why}"

@@ -150,7 +150,7 @@ impl Piecewise {
 }
 
 /// Rate differences wander by no more than this over a session: 20 ppm, a cheap crystal over tens of kelvins.
-const WANDER: f64 = 20e-6;
+pub const WANDER: f64 = 20e-6;
 
 /// Segment and the weight of its right end; beyond the ends the outer segments go on.
 fn place(knots: &[f64], x: f64) -> (usize, f64) {

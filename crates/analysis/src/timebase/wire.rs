@@ -14,7 +14,7 @@ const PULSES: u32 = skinrig_model::pulse::PULSES_PER_TRAIN as u32;
 pub struct Wire {
     /// Every train of the box in time order.
     pub trains: Vec<WireTrain>,
-    /// Edges from the first train that was seen to the last.
+    /// Edges of all trains.
     pub counts: LineCounts,
     /// Standard deviation of the rising edges about their own train's mean, µs, and how many edges it stands on.
     pub jitter: Option<(f64, u64)>,
@@ -41,7 +41,7 @@ pub fn wire(reports: &[BoxReport], edges: &[TriggerEdge], channel: u8) -> Result
     let Some(epoch) = epochs.iter().max_by_key(|e| e.trains.len()) else {
         return Err("the box told of no train".to_owned());
     };
-    let found = Edges::new(edges, channel).map(epoch)?;
+    let found = Edges::new(edges, channel).map(epoch, &[])?;
     let trains = epoch.trains.iter().zip(&found.whole_pulses);
     Ok(Wire {
         trains: trains

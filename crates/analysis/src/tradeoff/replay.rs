@@ -13,6 +13,7 @@ use crate::metrics::{Exclusions, metrics, penalised};
 use crate::result::{Analysis, ClockFit, Metrics, Penalised, PressView};
 use crate::segment::{Window, windows};
 use crate::sets::ScoreSet;
+use crate::untimed::{self, Untimed};
 
 /// A session whose presses can be located in many ways.
 pub struct Replay<'a> {
@@ -21,6 +22,8 @@ pub struct Replay<'a> {
     clocks: [ClockFit; 2],
     /// Rows of the plan that take part.
     rows: Vec<usize>,
+    /// Of all rows of the plan, those that a camera's clock does not time.
+    untimed: [Vec<Option<Untimed>>; 2],
 }
 
 /// What one way of locating gave.
@@ -60,6 +63,7 @@ impl<'a> Replay<'a> {
             kept,
             clocks: [one, two],
             rows,
+            untimed: untimed::of_session(input),
         })
     }
 
@@ -143,17 +147,14 @@ impl<'a> Replay<'a> {
             delays.iter().sum::<f64>() / count,
         );
         let input = self.part(settings);
-        let pick = |k: usize| -> (Vec<Option<PressView>>, Vec<bool>) {
-            self.rows
-                .iter()
-                .map(|row| (views[k][*row], lost[k][*row]))
-                .unzip()
-        };
-        let (one, two) = (pick(0), pick(1));
-        let seen = [&one, &two].map(|(views, data_lost)| Seen {
+        let views = views.map(|of| self.of_rows(&of));
+        let lost = lost.map(|of| self.of_rows(&of));
+        let untimed = [0, 1].map(|k| self.of_rows(&self.untimed[k]));
+        let seen = [0, 1].map(|k| Seen {
             has_clock: true,
-            views,
-            data_lost,
+            views: &views[k],
+            data_lost: &lost[k],
+            untimed: &untimed[k],
         });
         let judged = judge(&input, seen, &mut Vec::new());
         let scores = ScoreSet::from_presses(&judged.presses, &input.outcomes);
@@ -176,6 +177,11 @@ impl<'a> Replay<'a> {
             events_per_press,
             delay_ms,
         }
+    }
+
+    /// What holds for the rows that take part, out of what holds for all.
+    fn of_rows<T: Copy>(&self, all: &[T]) -> Vec<T> {
+        self.rows.iter().map(|row| all[*row]).collect()
     }
 
     /// The rows that take part, as a session of their own.

@@ -217,6 +217,7 @@ fn alignment(f: &Field) -> Option<AlignmentSettings> {
         max_lost: f.number("max_lost")?,
         max_spurious: f.number("max_spurious")?,
         min_coverage: f.number("min_coverage")?,
+        max_tie_distance_us: microseconds("max_tie_distance")?,
         robot_delay_us: microseconds("robot_delay")?,
     })
 }

@@ -519,6 +519,12 @@ pub(crate) static ALIGNMENT: Table = Table {
             "Least share of held-out trains within the 95 % interval stated for them, by more than chance (3 standard errors).",
         ),
         default(
+            "max_tie_distance",
+            Shape::Quantity(&[Time], Range::above_zero(86_400.0)),
+            "2.5 s",
+            "A press further than this from the nearest train or mark that a camera saw, or from the nearest exchange with the trigger box, is not timed and does not count.",
+        ),
+        default(
             "robot_delay",
             Shape::Quantity(&[Time], Range::from_zero(1.0)),
             "1 ms",

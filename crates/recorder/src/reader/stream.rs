@@ -216,6 +216,27 @@ impl SessionReader {
         Ok(losses.iter().map(|loss| loss.time.bounds_us()).collect())
     }
 
+    /// Camera-time intervals `(from_us, to_us)` in which `camera` was recording: for each leg from the first time in its stream to
+    /// the last.
+    ///
+    /// # Errors
+    /// When the file is damaged.
+    pub fn recorded(&self, camera: CameraId) -> Result<Vec<(u64, u64)>, RecorderError> {
+        let mut spans: Vec<(u64, u64)> = Vec::new();
+        let mut is_new = true;
+        for chunk in self.chunk_index(camera)? {
+            is_new |= chunk.restart_us.is_some();
+            if let (Some(first), Some(last)) = (chunk.facts.first_us, chunk.facts.last_us) {
+                match spans.last_mut().filter(|_| !is_new) {
+                    Some(span) => *span = (span.0.min(first), span.1.max(last)),
+                    None => spans.push((first, last)),
+                }
+                is_new = false;
+            }
+        }
+        Ok(spans)
+    }
+
     /// The trigger edges of `camera`, in stream order, all channels.
     ///
     /// # Errors

@@ -88,7 +88,16 @@ pub(super) fn lines(a: &Analysis) -> Option<Grid> {
             share(line.spurious),
         ]);
     }
-    grid.note("Counted from the first train that a camera saw to the last.");
+    grid.note("Counted are all trains that the box sent while the camera was recording.");
+    for (k, line) in lines.iter().enumerate() {
+        if line.trains_unrecorded > 0 {
+            grid.note(format!(
+                "Camera {}: {} further trains were sent while it was not recording.",
+                k + 1,
+                line.trains_unrecorded
+            ));
+        }
+    }
     Some(grid)
 }
 

@@ -200,6 +200,7 @@ fn alignment() -> Alignment {
     let line = LineCounts {
         trains_sent: 9_703,
         trains_seen: 9_700,
+        trains_unrecorded: 0,
         sent: 620_992,
         seen: 620_100,
         lost: 892,

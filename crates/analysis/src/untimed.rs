@@ -1,0 +1,82 @@
+//! Owns which presses a camera's clock does not time: those too far from everything that ties it to the host's.
+
+use std::fmt;
+
+use skinrig_model::CameraId;
+
+use crate::analyze::{time_base, timings};
+use crate::clock::{MarksFit, fit_marks};
+use crate::input::SessionInput;
+use crate::timebase::{Tie, TimeBase, distance_us};
+
+/// A press that a clock does not reach.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Untimed {
+    /// What is too far away.
+    pub tie: Tie,
+    /// How far the nearest is from the contact or the release, µs.
+    pub distance_us: f64,
+    /// How far it may be, µs.
+    pub limit_us: f64,
+}
+
+impl fmt::Display for Untimed {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let what = match self.tie {
+            Tie::Exchange => "exchange of time with the trigger box",
+            Tie::Train => "train that it saw",
+            Tie::Mark => "mark that it saw",
+        };
+        write!(
+            f,
+            "the nearest {what} is {:.1} s away, expected at most {} s",
+            self.distance_us * 1e-6,
+            self.limit_us * 1e-6
+        )
+    }
+}
+
+/// The rows of the plan that the clock of `camera` does not time. `marks`: what its clock stands on where the time base has none.
+/// A clock aligned by event rates stands on the presses themselves: nothing is said of it here.
+pub fn rows(
+    input: &SessionInput,
+    camera: CameraId,
+    base: Option<&TimeBase>,
+    marks: Option<&MarksFit>,
+) -> Vec<Option<Untimed>> {
+    let limit_us = input.settings.alignment.max_tie_distance_us;
+    let by_base = base.filter(|b| b.clocks[camera.index()].is_some());
+    let furthest = |host_us: f64| -> Option<(Tie, f64)> {
+        match (by_base, marks) {
+            (Some(base), _) => base.tie_distance_us(camera.index(), host_us),
+            (None, Some(marks)) => Some((Tie::Mark, distance_us(&marks.seen_us, host_us))),
+            (None, None) => None,
+        }
+    };
+    let mut out = vec![None; input.planned.len()];
+    for (row, timing) in timings(input) {
+        let ends = [timing.contact, timing.release].map(|t| t.0 as f64 * 1e-3);
+        let far = ends.into_iter().filter_map(furthest);
+        out[row] = far
+            .filter(|(_, distance_us)| *distance_us > limit_us)
+            .max_by(|a, b| a.1.total_cmp(&b.1))
+            .map(|(tie, distance_us)| Untimed {
+                tie,
+                distance_us,
+                limit_us,
+            });
+    }
+    out
+}
+
+/// The same of both cameras, from the session alone.
+pub fn of_session(input: &SessionInput) -> [Vec<Option<Untimed>>; 2] {
+    let base = time_base(input);
+    CameraId::ALL.map(|camera| {
+        let k = camera.index();
+        let by_base = base.as_ref().is_some_and(|b| b.clocks[k].is_some());
+        let channel = input.rig.trigger_channel.filter(|_| !by_base);
+        let marks = channel.and_then(|c| fit_marks(&input.edges[k], c, &input.marks));
+        rows(input, camera, base.as_ref(), marks.as_ref())
+    })
+}
