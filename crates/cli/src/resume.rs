@@ -8,7 +8,7 @@ use skinrig_controller::{Preflight, Resume, Run, RunReport};
 use skinrig_device::Rig;
 use skinrig_hil::lease::Lease;
 use skinrig_model::{
-    DeviceRole, HostTime, PlannedPress, PressHistory, PressRole, PressVerdict, Record,
+    DeviceRole, HostTime, PlannedPress, Point2, PressHistory, PressRole, PressVerdict, Record,
     ResumeHeader, RunEnd, RunHeader, SimLevel,
 };
 use skinrig_protocol::rig::RigFile;
@@ -218,7 +218,7 @@ fn go_on(
         notes,
         // Until the session is closed.
         lease: _lease,
-    } = open_rig(args, found, protocol, &rest)?;
+    } = open_rig(args, found, protocol, &rest, wanted)?;
     let expected = skinrig_model::HostDuration::from_secs_f64(rest.summary().duration_s);
     let view = ProgressView::resumed(&found.plan.presses, &found.histories, wanted, expected);
     let folder = paths::folder_of(&args.session);
@@ -273,6 +273,17 @@ fn rest_of(protocol: &Protocol, plan: &Plan, wanted: &[bool]) -> Result<Plan, Fa
     Ok(planned)
 }
 
+/// Where the simulated skin was pressed in earlier legs. An attempt that is made again does not count: it meets the contact that it would
+/// have met.
+fn pressed_before(found: &Unfinished, wanted: &[bool]) -> Vec<Point2> {
+    let all = found.plan.presses.iter().zip(&found.histories).zip(wanted);
+    all.flat_map(|((press, history), wanted)| {
+        let made = history.attempts.saturating_sub(u32::from(*wanted));
+        (0..made).map(|_| press.at)
+    })
+    .collect()
+}
+
 /// The rig of a session.
 struct Opened {
     rig: Rig,
@@ -289,6 +300,7 @@ fn open_rig(
     found: &Unfinished,
     protocol: Protocol,
     rest: &Plan,
+    wanted: &[bool],
 ) -> Result<Opened, Failure> {
     let folder = paths::folder_of(&args.session);
     let header = &found.header;
@@ -306,7 +318,14 @@ fn open_rig(
             .parse()
             .map_err(|e| Failure::input(format!("{}: rig: {e}", args.session.display())))?;
         let faults = &args.faults;
-        let rig = rig::simulated(&protocol, level, header.seed, args.real_time, faults);
+        let rig = rig::simulated_after(
+            &protocol,
+            level,
+            header.seed,
+            args.real_time,
+            faults,
+            pressed_before(found, wanted),
+        );
         let mut preflight = gates::of_simulated(&rig, folder, summary.expected_bytes);
         preflight.made.insert(0, gates::recorder(&args.session));
         let notes = planted::told(faults).into_iter().collect();

@@ -6,9 +6,13 @@
     reason = "a test that cannot run must fail, or say why it did not run"
 )]
 
+#[path = "emulated_bench/first_contact.rs"]
+mod first_contact;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use serde_json::Value;
 use skinrig_emulated_bench::{BenchConfig, BenchError, EmulatedBench};
@@ -16,6 +20,26 @@ use skinrig_emulated_bench::{BenchConfig, BenchError, EmulatedBench};
 const SKINRIG: &str = env!("CARGO_BIN_EXE_skinrig");
 /// Of the cameras' true geometry and their noise; the simulated bench takes it too.
 const SEED: u64 = 1;
+
+/// Two benches at once would be late for one another.
+static REAL_TIME: Mutex<()> = Mutex::new(());
+
+/// A bench that has the processors to itself; `None`, and why on standard error, on a machine that can have none.
+fn start() -> Option<(MutexGuard<'static, ()>, EmulatedBench)> {
+    let alone = REAL_TIME.lock().unwrap_or_else(PoisonError::into_inner);
+    let bench = EmulatedBench::start(&BenchConfig {
+        seed: SEED,
+        ..BenchConfig::default()
+    });
+    match bench {
+        Ok(bench) => Some((alone, bench)),
+        Err(BenchError::Box(reason)) => {
+            eprintln!("skipped: no emulated bench: {reason}");
+            None
+        }
+        Err(e) => panic!("{e}"),
+    }
+}
 
 fn top() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
@@ -90,17 +114,8 @@ fn results(folder: &Path) -> Value {
 fn the_quick_check_on_the_emulated_bench_agrees_with_the_simulated_one() {
     let folder = tempfile::tempdir().unwrap();
     let (emulated, simulated) = (folder.path().join("emulated"), folder.path().join("sim"));
-    let bench = EmulatedBench::start(&BenchConfig {
-        seed: SEED,
-        ..BenchConfig::default()
-    });
-    let bench = match bench {
-        Ok(bench) => bench,
-        Err(BenchError::Box(reason)) => {
-            eprintln!("skipped: no emulated bench: {reason}");
-            return;
-        }
-        Err(e) => panic!("{e}"),
+    let Some((_alone, bench)) = start() else {
+        return;
     };
     let (emulated, said) = run_in_real_time(&bench, &emulated);
     assert!(said.contains("rig       emulated"), "{said}");

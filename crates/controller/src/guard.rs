@@ -112,6 +112,13 @@ impl<'a> GuardedIndenter<'a> {
         Ok(())
     }
 
+    /// What the robot has to say besides its samples.
+    pub fn take_notes(&mut self) -> Vec<String> {
+        let mut notes = Vec::new();
+        self.inner.take_notes(&mut notes);
+        notes
+    }
+
     /// True between [`arm`](Self::arm) and [`disarm`](Self::disarm).
     #[must_use]
     pub const fn is_armed(&self) -> bool {

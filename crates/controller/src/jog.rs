@@ -159,6 +159,11 @@ impl<'a> Jog<'a> {
         self.position()
     }
 
+    /// What the robot has to say besides its samples, such as the force that carries the arm.
+    pub fn take_notes(&mut self) -> Vec<String> {
+        self.indenter.take_notes()
+    }
+
     /// Takes the path of the tip since the last call, a sample every 100 ms.
     pub fn take_trace(&mut self) -> Vec<PoseSample> {
         std::mem::take(&mut self.trace)

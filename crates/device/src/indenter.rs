@@ -98,6 +98,9 @@ pub trait Indenter: Send {
     /// # Errors
     /// [`DeviceError::Lost`]; the motors are then off by the device's own watchdog.
     fn disarm(&mut self) -> Result<(), DeviceError>;
+
+    /// Appends what the operator should know and no sample says, such as the force that carries the arm.
+    fn take_notes(&mut self, _notes: &mut Vec<String>) {}
 }
 
 /// Whoever holds one for a while may lend it on.
@@ -132,5 +135,9 @@ impl<T: Indenter + ?Sized> Indenter for &mut T {
 
     fn disarm(&mut self) -> Result<(), DeviceError> {
         (**self).disarm()
+    }
+
+    fn take_notes(&mut self, notes: &mut Vec<String>) {
+        (**self).take_notes(notes);
     }
 }

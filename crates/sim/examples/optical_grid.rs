@@ -108,6 +108,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             skin_rows: CROP[id.index()],
             tip_side_mm: 10.0,
             skin_thickness_mm: 4.0,
+            contacts: skinrig_sim::contacts::Contacts::default(),
         })
     });
     println!(

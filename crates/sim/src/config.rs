@@ -1,10 +1,11 @@
 //! Every constant of a simulated rig, with documented defaults.
 
 use skinrig_model::{
-    CameraId, CameraModel, LensModel, Point3, RigidTransform, Robot, SimLevel, Skin, SkinOutline,
-    StereoGeometry,
+    CameraId, CameraModel, LensModel, Point2, Point3, RigidTransform, Robot, SimLevel, Skin,
+    SkinOutline, StereoGeometry,
 };
 
+use crate::contacts::Contacts;
 use crate::faults::Fault;
 use crate::geometric::GeometricConfig;
 use crate::motion::MotionConfig;
@@ -133,6 +134,8 @@ pub struct SimConfig {
     pub trigger_box: TriggerBoxConfig,
     /// Rates and spreads of the geometric level.
     pub geometric: GeometricConfig,
+    /// Where the tip touched the skin before this rig began, skin frame: a further leg of a run goes on with them.
+    pub pressed_before: Vec<Point2>,
     /// What goes wrong.
     pub faults: Vec<Fault>,
 }
@@ -142,8 +145,8 @@ pub struct SimConfig {
 pub const DRAWN: StereoGeometry = {
     const fn camera(y_mm: f64) -> CameraModel {
         CameraModel {
-            position: skinrig_model::Point2::new(45.0, y_mm),
-            aim: skinrig_model::Point2::new(10.0, 2.0),
+            position: Point2::new(45.0, y_mm),
+            aim: Point2::new(10.0, 2.0),
             skew_deg: 0.0,
             lens: LensModel::Exponential {
                 half_fov_deg: 60.0,
@@ -180,6 +183,7 @@ impl SimConfig {
             camera_clock: CameraClockConfig::default(),
             trigger_box: TriggerBoxConfig::default(),
             geometric: GeometricConfig::default(),
+            pressed_before: Vec::new(),
             faults: Vec::new(),
         }
     }
@@ -214,6 +218,7 @@ impl SimConfig {
             skin_rows: self.skin_rows[camera.index()],
             tip_side_mm: self.tip_side_mm,
             skin_thickness_mm: self.skin_thickness_mm,
+            contacts: Contacts::after(&self.pressed_before),
         }
     }
 }

@@ -44,7 +44,7 @@ pub struct GeometricConfig {
     pub dead_share: f64,
     /// Half width of the uniform variation of a contact's strength about 1.
     pub strength_spread: f64,
-    /// Contacts, counted from 0, that are dead whatever is drawn (fault injection).
+    /// Contacts, counted from 0 over all places, that are dead whatever is drawn (fault injection).
     pub dead_contacts: Vec<u32>,
 }
 
@@ -106,12 +106,10 @@ pub struct GeometricModel {
     scene: SceneConfig,
     table: ColumnTable,
     events: Stream,
-    contacts: Stream,
     hot: Vec<(u16, u16)>,
     hot_hz: f64,
     sites: Vec<Site>,
     touching: bool,
-    contact_count: u32,
     /// Expected events until the next one.
     due: f64,
     last: Option<TipSample>,
@@ -138,18 +136,15 @@ impl GeometricModel {
     /// The model of one camera.
     #[must_use]
     pub fn new(scene: &SceneConfig, config: &GeometricConfig) -> Self {
-        let mut contacts = Stream::new(scene.seed, Purpose::Pixels, 1);
+        let mut pixels = Stream::new(scene.seed, Purpose::Pixels, 1);
         let mut events = Stream::new(scene.seed_of_start(), Purpose::Pixels, 2);
         let hot = (0..config.hot_pixels)
             .map(|_| {
-                let x = contacts.between(0.0, f64::from(SENSOR_WIDTH)) as u16;
-                let y = contacts.between(0.0, f64::from(SENSOR_HEIGHT)) as u16;
+                let x = pixels.between(0.0, f64::from(SENSOR_WIDTH)) as u16;
+                let y = pixels.between(0.0, f64::from(SENSOR_HEIGHT)) as u16;
                 (x, y)
             })
             .collect();
-        if scene.start > 0 {
-            contacts = Stream::new(scene.seed_of_start(), Purpose::Pixels, 1);
-        }
         let hot_hz = (1..=config.hot_pixels)
             .map(|k| config.hottest_hz / k as f64)
             .sum();
@@ -158,12 +153,10 @@ impl GeometricModel {
             scene: scene.clone(),
             due: events.exponential(),
             events,
-            contacts,
             hot,
             hot_hz,
             sites: Vec::new(),
             touching: false,
-            contact_count: 0,
             last: None,
             decay: libm::exp(-(GRID_NS as f64 * 1e-9) / config.relax_s),
             config: config.clone(),
@@ -172,11 +165,10 @@ impl GeometricModel {
 
     fn begin_contact(&mut self, at: Point2) {
         let c = &self.config;
-        let chance = self.contacts.unit();
-        let strength = 1.0 + self.contacts.between(-c.strength_spread, c.strength_spread);
-        let number = self.contact_count;
-        self.contact_count += 1;
-        let dead = chance < c.dead_share || c.dead_contacts.contains(&number);
+        let contact = self.scene.contacts.next(at);
+        let mut drawn = contact.random(self.scene.seed);
+        let dead = drawn.unit() < c.dead_share || c.dead_contacts.contains(&contact.number);
+        let strength = 1.0 + drawn.between(-c.strength_spread, c.strength_spread);
         let distance = self.scene.camera.position.distance_mm(at);
         let falloff = (c.reference_mm + c.fall_off_mm) / (distance + c.fall_off_mm);
         let visible = self.table.column(at).is_some() && self.scene.outline.contains(at);

@@ -10,6 +10,7 @@ mod camera_stream;
 pub mod clock;
 pub mod columns;
 pub mod config;
+pub mod contacts;
 pub mod drifting;
 pub mod faults;
 pub mod geometric;

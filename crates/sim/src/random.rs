@@ -18,6 +18,8 @@ pub enum Purpose {
     CameraClock = 10,
     /// Pixels of camera 1 (camera 2: the next).
     Pixels = 20,
+    /// What a contact of the tip with the skin is like, by place and number.
+    Contacts = 30,
 }
 
 /// The seed of a stream: `seed` and purpose mixed (SplitMix64's finaliser), `index` tells instances apart.

@@ -11,8 +11,7 @@ use crate::geometric::GeometricModel;
 use crate::held_up::HeldUp;
 use crate::indenter::SimIndenter;
 use crate::optical::OpticalModel;
-use crate::random::{Purpose, derive_seed};
-use crate::scene::PixelModel;
+use crate::scene::{PixelModel, SceneConfig};
 use crate::trigger::SimTriggerBox;
 use crate::world::Shared;
 
@@ -70,10 +69,10 @@ fn pixel_factory(config: &SimConfig, id: CameraId) -> PixelFactory {
         }
     }
     Box::new(move |start| -> Option<Box<dyn PixelModel>> {
-        let mut scene = scene.clone();
-        if start > 0 {
-            scene.seed = derive_seed(scene.seed, Purpose::Pixels, 1_000 + start);
-        }
+        let scene = SceneConfig {
+            start,
+            ..scene.clone()
+        };
         match level {
             SimLevel::Kinematic => None,
             SimLevel::Geometric => Some(Box::new(GeometricModel::new(&scene, &geometric))),

@@ -5,6 +5,7 @@
 
 use skinrig_model::{CameraId, CameraModel, Point3, Polarity, Skin, SkinOutline};
 
+use crate::contacts::Contacts;
 use crate::random::{Purpose, derive_seed};
 
 /// Where the tip was. Samples lie on a grid of [`GRID_NS`]; the tip moves linearly between two of them.
@@ -63,6 +64,8 @@ pub struct SceneConfig {
     pub tip_side_mm: f64,
     /// Thickness of the skin, mm (paper: 4).
     pub skin_thickness_mm: f64,
+    /// Where the tip touched the skin so far. Models made of clones of this go on with it.
+    pub contacts: Contacts,
 }
 
 impl SceneConfig {

@@ -36,7 +36,7 @@ impl Verdict {
 /// One check and how it ended.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub(super) struct Finding {
-    /// `permissions`, `cables`, `USB speed`, `versions`, `disk`, `real time`, `power`, `clock` or `bench`.
+    /// `rig file`, `permissions`, `cables`, `USB speed`, `versions`, `disk`, `real time`, `power`, `clock` or `bench`.
     pub area: &'static str,
     /// What was checked.
     pub check: String,

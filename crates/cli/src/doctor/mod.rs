@@ -9,6 +9,7 @@ mod cables;
 mod clock;
 mod disk;
 mod finding;
+mod inputs;
 mod machine;
 mod permissions;
 mod power;
@@ -28,6 +29,7 @@ use skinrig_protocol::rig::RigFile;
 use crate::exit::{Exit, Outcome};
 use crate::hil::lease;
 use crate::rig::bench as rig_bench;
+use crate::rig::inputs::{self as rig_inputs, Input};
 use finding::{Finding, Verdict};
 use machine::Machine;
 use survey::Survey;
@@ -48,6 +50,8 @@ pub struct DoctorArgs {
 struct Case<'a> {
     machine: &'a Machine,
     rig: Option<&'a RigFile>,
+    /// What the rig file names on this computer.
+    inputs: &'a [Input],
     survey: &'a Survey,
     sessions: &'a Path,
     /// The file of the bench's lease.
@@ -70,6 +74,7 @@ pub fn doctor(args: &DoctorArgs, json: bool) -> Outcome {
     let findings = examine(&Case {
         machine: &Machine::this(),
         rig: rig.as_ref(),
+        inputs: &rig.as_ref().map(rig_inputs::all).unwrap_or_default(),
         survey: &survey,
         sessions: &args.sessions,
         lease: lease.as_deref(),
@@ -88,7 +93,8 @@ pub fn doctor(args: &DoctorArgs, json: bool) -> Outcome {
 
 /// Everything, in the order in which it is told.
 fn examine(case: &Case<'_>) -> Vec<Finding> {
-    let mut findings = permissions::findings(case);
+    let mut findings = inputs::findings(case);
+    findings.extend(permissions::findings(case));
     findings.extend(cables::findings(case));
     findings.extend(versions::findings(case));
     findings.extend(disk::findings(case));

@@ -22,7 +22,7 @@ use super::trend::After;
 use super::{folder, lease, trend};
 use crate::check;
 use crate::exit::{Exit, Failure, Outcome};
-use crate::rig::bench;
+use crate::rig::{bench, inputs};
 use crate::run::host_name;
 use crate::signals::Operator;
 
@@ -36,6 +36,7 @@ pub fn run(args: &HilRunArgs, command_line: &str, json: bool) -> Outcome {
     let suite = load(&args.suite)?;
     let rig = bench::load(&args.rig)?;
     bench::refuse_without_sample(&rig)?;
+    inputs::check(&rig)?;
     known_checks(&suite, args.only.as_deref())?;
     let clock = RealClock::start();
     let tonight = Tonight {

@@ -220,6 +220,10 @@ pub fn jog(args: &JogArgs) -> Outcome {
         log.line(table.jog.now(), "limit", &words);
         outln!("limit     {words} (--beyond-frame for a skin that lies lower)");
     }
+    for note in table.jog.take_notes() {
+        log.line(table.jog.now(), "note", &note);
+        outln!("note      {note}");
+    }
     let outcome = table.listen(&mut log);
     let ended = table.jog.finish();
     log.path_of_tip(&table.jog.take_trace());

@@ -12,7 +12,7 @@ use skinrig_evk1::biases::parse_bias_file;
 use skinrig_evk1::{Evk1, Evk1Config, Evk1Error};
 use skinrig_model::{CameraId, HostDuration, RigGeometry, SkinOutline, StereoGeometry};
 use skinrig_omega3::axes::{Axes, Axis};
-use skinrig_omega3::config::{Initialise, SupervisorCommand, Watchdog};
+use skinrig_omega3::config::{Initialise, RedundantEncoders, SupervisorCommand, Watchdog};
 use skinrig_omega3::{Omega, OmegaConfig, OmegaError};
 use skinrig_protocol::Protocol;
 use skinrig_protocol::rig::{BoxSetup, CameraSetup, RigFile, RigKind, SyncRole};
@@ -220,6 +220,9 @@ pub(crate) fn omega_config(rig: &RigFile) -> Result<OmegaConfig, Failure> {
     config.watchdog = Watchdog::ArmMilliseconds(f64::from(robot.watchdog_steps) * 0.125);
     if robot.auto_init && robot.sample_is_off {
         config.initialise = Initialise::SampleIsOff;
+    }
+    if robot.needs_redundant_encoders {
+        config.redundant_encoders = RedundantEncoders::Required;
     }
     if robot.supervisor {
         let program = std::env::current_exe()

@@ -3,13 +3,14 @@
 pub mod bench;
 pub mod evt3_camera;
 pub mod gates;
+pub mod inputs;
 pub mod planted;
 
 use std::path::Path;
 
 use skinrig_controller::ControlHandle;
 use skinrig_device::{CameraSettings, Clock, Rig, Roi};
-use skinrig_model::{HostTime, InterruptionKind, RunHeader, SimLevel};
+use skinrig_model::{HostTime, InterruptionKind, Point2, RunHeader, SimLevel};
 use skinrig_protocol::{CameraRequest, PlantedFault, Protocol};
 use skinrig_sim::replay::{RecordedRig, replayed_rig};
 use skinrig_sim::{SimConfig, in_real_time, simulated_rig};
@@ -27,7 +28,23 @@ pub fn simulated(
     real_time: bool,
     faults: &[PlantedFault],
 ) -> Rig {
-    let mut config = SimConfig::new(seed, level);
+    simulated_after(protocol, level, seed, real_time, faults, Vec::new())
+}
+
+/// The same rig for a further leg: its skin was pressed at these places before.
+#[must_use]
+pub fn simulated_after(
+    protocol: &Protocol,
+    level: SimLevel,
+    seed: u64,
+    real_time: bool,
+    faults: &[PlantedFault],
+    pressed_before: Vec<Point2>,
+) -> Rig {
+    let mut config = SimConfig {
+        pressed_before,
+        ..SimConfig::new(seed, level)
+    };
     config.outline = protocol.surroundings.outline;
     config.faults = planted::of_devices(faults);
     let mut rig = simulated_rig(&config);

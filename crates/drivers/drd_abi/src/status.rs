@@ -36,7 +36,7 @@ pub enum StatusField {
     TimeGuard = 11,
     /// The wrist is initialised.
     WristInit = 12,
-    /// Redundant encoders agree.
+    /// 1: redundant encoders agree; 0: they do not, or there are none; -1 on some devices: there are none.
     Redundancy = 13,
     /// Why forces went off last, see [`ForceOffCause`].
     ForceOffCause = 14,

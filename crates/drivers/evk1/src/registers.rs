@@ -206,7 +206,7 @@ pub const ROI_TD_SHADOW_TRIGGER: Field = bit(ROI_CTRL, "roi_td_shadow_trigger", 
 /// Readout of change detection.
 pub const READOUT_CTRL: Register = register("readout_ctrl", 0x0208, 0x4000_0bff);
 /// Readout of the exposure measurement, laid out like [`READOUT_CTRL`].
-pub const ROE_CTRL: Register = register("roe_ctrl", 0x0244, 0x4000_0bff);
+pub const ROE_CTRL: Register = register("roe_ctrl", 0x0244, 0x4000_03ff);
 
 /// `ro_act_pdy_ctrl` of [`READOUT_CTRL`] or [`ROE_CTRL`].
 #[must_use]

@@ -28,6 +28,8 @@ pub struct OmegaConfig {
     pub watchdog: Watchdog,
     /// Whether the robot may initialise itself, which moves the arm through its workspace.
     pub initialise: Initialise,
+    /// What a robot must report of redundant encoders.
+    pub redundant_encoders: RedundantEncoders,
     /// The process that brakes the arm when this one dies.
     pub supervisor: Option<SupervisorCommand>,
     /// How long calls and procedures may take.
@@ -47,6 +49,7 @@ impl Default for OmegaConfig {
             trips: Trips::default(),
             watchdog: Watchdog::ArmMilliseconds(10.0),
             initialise: Initialise::Never,
+            redundant_encoders: RedundantEncoders::Reported,
             supervisor: None,
             patience: Patience::default(),
         }
@@ -249,6 +252,16 @@ pub enum Initialise {
     Never,
     /// The sample and the tools are off the bench, hands are clear: the arm may move through its whole workspace.
     SampleIsOff,
+}
+
+/// What a robot must report of redundant encoders (word 13 of the status vector). By public texts derived from the vendor's, 0 means
+/// that their check failed *or that there are none*; some devices report -1 for none. An omega.3 is not documented to have any.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RedundantEncoders {
+    /// Whatever it reports is accepted and recorded; 0 also becomes a remark.
+    Reported,
+    /// 1 is required: for a robot that is known to have them.
+    Required,
 }
 
 /// The command that runs [`crate::supervisor::supervise`] on its standard input.

@@ -171,4 +171,8 @@ impl Indenter for Omega {
     fn disarm(&mut self) -> Result<(), DeviceError> {
         self.owner.disarm()
     }
+
+    fn take_notes(&mut self, notes: &mut Vec<String>) {
+        self.stream.take_notes(notes);
+    }
 }

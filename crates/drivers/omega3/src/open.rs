@@ -3,12 +3,12 @@
 
 use skinrig_drd_abi::{
     DEVICE_OMEGA3, DEVICE_OMEGA3_UNLISTED, DeviceId, ErrorCode, ForceOffCause, StatusField,
-    WATCHDOG_UNIT_US,
+    StatusVector, WATCHDOG_UNIT_US,
 };
 use skinrig_model::Setting;
 
 use crate::brake::brake;
-use crate::config::{Initialise, OmegaConfig, Patience, Watchdog};
+use crate::config::{Initialise, OmegaConfig, Patience, RedundantEncoders, Watchdog};
 use crate::enumerate::{self, Found};
 use crate::error::OmegaError;
 use crate::sdk::{Answer, CallError, Quantity, Sdk};
@@ -24,6 +24,8 @@ pub struct Opened {
     pub model: String,
     /// Version of its controller's firmware.
     pub firmware: String,
+    /// Mass that gravity compensation carries, kg; `None` when the library does not tell it.
+    pub effector_mass_kg: Option<f64>,
     /// What was set or read, for the record of the session.
     pub settings: Vec<Setting>,
     /// What the operator should know.
@@ -55,6 +57,7 @@ pub fn open(
         serial: serial.clone(),
         model: found.model.unwrap_or_else(|| "omega.3".to_owned()),
         firmware: String::new(),
+        effector_mass_kg: config.mount.effector_mass_kg,
         settings: Vec::new(),
         remarks: Vec::new(),
     };
@@ -232,10 +235,7 @@ impl Procedure<'_> {
             let next = "power-cycle the robot; if it stays, have it serviced";
             return self.unfit("no fault", "its controller reports one", next);
         }
-        if status.get(StatusField::Redundancy) == Some(0) {
-            let next = "have the robot serviced";
-            return self.unfit("encoders that agree", "redundant ones that do not", next);
-        }
+        self.check_redundancy(opened, &status)?;
         if status.is(StatusField::Force) {
             // Left behind by a program that died.
             let wait = std::thread::sleep;
@@ -259,6 +259,35 @@ impl Procedure<'_> {
         Ok(())
     }
 
+    /// 0 does not tell encoders that disagree from a robot without redundant ones: only a robot that is known to have them
+    /// is refused for it.
+    fn check_redundancy(
+        &self,
+        opened: &mut Opened,
+        status: &StatusVector,
+    ) -> Result<(), OmegaError> {
+        let word = status.get(StatusField::Redundancy);
+        let found = word.map_or_else(|| "not reported".to_owned(), |word| word.to_string());
+        opened.settings.push(seen("redundant_encoders", &found));
+        match (self.config.redundant_encoders, word) {
+            (RedundantEncoders::Required, Some(1)) => Ok(()),
+            (RedundantEncoders::Required, _) => self.unfit(
+                "redundant encoders that agree (status word 13: 1)",
+                format!("status word 13: {found}"),
+                "have the robot serviced; a robot that never reported 1 has none: write `redundant_encoders: reported` in the rig file",
+            ),
+            (RedundantEncoders::Reported, Some(0)) => {
+                opened.remarks.push(
+                    "status word 13 is 0: no redundant encoders, or their check failed; if this robot reported 1 before, have it \
+                     serviced and write `redundant_encoders: required` in the rig file"
+                        .to_owned(),
+                );
+                Ok(())
+            }
+            (RedundantEncoders::Reported, _) => Ok(()),
+        }
+    }
+
     fn mount(&self, opened: &mut Opened) -> Result<(), OmegaError> {
         let mount = &self.config.mount;
         let angle = mount.device_angle_deg;
@@ -272,6 +301,7 @@ impl Procedure<'_> {
             None => {
                 if let Some(mass) = self.sdk.get(self.id, Quantity::EffectorMassKg) {
                     let mass = self.call("read its effector's mass", mass)?;
+                    opened.effector_mass_kg = Some(mass);
                     opened
                         .settings
                         .push(seen(Quantity::EffectorMassKg.name(), mass));

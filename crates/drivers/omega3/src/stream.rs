@@ -19,6 +19,7 @@ struct Inside {
     dropped: u64,
     failure: Option<DeviceError>,
     watched: bool,
+    notes: Vec<String>,
 }
 
 impl Stream {
@@ -50,6 +51,16 @@ impl Stream {
     /// The failure.
     pub(crate) fn failure(&self) -> Option<DeviceError> {
         self.lock().failure.clone()
+    }
+
+    /// Something that the operator should know.
+    pub(crate) fn note(&self, note: String) {
+        self.lock().notes.push(note);
+    }
+
+    /// Moves all notes to the end of `into`.
+    pub(crate) fn take_notes(&self, into: &mut Vec<String>) {
+        into.append(&mut self.lock().notes);
     }
 
     /// Somebody looks after the robot.

@@ -170,6 +170,8 @@ pub struct RobotSetup {
     pub auto_init: bool,
     /// The sample is off.
     pub sample_is_off: bool,
+    /// The robot must report redundant encoders that agree.
+    pub needs_redundant_encoders: bool,
     /// Which axes of the device the robot frame's axes are: `+x` to `-z`, right-handed.
     pub axes: [&'static str; 3],
     /// Tip force per share of the motors' torque, N.

@@ -124,6 +124,7 @@ pub(super) fn robot(
         velocity_threshold: f.count("velocity_threshold"),
         auto_init: auto_init?,
         sample_is_off: sample_is_off?,
+        needs_redundant_encoders: f.word("redundant_encoders")? == "required",
         axes: axes?,
         force_per_ratio_n: force.quantity("per_ratio")?,
         gravity_ratio: force.number("gravity_ratio")?,

@@ -6,6 +6,7 @@ use proptest::prelude::*;
 use skinrig_model::{CameraId, Point2, Point3, Polarity, SkinOutline, StereoGeometry};
 
 use super::{OpticalConfig, OpticalModel};
+use crate::contacts::Contacts;
 use crate::scene::{GRID_NS, PixelEvent, PixelModel, SceneConfig, TipSample};
 
 fn scene(id: CameraId) -> SceneConfig {
@@ -18,6 +19,7 @@ fn scene(id: CameraId) -> SceneConfig {
         skin_rows: [(185, 360), (200, 355)][id.index()],
         tip_side_mm: 10.0,
         skin_thickness_mm: 4.0,
+        contacts: Contacts::default(),
     }
 }
 

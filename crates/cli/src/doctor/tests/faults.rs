@@ -4,7 +4,7 @@ use std::fs;
 
 use super::super::finding::Verdict;
 use super::super::survey::Library;
-use super::{Bench, CAMERA_1, CAMERA_2, ROBOT_NODE};
+use super::{Bench, CAMERA_1, CAMERA_2, ROBOT_NODE, lamp};
 
 pub(super) type Fault = (
     &'static str,
@@ -15,6 +15,12 @@ pub(super) type Fault = (
 
 /// A fault, the only finding that it makes, and words of the next step.
 pub(super) const FAULTS: &[Fault] = &[
+    (
+        "the lamps' program is not there",
+        |b| b.inputs = vec![lamp(Err("`/usr/local/bin/lamp`: No such file"))],
+        ("rig file", "hil.light.dark", Verdict::Problem),
+        "name a program",
+    ),
     (
         "run by root",
         |b| {

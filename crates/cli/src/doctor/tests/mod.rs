@@ -15,6 +15,7 @@ use super::machine::Machine;
 use super::survey::{Library, Survey};
 use super::*;
 use crate::devices::Line;
+use crate::rig::inputs::Input;
 use faults::FAULTS;
 
 const RIG: &str = include_str!("../../../../../hil/rigs/bench.example.yaml");
@@ -28,6 +29,7 @@ struct Bench {
     folder: TempDir,
     survey: Survey,
     rig: Option<RigFile>,
+    inputs: Vec<Input>,
     free_b: fn(&Path) -> Result<f64, String>,
 }
 
@@ -84,6 +86,7 @@ impl Bench {
         examine(&Case {
             machine: &machine,
             rig: self.rig.as_ref(),
+            inputs: &self.inputs,
             survey: &self.survey,
             sessions: &self.path("sessions"),
             lease: Some(&self.path(LEASE)),
@@ -96,6 +99,16 @@ impl Bench {
         all.filter(|f| matches!(f.verdict, Verdict::Problem | Verdict::Warning))
             .map(|f| (f.area, f.check, f.verdict))
             .collect()
+    }
+}
+
+/// The program that switches the lamps off, as it is found.
+fn lamp(found: Result<&str, &str>) -> Input {
+    Input {
+        key: "hil.light.dark".to_owned(),
+        expected: "a program that this user may run".to_owned(),
+        found: found.map(str::to_owned).map_err(str::to_owned),
+        next: "name a program that is there".to_owned(),
     }
 }
 
@@ -140,6 +153,7 @@ fn healthy() -> Bench {
             left_alone: false,
         },
         rig: RigFile::parse("rig.yaml", rig.as_bytes(), &|_| None).ok(),
+        inputs: vec![lamp(Ok("/usr/local/bin/lamp"))],
         free_b: |_| Ok(500e9),
     };
     fs::create_dir(b.path("sessions")).unwrap();
@@ -277,6 +291,7 @@ fn an_empty_machine_is_not_checked_and_says_why() {
     let mut bench = healthy();
     bench.folder = tempfile::tempdir().unwrap();
     bench.rig = None;
+    bench.inputs.clear();
     bench.survey.lines.clear();
     bench.survey.library = Library::Absent(6);
     bench.free_b = |_| Err("no such call".to_owned());

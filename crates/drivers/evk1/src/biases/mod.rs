@@ -86,7 +86,7 @@ impl Bias {
     /// The register's word for `mv`.
     ///
     /// # Errors
-    /// [`Evk1Error::Refused`] outside the range, or where the code is not public.
+    /// [`Evk1Error::Refused`] outside the range.
     pub fn encode(&self, mv: i64) -> Result<u32, Evk1Error> {
         if !self.range_mv.contains(&mv) {
             let (low, high) = (self.range_mv.start(), self.range_mv.end());
@@ -106,32 +106,18 @@ impl Bias {
                 let steps = tables::RAIL_P_FROM_MV.partition_point(|&from| from <= mv);
                 RAIL_P | (127 - steps as u32) << 8
             }
-            Dac::PThick => self.p_thick(mv)?,
+            Dac::PThick => Self::p_thick(mv),
             Dac::NThin => P_PLAIN | code(&tables::N_THIN_CODES, tables::N_THIN_FIRST_MV, mv) << 8,
         })
     }
 
-    fn p_thick(&self, mv: i64) -> Result<u32, Evk1Error> {
-        if mv < tables::P_THICK_FIRST_MV {
-            let known = tables::P_THICK_LOW.map(|(mv, _)| mv.to_string()).join(", ");
-            return match tables::P_THICK_LOW.iter().find(|(at, _)| *at == mv) {
-                Some(&(_, code)) => Ok(P_CASCODE | u32::from(code) << 8),
-                None => Err(Evk1Error::refused(
-                    format!(
-                        "{} of {} mV or more, or one of the values below with a public code: {known} mV",
-                        self.name,
-                        tables::P_THICK_FIRST_MV
-                    ),
-                    format!("{mv} mV"),
-                )),
-            };
-        }
+    fn p_thick(mv: i64) -> u32 {
         let mode = if mv < tables::P_THICK_NO_CASCODE_MV {
             P_CASCODE
         } else {
             P_PLAIN
         };
-        Ok(mode | code(&tables::P_THICK_CODES, tables::P_THICK_FIRST_MV, mv) << 8)
+        mode | code(&tables::P_THICK_CODES, tables::P_THICK_FIRST_MV, mv) << 8
     }
 }
 
@@ -297,10 +283,21 @@ mod tests {
         assert_eq!(word("bias_refr", 1653), 0x5100_0000);
     }
 
+    /// Values at which a table of single points, and not of every millivolt, would guess.
     #[test]
-    fn a_value_without_a_public_code_is_refused() {
-        let error = named("bias_hpf").unwrap().encode(901).unwrap_err();
-        assert!(error.to_string().contains("900, 908, 920"), "{error}");
+    fn every_millivolt_of_every_range_has_a_code() {
+        for bias in &BIASES {
+            for mv in bias.range_mv.clone() {
+                bias.encode(mv).unwrap();
+            }
+            for mv in [bias.range_mv.start() - 1, bias.range_mv.end() + 1] {
+                assert!(bias.encode(mv).is_err(), "{} {mv} mV", bias.name);
+            }
+        }
+        assert_eq!(word("bias_hpf", 901), 0x4100_8300);
+        assert_eq!(word("bias_hpf", 907), 0x4100_7f00);
+        assert_eq!(word("bias_hpf", 947), 0x4100_5000);
+        assert_eq!(word("bias_hpf", 974), 0x4100_3c00);
     }
 
     #[test]
@@ -360,8 +357,8 @@ expected a bias out of bias_diff, bias_diff_off, bias_diff_on, bias_fo, bias_hpf
         for (name, range) in [
             ("bias_diff_on", 0..=1800),
             ("bias_fo", 1250..=1800),
-            ("bias_pr", 975..=1157),
-            ("bias_pr", 1158..=1800),
+            ("bias_hpf", 900..=1157),
+            ("bias_hpf", 1158..=1800),
             ("bias_refr", 1300..=1800),
         ] {
             let rising = name == "bias_diff_on";

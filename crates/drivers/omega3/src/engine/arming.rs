@@ -7,12 +7,44 @@ use skinrig_drd_abi::{ForceOffCause, StatusField};
 
 use super::armed::{Armed, Tare};
 use super::{CONTROL_EVERY, Engine, STATUS_EVERY, State, span};
+use crate::config::Envelope;
 use crate::correction::Correction;
 use crate::monitor::{Freshness, Monitor, Trip};
 use crate::regulation;
 use crate::supervisor::Supervisor;
-use crate::trajectory::Trajectory;
+use crate::trajectory::{Trajectory, norm};
 use crate::weighing::Weighing;
+
+/// Standard gravity, m/s².
+const GRAVITY_M_S2: f64 = 9.806_65;
+
+/// The share of the motors' torque that carries the arm at rest: gravity compensation, which the library leaves out of the force that it
+/// reports (public text derived from the vendor's), and what is reported beside it.
+fn carries(envelope: &Envelope, mass_kg: Option<f64>, reported_n: f64) -> String {
+    let Some(mass_kg) = mass_kg else {
+        return format!(
+            "at rest the motors push with {reported_n:.2} N besides gravity compensation, whose mass this library does not tell"
+        );
+    };
+    let compensation_n = mass_kg * GRAVITY_M_S2;
+    let share = (compensation_n + reported_n) / envelope.n_per_ratio;
+    format!(
+        "gravity compensation carries {compensation_n:.2} N (effector mass {mass_kg} kg), the motors push with {reported_n:.2} N \
+         more at rest: gravity_ratio {share:.3} at {} N per ratio; the rig file says {}",
+        envelope.n_per_ratio, envelope.gravity_ratio
+    )
+}
+
+/// Which cap the arm was held with, and what to do when that is too little to carry it.
+fn cap(envelope: &Envelope, limits: &MotionLimits) -> String {
+    format!(
+        "Its motors may use {:.3} of their torque: if the arm sinks with that, raise `limits.max_force` ({} N) or settle \
+         `robot.motor_force.gravity_ratio` ({}), docs/first-contact.md",
+        envelope.ratio_of(limits.max_force_n),
+        limits.max_force_n,
+        envelope.gravity_ratio
+    )
+}
 
 impl<C: Clock> Engine<C> {
     /// Powers the motors, waits until the regulation runs at full rate, and takes the force at rest as zero.
@@ -42,18 +74,36 @@ impl<C: Clock> Engine<C> {
             self.clock.wait_until(next);
             self.tick();
             match &self.state {
-                State::Armed(armed) if matches!(armed.tare, Tare::Known(_)) => return Ok(()),
+                State::Armed(armed) if let Tare::Known(carried) = armed.tare => {
+                    let mass = self.opened.effector_mass_kg;
+                    self.stream
+                        .note(carries(&self.config.envelope, mass, norm(carried)));
+                    return Ok(());
+                }
                 State::Armed(_) if self.clock.now() < deadline => {}
                 State::Armed(_) => {
-                    let e = self.wrong_state(
-                        "still, to take the force at rest as zero",
-                        "moving or without new readings; see that the arm hangs free",
+                    let found = format!(
+                        "moving or without new readings; see that the arm hangs free. {}",
+                        cap(&self.config.envelope, &limits)
                     );
+                    let e = self.wrong_state("still, to take the force at rest as zero", found);
                     return Err(self.brake_after(e));
                 }
                 _ => {
                     // The failure is told here, and not again by the next poll.
-                    let failure = self.stream.failure();
+                    let failure = match &self.state {
+                        // Held by too little torque it falls.
+                        State::Tripped(
+                            trip @ (Trip::Deviation { .. }
+                            | Trip::Jump { .. }
+                            | Trip::OutsideBox { .. }),
+                        ) => {
+                            let found =
+                                format!("braked: {trip}. {}", cap(&self.config.envelope, &limits));
+                            Some(self.wrong_state("armed", found))
+                        }
+                        _ => self.stream.failure(),
+                    };
                     if matches!(&self.state, State::Tripped(trip) if !matches!(trip, Trip::NotBraked(_)))
                     {
                         self.state = State::Parked;

@@ -4,7 +4,7 @@ use skinrig_drd_abi::ErrorCode;
 
 use super::scripted::Scripted;
 use crate::OmegaConfig;
-use crate::config::{Initialise, Patience, SupervisorCommand, Watchdog};
+use crate::config::{Initialise, Patience, RedundantEncoders, SupervisorCommand, Watchdog};
 use crate::enumerate;
 use crate::open::open;
 use crate::supervisor::brake_all;
@@ -120,6 +120,46 @@ fn initialisation_needs_word_that_the_sample_is_off_and_ends_braked() {
             .iter()
             .any(|r| r.contains("initialised itself"))
     );
+}
+
+#[test]
+fn redundant_encoders_are_reported_and_required_only_where_the_rig_says_so() {
+    use RedundantEncoders::{Reported, Required};
+    // What status word 13 says: absent in SDKs that write fewer words.
+    for (word, wanted, opens, remarked) in [
+        (Some(1), Reported, true, false),
+        (Some(0), Reported, true, true),
+        (Some(-1), Reported, true, false),
+        (Some(1), Required, true, false),
+        (Some(0), Required, false, false),
+        (Some(-1), Required, false, false),
+    ] {
+        let sdk = Scripted::default();
+        sdk.with(|s| s.status.extend(word.map(|w| (13, w))));
+        let config = OmegaConfig {
+            redundant_encoders: wanted,
+            ..OmegaConfig::default()
+        };
+        match open(&sdk, &config, |_| Ok(())) {
+            Ok(opened) => {
+                assert!(opens, "{word:?} {wanted:?}");
+                let there = opened.remarks.iter().any(|r| r.contains("word 13 is 0"));
+                assert_eq!(there, remarked, "{word:?} {wanted:?}");
+                let recorded = opened.settings.iter().any(|s| {
+                    s.name == "redundant_encoders"
+                        && Some(&s.read_back) == word.map(|w| w.to_string()).as_ref()
+                });
+                assert!(recorded, "{:?}", opened.settings);
+            }
+            Err(e) => {
+                assert!(!opens, "{word:?} {wanted:?}: {e}");
+                assert!(
+                    e.to_string().contains("redundant_encoders: reported"),
+                    "{e}"
+                );
+            }
+        }
+    }
 }
 
 #[test]

@@ -72,6 +72,12 @@ pub(super) static ROBOT: Table = Table {
             "Your word that sample, hands and tools are out of the arm's whole reach.",
         ),
         default(
+            "redundant_encoders",
+            Shape::Choice(REDUNDANT_ENCODERS),
+            "reported",
+            "What the robot must report of redundant encoders: the library says 0 when their check failed and also when there are none.",
+        ),
+        default(
             "motor_force",
             Shape::Map(&MOTOR_FORCE),
             "{}",
@@ -116,6 +122,14 @@ pub(super) static ROBOT: Table = Table {
 };
 
 const ROBOTS: &[Word] = &[("omega3", "Force Dimension omega.3")];
+
+const REDUNDANT_ENCODERS: &[Word] = &[
+    ("reported", "anything; it is recorded, and 0 is remarked"),
+    (
+        "required",
+        "that they agree (1): for a robot that is known to have them",
+    ),
+];
 
 static MOTOR_FORCE: Table = Table {
     name: "motor_force",

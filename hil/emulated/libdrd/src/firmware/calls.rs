@@ -208,7 +208,8 @@ impl World {
             (StatusField::Brake, is(Mode::Brake)),
             (StatusField::Gravity, i32::from(self.settings.gravity)),
             (StatusField::TimeGuard, 1),
-            (StatusField::Redundancy, -1),
+            // "The check failed, or there are none": the word that says least.
+            (StatusField::Redundancy, 0),
             (StatusField::ForceOffCause, self.cause as i32),
             (StatusField::Locks, -1),
         ];

@@ -1,0 +1,16 @@
+//! Whether what the rig file names on this computer is there: bias files, lamp programs.
+
+use super::Case;
+use super::finding::{Finding, check};
+
+/// A finding for each file and program that the rig file names.
+pub(super) fn findings(case: &Case<'_>) -> Vec<Finding> {
+    let found = case.inputs.iter().map(|input| {
+        let check = check("rig file", &input.key, &input.expected);
+        match &input.found {
+            Ok(found) => check.ok(found),
+            Err(found) => check.problem(found, &input.next),
+        }
+    });
+    found.collect()
+}

@@ -1,0 +1,180 @@
+//! What a rig file names on this computer: bias files and lamp programs. Looked at before anything is opened or moved.
+
+use std::path::{Path, PathBuf};
+
+use skinrig_protocol::CameraRequest;
+use skinrig_protocol::rig::RigFile;
+
+use super::bench;
+use crate::exit::Failure;
+
+/// Something that a rig file names, and whether it can be used.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Input {
+    /// The key that names it.
+    pub key: String,
+    /// What has to be there.
+    pub expected: String,
+    /// What is there.
+    pub found: Result<String, String>,
+    /// What to do when it cannot be used.
+    pub next: String,
+}
+
+/// Every bias file and every lamp program of `rig`.
+#[must_use]
+pub fn all(rig: &RigFile) -> Vec<Input> {
+    let mut inputs = Vec::new();
+    for (setup, name) in rig.cameras.iter().zip(["camera1", "camera2"]) {
+        if let Some(file) = &setup.bias_file {
+            let read = bench::camera_settings(setup, &CameraRequest::default());
+            inputs.push(Input {
+                key: format!("cameras.{name}.bias_file"),
+                expected: "a bias file that can be read".to_owned(),
+                found: read
+                    .map(|_| file.display().to_string())
+                    .map_err(|failure| failure.message),
+                next: "correct the path, which is relative to the rig file, or leave the key out"
+                    .to_owned(),
+            });
+        }
+    }
+    if let Some(lamps) = &rig.hil.lamps {
+        for (words, key) in [(&lamps.dark, "dark"), (&lamps.lit, "lit")] {
+            inputs.push(Input {
+                key: format!("hil.light.{key}"),
+                expected: "a program that this user may run".to_owned(),
+                found: program(words, std::env::var_os("PATH").as_deref())
+                    .map(|path| path.display().to_string()),
+                next: "name a program that is there, by its path or by a name in PATH, or leave `hil.light` out"
+                    .to_owned(),
+            });
+        }
+    }
+    inputs
+}
+
+/// Refuses a rig file that names what cannot be used.
+///
+/// # Errors
+/// [`Failure::input`] naming all of it.
+pub fn check(rig: &RigFile) -> Result<(), Failure> {
+    let wrong: Vec<String> = all(rig)
+        .into_iter()
+        .filter_map(|input| {
+            let found = input.found.err()?;
+            Some(format!(
+                "{}: {}: expected {}, found {found}\n  next: {}",
+                rig.file_name, input.key, input.expected, input.next
+            ))
+        })
+        .collect();
+    if wrong.is_empty() {
+        return Ok(());
+    }
+    Err(Failure::input(wrong.join("\n")))
+}
+
+/// The file that running `words` would start, as the system looks for it: a name with a slash is a path, any other one is
+/// looked for in the folders of `path`.
+fn program(words: &[String], path: Option<&std::ffi::OsStr>) -> Result<PathBuf, String> {
+    let Some(name) = words.first().filter(|name| !name.is_empty()) else {
+        return Err("no program".to_owned());
+    };
+    if name.contains('/') {
+        let file = PathBuf::from(name);
+        return runnable(&file).map(|()| file);
+    }
+    let folders = path.map(std::env::split_paths).into_iter().flatten();
+    let mut why = format!("`{name}`, which is in no folder of PATH");
+    for folder in folders {
+        let file = folder.join(name);
+        match runnable(&file) {
+            Ok(()) => return Ok(file),
+            Err(e) if file.is_file() => why = e,
+            Err(_) => {}
+        }
+    }
+    Err(why)
+}
+
+#[cfg(unix)]
+fn runnable(file: &Path) -> Result<(), String> {
+    use rustix::fs::{Access, access};
+
+    let name = file.display();
+    match std::fs::metadata(file) {
+        Err(e) => Err(format!("`{name}`: {e}")),
+        Ok(there) if !there.is_file() => Err(format!("`{name}`, which is no file")),
+        Ok(_) => access(file, Access::EXEC_OK).map_err(|e| format!("`{name}`: {e}")),
+    }
+}
+
+#[cfg(not(unix))]
+fn runnable(file: &Path) -> Result<(), String> {
+    match file.is_file() {
+        true => Ok(()),
+        false => Err(format!("`{}`, which is no file", file.display())),
+    }
+}
+
+#[cfg(test)]
+#[cfg(unix)]
+mod tests {
+    use super::*;
+
+    const EXAMPLE: &str = include_str!("../../../../hil/rigs/bench.example.yaml");
+
+    fn words(program: &str) -> Vec<String> {
+        vec![program.to_owned(), "off".to_owned()]
+    }
+
+    #[test]
+    fn a_program_is_found_as_the_system_finds_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("lamp");
+        let path = Some(folder.path().as_os_str());
+        assert!(program(&words("lamp"), path).unwrap_err().contains("PATH"));
+        std::fs::write(&file, "#!/bin/sh\n").unwrap();
+        set_mode(&file, 0o755);
+        assert_eq!(program(&words("lamp"), path), Ok(file.clone()));
+        assert_eq!(
+            program(&words(&file.display().to_string()), None),
+            Ok(file.clone())
+        );
+        set_mode(&file, 0o644);
+        assert!(
+            program(&words("lamp"), path)
+                .unwrap_err()
+                .contains("denied")
+        );
+        let here = folder.path().display().to_string();
+        assert!(
+            program(&words(&here), path)
+                .unwrap_err()
+                .contains("no file")
+        );
+        assert!(program(&[], path).is_err());
+    }
+
+    fn set_mode(file: &Path, mode: u32) {
+        use std::os::unix::fs::PermissionsExt;
+        std::fs::set_permissions(file, std::fs::Permissions::from_mode(mode)).unwrap();
+    }
+
+    #[test]
+    fn everything_that_is_missing_is_named_with_its_key() {
+        let text = EXAMPLE.replace("/usr/local/bin/lamp", "/nowhere/lamp");
+        let rig = RigFile::parse("rigs/rig.yaml", text.as_bytes(), &|_| None).unwrap();
+        let said = check(&rig).unwrap_err().message;
+        for word in [
+            "rigs/rig.yaml: cameras.camera1.bias_file",
+            "camera1.bias",
+            "hil.light.dark",
+            "hil.light.lit",
+            "/nowhere/lamp",
+        ] {
+            assert!(said.contains(word), "{word} is not in {said}");
+        }
+    }
+}

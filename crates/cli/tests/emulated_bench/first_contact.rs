@@ -1,0 +1,320 @@
+//! Steps 14 to 21 of docs/first-contact.md, as printed, on the emulated bench. Emulated; nobody has seen them on hardware.
+
+use std::fs;
+use std::io::{BufRead, BufReader, Read, Write};
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStdin, Stdio};
+use std::sync::mpsc::{Receiver, channel};
+use std::time::Duration;
+
+use emulated_libdrd::{ArmState, Contact, Mode};
+use skinrig_emulated_bench::{EmulatedBench, Fault, When};
+
+use super::{start, top};
+
+const SKINRIG: &str = env!("CARGO_BIN_EXE_skinrig");
+/// So long an answer may take that has to come; nothing waits longer than it must.
+const PATIENCE: Duration = Duration::from_secs(60);
+/// How far the tip of the stand-in may be from where it was sent, mm.
+const NEAR_MM: f64 = 0.15;
+
+/// A jog under way, its standard input a pipe.
+struct Jog {
+    child: Child,
+    orders: Option<ChildStdin>,
+    lines: Receiver<String>,
+    said: String,
+}
+
+impl Jog {
+    /// `skinrig jog --rig FILE`, up to its first lines.
+    fn start(bench: &EmulatedBench, rig: &Path, log: &Path) -> Self {
+        let mut command = bench.command(SKINRIG).unwrap();
+        command
+            .args(["jog", "--rig"])
+            .arg(rig)
+            .arg("--log")
+            .arg(log);
+        command.stdin(Stdio::piped()).stdout(Stdio::piped());
+        let mut child = command.stderr(Stdio::piped()).spawn().unwrap();
+        let out = BufReader::new(child.stdout.take().unwrap());
+        let (tell, lines) = channel();
+        std::thread::spawn(move || {
+            for line in out.lines().map_while(Result::ok) {
+                if tell.send(line).is_err() {
+                    return;
+                }
+            }
+        });
+        Self {
+            orders: child.stdin.take(),
+            child,
+            lines,
+            said: String::new(),
+        }
+    }
+
+    fn tell(&mut self, order: &str) {
+        writeln!(self.orders.as_mut().unwrap(), "{order}").unwrap();
+    }
+
+    /// The next line that begins so.
+    fn hear(&mut self, beginning: &str) -> String {
+        loop {
+            let line = self.lines.recv_timeout(PATIENCE);
+            let line = line.unwrap_or_else(|e| panic!("{beginning}: {e}: {}", self.rest()));
+            self.said += &format!("{line}\n");
+            if line.starts_with(beginning) {
+                return line;
+            }
+        }
+    }
+
+    fn rest(&mut self) -> String {
+        self.orders = None;
+        let mut errors = String::new();
+        if let Some(mut stderr) = self.child.stderr.take() {
+            stderr.read_to_string(&mut errors).unwrap();
+        }
+        format!("{}{errors}", self.said)
+    }
+
+    /// Gives an order and returns where the tip then is by the robot, mm.
+    fn at(&mut self, order: &str) -> [f64; 3] {
+        self.tell(order);
+        let line = self.hear("at ");
+        let (_, inside) = line.split_once('(').unwrap();
+        let numbers = inside.split_once(')').unwrap().0.split(", ");
+        let numbers: Vec<f64> = numbers.map(|n| n.parse().unwrap()).collect();
+        numbers.try_into().unwrap()
+    }
+
+    /// The end: exit code, and everything said.
+    fn end(mut self) -> (Option<i32>, String) {
+        let rest = self.rest();
+        let code = self.child.wait().unwrap().code();
+        let more: Vec<String> = self.lines.iter().collect();
+        (code, format!("{rest}{}", more.join("\n")))
+    }
+}
+
+/// The bench, and the copy of its rig file that the steps edit.
+struct Steps {
+    bench: EmulatedBench,
+    folder: tempfile::TempDir,
+    jogs: usize,
+}
+
+impl Steps {
+    fn rig(&self) -> PathBuf {
+        self.folder.path().join("NAME.yaml")
+    }
+
+    /// Step 14: limits about where the arm is, in the middle of its reach.
+    fn write_rig(&self, max_force: &str, gravity_ratio: &str) {
+        let text = fs::read_to_string(top().join("hil/rigs/emulated.yaml")).unwrap();
+        let workspace = "workspace: {min: [-70 mm, -70 mm, -30 mm], max: [70 mm, 70 mm, 40 mm]}";
+        let lines = [
+            (
+                workspace,
+                "workspace: {min: [-10 mm, -20 mm, -25 mm], max: [30 mm, 20 mm, 40 mm]}",
+            ),
+            ("max_speed: 100 mm/s", "max_speed: 10 mm/s"),
+            ("max_force: 8 N", &format!("max_force: {max_force}")),
+            (
+                "gravity_ratio: 0.1",
+                &format!("gravity_ratio: {gravity_ratio}"),
+            ),
+        ];
+        let text = lines.into_iter().fold(text, |text, (from, to)| {
+            assert!(text.contains(from), "{from}");
+            text.replace(from, to)
+        });
+        fs::write(self.rig(), text).unwrap();
+    }
+
+    fn jog(&mut self) -> Jog {
+        self.jogs += 1;
+        let log = self.folder.path().join(format!("{}.log", self.jogs));
+        Jog::start(&self.bench, &self.rig(), &log)
+    }
+
+    /// Puts the arm into the middle by hand.
+    fn middle(&self) {
+        self.bench.arm().clear_faults().unwrap();
+        self.bench.arm().place([0.01, 0.0, 0.01]).unwrap();
+    }
+
+    /// Waits until the arm goes soft.
+    fn soft(&self) {
+        let soft = self
+            .bench
+            .arm()
+            .wait_until(PATIENCE, |s| s.mode != Mode::Force);
+        soft.unwrap();
+    }
+
+    fn tip_mm(&self) -> [f64; 3] {
+        self.bench
+            .arm()
+            .state()
+            .unwrap()
+            .position_m
+            .map(|m| 1e3 * m)
+    }
+
+    /// A jog in the middle of a slow way up.
+    fn on_the_way_up(&mut self) -> Jog {
+        self.middle();
+        let mut jog = self.jog();
+        jog.tell("speed 2mm/s");
+        jog.hear("speed");
+        let from_m = self.tip_mm()[2] * 1e-3;
+        jog.tell("z +20mm");
+        let rises = |s: &ArmState| s.position_m[2] > from_m + 0.001;
+        self.bench.arm().wait_until(PATIENCE, rises).unwrap();
+        jog
+    }
+}
+
+#[test]
+fn the_steps_of_a_first_contact_show_what_they_must() {
+    let Some((_alone, bench)) = start() else {
+        return;
+    };
+    let mut steps = Steps {
+        bench,
+        folder: tempfile::tempdir().unwrap(),
+        jogs: 0,
+    };
+    the_share_of_gravity(&mut steps);
+    axes_and_rest(&mut steps);
+    button_and_cable(&mut steps);
+    a_program_that_dies_or_hangs(&mut steps);
+    a_hand(&mut steps);
+}
+
+/// Step 14: with 1 N this arm does not hold, jog says what to do, and that works.
+fn the_share_of_gravity(steps: &mut Steps) {
+    steps.middle();
+    steps.write_rig("1 N", "0");
+    let (code, said) = steps.jog().end();
+    assert_eq!(code, Some(3), "{said}");
+    for word in ["limits.max_force", "motor_force.gravity_ratio"] {
+        assert!(said.contains(word), "{word}: {said}");
+    }
+    steps.soft();
+    steps.middle();
+    steps.write_rig("3 N", "0");
+    let mut jog = steps.jog();
+    let note = jog.hear("note ");
+    let (_, ratio) = note.split_once("gravity_ratio ").unwrap();
+    let ratio: f64 = ratio.split_once(' ').unwrap().0.parse().unwrap();
+    // The stand-in carries 0.115 kg by itself, of the 0.12 kg that it has to.
+    assert!((0.08..0.11).contains(&ratio), "{note}");
+    let (code, said) = jog.end();
+    assert_eq!(code, Some(0), "{said}");
+    steps.write_rig("1 N", &ratio.to_string());
+}
+
+/// Steps 14 to 16.
+fn axes_and_rest(steps: &mut Steps) {
+    steps.middle();
+    let mut jog = steps.jog();
+    let told = jog.at("where");
+    let near = |a: [f64; 3], b: [f64; 3]| (0..3).all(|i| (a[i] - b[i]).abs() < NEAR_MM);
+    assert!(near(told, steps.tip_mm()), "{told:?} {:?}", steps.tip_mm());
+    jog.tell("speed 2mm/s");
+    jog.hear("speed");
+    for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
+        for by_mm in [2.0, -2.0] {
+            let mut wanted = jog.at("where");
+            wanted[axis] += by_mm;
+            jog.at(&format!("{name} {by_mm:+}mm"));
+            assert!(
+                near(wanted, steps.tip_mm()),
+                "{name} {by_mm:+}: {wanted:?} {:?}",
+                steps.tip_mm()
+            );
+        }
+    }
+    let before = jog.at("where");
+    let mut after = before;
+    for _ in 0..100 {
+        after = jog.at("where");
+    }
+    let drift = (0..3)
+        .map(|i| (after[i] - before[i]).powi(2))
+        .sum::<f64>()
+        .sqrt();
+    assert!(drift < 0.05, "{before:?} {after:?}");
+    let (code, said) = jog.end();
+    assert_eq!(code, Some(0), "{said}");
+    assert!(said.contains("disarmed"), "{said}");
+}
+
+/// Steps 17 and 18.
+fn button_and_cable(steps: &mut Steps) {
+    for (fault, words) in [(Fault::Button, "button"), (Fault::Unplug, "USB")] {
+        let jog = steps.on_the_way_up();
+        steps.bench.arm().inject(When::Now, fault).unwrap();
+        steps.soft();
+        let (code, said) = jog.end();
+        assert_eq!(code, Some(3), "{said}");
+        assert!(said.contains(words), "{words}: {said}");
+        if fault == Fault::Button {
+            // The next press of it allows forces again.
+            steps.bench.arm().inject(When::Now, Fault::Button).unwrap();
+        }
+    }
+}
+
+/// Steps 19 and 20.
+fn a_program_that_dies_or_hangs(steps: &mut Steps) {
+    let mut jog = steps.on_the_way_up();
+    jog.child.kill().unwrap();
+    steps.soft();
+    drop(jog.end());
+    let jog = steps.on_the_way_up();
+    signal(&jog, "-STOP");
+    steps.soft();
+    signal(&jog, "-CONT");
+    let (code, said) = jog.end();
+    assert_eq!(code, Some(3), "{said}");
+}
+
+fn signal(jog: &Jog, signal: &str) {
+    let pid = jog.child.id().to_string();
+    let sent = std::process::Command::new("kill")
+        .args([signal, &pid])
+        .status();
+    assert!(sent.unwrap().success());
+}
+
+/// Step 21: a hand 2 mm beside the tip.
+fn a_hand(steps: &mut Steps) {
+    steps.middle();
+    let mut jog = steps.jog();
+    jog.tell("speed 2mm/s");
+    jog.hear("speed");
+    let [x, y, z] = steps.tip_mm().map(|mm| 1e-3 * mm);
+    let hand = Contact {
+        point_m: [x + 0.002, y, z],
+        normal: [-1.0, 0.0, 0.0],
+        stiffness_n_m: 500.0,
+        damping_n_s_m: 5.0,
+    };
+    steps.bench.arm().set_contact(Some(hand)).unwrap();
+    jog.tell("x +10mm");
+    let arm = steps.bench.arm();
+    let pushes = |s: &ArmState| -s.contact_force_n[0] > 0.5;
+    arm.wait_until(PATIENCE, pushes).unwrap();
+    let mut most_n: f64 = 0.0;
+    let ended = arm.wait_until(PATIENCE, |s| s.mode != Mode::Force);
+    ended.unwrap();
+    most_n = most_n.max(-arm.state().unwrap().contact_force_n[0]);
+    let (code, said) = jog.end();
+    assert_eq!(code, Some(3), "{said}");
+    assert!(most_n < 1.3, "{most_n} N");
+    assert!(said.contains("force"), "{said}");
+}

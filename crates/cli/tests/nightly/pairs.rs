@@ -1,0 +1,405 @@
+//! Two faults at once: whatever else is wrong, none of them passes, and each is told by its own cause.
+
+use std::collections::BTreeSet;
+use std::time::Instant;
+
+use serde_json::Value;
+use skinrig_emulated_bench::{Fault, NoisePerMillion, Order, When, Wire};
+use skinrig_model::CameraId;
+
+use super::{Nights, SURFACE_M, Seen};
+
+/// How a fault shows in a night, when no other one hides it.
+pub(super) struct Planted {
+    /// For people, and in the table of docs/nightly.md.
+    pub name: &'static str,
+    plant: fn(&mut Nights),
+    /// The check that finds it.
+    check: &'static str,
+    /// What that check says: evidence of this kind about this device; `None`: a broken limit of this metric and device alone.
+    shows: Shows,
+    /// Other devices of which evidence may speak besides: what is measured with them needs this one.
+    also: &'static [&'static str],
+    /// Faults that cannot be seen beside this one.
+    hides: &'static [&'static str],
+}
+
+enum Shows {
+    Evidence {
+        kind: &'static str,
+        subject: &'static str,
+        cause: &'static str,
+    },
+    Limit {
+        subject: &'static str,
+        metric: &'static str,
+    },
+}
+
+use Shows::{Evidence, Limit};
+
+const fn seen(kind: &'static str, subject: &'static str) -> Shows {
+    Evidence {
+        kind,
+        subject,
+        cause: "rig",
+    }
+}
+
+const fn absent(subject: &'static str) -> Shows {
+    Evidence {
+        kind: "absent",
+        subject,
+        cause: "infrastructure",
+    }
+}
+
+/// Faults of the arm that leave nothing of it to measure.
+const ARM: &[&str] = &[
+    "joints rub",
+    "force offset",
+    "arm jammed",
+    "robot unplugged",
+    "robot not calibrated",
+];
+
+pub(super) const FAULTS: &[Planted] = &[
+    Planted {
+        name: "camera 2 unplugged",
+        plant: |n| n.camera(CameraId::Two, Order::Unplug),
+        check: "identity",
+        shows: absent("camera2"),
+        also: &[],
+        hides: &["camera 2 loses words", "wire of camera 2 cut"],
+    },
+    Planted {
+        name: "register of camera 1 stuck",
+        plant: |n| {
+            // Its generator keeps the default, and the rig file asks for another value.
+            n.edit_rig(
+                "    serial: \"00000001\"\n",
+                "    serial: \"00000001\"\n    biases: {bias_diff_on: 400}\n",
+            );
+            n.camera(CameraId::One, Order::Stick(0x0350));
+        },
+        check: "settings",
+        shows: seen("read_back", "camera1"),
+        also: &[],
+        // A camera that cannot be set up measures nothing.
+        hides: &["hot pixels in camera 1", "wire of camera 1 leaky"],
+    },
+    Planted {
+        name: "hot pixels in camera 1",
+        plant: |n| n.camera(CameraId::One, Order::HotPixels(40)),
+        check: "noise_lit",
+        shows: Limit {
+            subject: "camera1",
+            metric: "hot_pixels",
+        },
+        also: &[],
+        hides: &[],
+    },
+    Planted {
+        name: "camera 2 loses words",
+        plant: |n| n.camera(CameraId::Two, Order::Lose(10)),
+        check: "test_pattern",
+        shows: seen("data_lost", "camera2"),
+        also: &[],
+        hides: &["wire of camera 2 cut"],
+    },
+    Planted {
+        name: "lamps stay on",
+        plant: |n| n.lamps_obey("true"),
+        check: "noise_dark",
+        shows: Limit {
+            subject: "camera1",
+            metric: "rate",
+        },
+        also: &[],
+        hides: &[],
+    },
+    Planted {
+        name: "lamps' program fails",
+        plant: |n| n.lamps_obey("false"),
+        check: "noise_dark",
+        shows: seen("state", "computer"),
+        also: &[],
+        hides: &["lamps stay on"],
+    },
+    Planted {
+        name: "wire of camera 2 cut",
+        plant: |n| n.bench.wire(CameraId::Two, Wire::Cut),
+        check: "trigger_loopback",
+        shows: seen("trigger_fault", "camera2"),
+        also: &[],
+        hides: &[],
+    },
+    Planted {
+        name: "wire of camera 1 leaky",
+        plant: |n| n.bench.wire(CameraId::One, Wire::Leaky),
+        check: "trigger_loopback",
+        shows: seen("trigger_fault", "camera1"),
+        also: &[],
+        hides: &[],
+    },
+    Planted {
+        name: "trigger box unplugged",
+        plant: |n| {
+            n.bench.trigger_box().unplug().unwrap();
+        },
+        check: "identity",
+        shows: absent("trigger box"),
+        also: &[],
+        hides: &[
+            "wire of camera 1 leaky",
+            "wire of camera 2 cut",
+            "serial line noisy",
+            "other firmware in the box",
+        ],
+    },
+    Planted {
+        name: "other firmware in the box",
+        plant: |n| n.edit_rig("  port: ", "  firmware: \"9.9.9\"\n  port: "),
+        check: "identity",
+        shows: seen("other_device", "trigger box"),
+        also: &[],
+        hides: &[
+            "wire of camera 1 leaky",
+            "wire of camera 2 cut",
+            "serial line noisy",
+        ],
+    },
+    Planted {
+        name: "joints rub",
+        plant: |n| n.arm(When::Now, Fault::Friction(800.0)),
+        check: "step_response",
+        shows: Limit {
+            subject: "robot",
+            metric: "settling",
+        },
+        also: &["robot"],
+        hides: &[],
+    },
+    Planted {
+        name: "force offset",
+        plant: |n| {
+            // Half a newton that nobody exerts, on the way down: the touch is told above the skin.
+            let offset = Fault::ForceOffset([0.0, 0.0, -0.5]);
+            n.arm(When::Below(SURFACE_M + 0.0009), offset);
+        },
+        check: "depth",
+        shows: Limit {
+            subject: "robot",
+            metric: "surface",
+        },
+        also: &[],
+        hides: &[],
+    },
+    Planted {
+        name: "arm jammed",
+        plant: |n| n.arm(When::IntoMove(0.1), Fault::Jammed),
+        check: "repeatability",
+        shows: seen("state", "robot"),
+        also: &[],
+        hides: ARM,
+    },
+    Planted {
+        name: "robot unplugged",
+        plant: |n| n.arm(When::IntoMove(1.0), Fault::Unplug),
+        check: "repeatability",
+        shows: seen("device_lost", "robot"),
+        also: &[],
+        hides: ARM,
+    },
+    Planted {
+        name: "robot not calibrated",
+        plant: |n| n.arm(When::Now, Fault::PowerLoss),
+        check: "robot_state",
+        shows: seen("state", "robot"),
+        also: &[],
+        hides: ARM,
+    },
+    Planted {
+        name: "serial line noisy",
+        plant: |n| {
+            let noise = NoisePerMillion {
+                flip: 30_000,
+                ..NoisePerMillion::default()
+            };
+            n.bench.trigger_box().noise(1, noise).unwrap();
+        },
+        check: "trigger_loopback",
+        shows: Evidence {
+            kind: "",
+            subject: "trigger box",
+            cause: "rig",
+        },
+        also: &["camera1", "camera2"],
+        hides: &["wire of camera 1 leaky", "wire of camera 2 cut"],
+    },
+];
+
+/// All pairs, in a fixed order.
+pub(super) fn all() -> Vec<[&'static Planted; 2]> {
+    let with = |i: usize| FAULTS[i + 1..].iter().map(move |b| [&FAULTS[i], b]);
+    (0..FAULTS.len()).flat_map(with).collect()
+}
+
+/// The pair of these names.
+pub(super) fn named(names: [&str; 2]) -> [&'static Planted; 2] {
+    names.map(|name| FAULTS.iter().find(|f| f.name == name).unwrap())
+}
+
+/// Plants two faults into a fresh bench, makes the checks that find them, and says what is wrong with the night.
+pub(super) fn made([a, b]: [&Planted; 2]) -> Option<Result<String, String>> {
+    let mut nights = Nights::start()?;
+    let began = Instant::now();
+    for fault in [a, b] {
+        (fault.plant)(&mut nights);
+    }
+    let mut only = vec![a.check];
+    if b.check != a.check {
+        only.push(b.check);
+    }
+    // The arm is not moved without these.
+    if ["repeatability", "step_response", "depth"]
+        .iter()
+        .any(|c| only.contains(c))
+    {
+        only.insert(0, "robot_state");
+    }
+    let night = nights.night(&only.join(","));
+    let told = format!(
+        "{} + {}: {} s, exit {}",
+        a.name,
+        b.name,
+        began.elapsed().as_secs(),
+        night.exit
+    );
+    let wrong: Vec<String> = wrong(a, b, &night);
+    Some(match wrong.is_empty() {
+        true => Ok(told),
+        false => Err(format!("{told}: {}\n{}", wrong.join("; "), night.said)),
+    })
+}
+
+/// What the night says and should not, or the other way round.
+fn wrong(a: &Planted, b: &Planted, night: &Seen) -> Vec<String> {
+    let mut wrong = Vec::new();
+    let verdict = &night.night["verdict"];
+    if night.exit == 0 || verdict == "PASS" || verdict == "MARGINAL" {
+        wrong.push(format!("{verdict} with exit {}", night.exit));
+    }
+    for (fault, other) in [(a, b), (b, a)] {
+        if !other.hides.contains(&fault.name) {
+            wrong.extend(hidden(fault, night));
+        }
+    }
+    // Nobody is blamed who is well.
+    let mut guilty: BTreeSet<&str> = BTreeSet::from(["computer"]);
+    for fault in [a, b] {
+        guilty.extend(fault.also);
+        let (Evidence { subject, .. } | Limit { subject, .. }) = fault.shows;
+        guilty.insert(subject);
+    }
+    for evidence in evidence(night.night["checks"].as_array().unwrap()) {
+        let subject = evidence["subject"].as_str().unwrap();
+        if !guilty.contains(subject) {
+            wrong.push(format!("{subject} is blamed: {}", evidence["what"]));
+        }
+    }
+    wrong
+}
+
+/// What is missing of a fault that should be seen.
+fn hidden(fault: &Planted, night: &Seen) -> Option<String> {
+    let check = night.check(fault.check);
+    let name = fault.name;
+    match fault.shows {
+        Evidence {
+            kind,
+            subject,
+            cause,
+        } => {
+            let there = evidence([check])
+                .any(|e| (kind.is_empty() || e["kind"] == kind) && e["subject"] == subject);
+            // Of two equally bad causes of a check the one that is not the infrastructure is told.
+            let told = check["cause"].as_str().unwrap_or("none");
+            let fits = told == cause || told == "rig";
+            (!there || !fits).then(|| format!("{name}: cause {told}, evidence there: {there}"))
+        }
+        Limit { subject, metric } => {
+            let judged = night.judged(fault.check, subject, metric);
+            let told = check["cause"].as_str().unwrap_or("none");
+            (judged != "FAIL" || told != "rig")
+                .then(|| format!("{name}: {metric} of {subject} {judged}, cause {told}"))
+        }
+    }
+}
+
+fn evidence<'a>(checks: impl IntoIterator<Item = &'a Value>) -> impl Iterator<Item = &'a Value> {
+    let attempts = checks
+        .into_iter()
+        .flat_map(|c| c["attempts"].as_array().unwrap());
+    attempts.flat_map(|a| a["evidence"].as_array().unwrap())
+}
+
+/// A sample: every fault once, beside one of another device.
+const SAMPLE: [[&str; 2]; 8] = [
+    ["camera 2 unplugged", "register of camera 1 stuck"],
+    ["hot pixels in camera 1", "lamps' program fails"],
+    ["camera 2 loses words", "lamps stay on"],
+    ["wire of camera 2 cut", "wire of camera 1 leaky"],
+    ["trigger box unplugged", "arm jammed"],
+    ["other firmware in the box", "robot unplugged"],
+    ["joints rub", "force offset"],
+    ["robot not calibrated", "serial line noisy"],
+];
+
+/// A sample of the pairs, for every test run.
+pub(super) fn sample() {
+    let mut left: BTreeSet<&str> = FAULTS.iter().map(|f| f.name).collect();
+    for pair in SAMPLE {
+        for name in pair {
+            assert!(left.remove(name), "{name} twice, or unknown");
+        }
+        match made(named(pair)) {
+            None => return,
+            Some(Ok(_)) => {}
+            Some(Err(wrong)) => panic!("{wrong}"),
+        }
+    }
+    assert!(left.is_empty(), "{left:?}");
+}
+
+#[test]
+#[ignore = "half an hour of real time: cargo test -p skinrig --test nightly -- --ignored --nocapture all_pairs"]
+fn all_pairs_of_faults_are_told_by_their_own_causes() {
+    let (from, to) = range(std::env::var("SKINRIG_PAIRS").ok());
+    let pairs = all();
+    let n = pairs.len();
+    let mut failed = Vec::new();
+    for (i, pair) in pairs.into_iter().enumerate() {
+        if !(from..=to).contains(&(i + 1)) {
+            continue;
+        }
+        match made(pair) {
+            None => return,
+            Some(Ok(told)) => eprintln!("pair {} of {n}: ok: {told}", i + 1),
+            Some(Err(wrong)) => {
+                eprintln!("pair {} of {n}: WRONG: {wrong}", i + 1);
+                failed.push(i + 1);
+            }
+        }
+    }
+    assert_eq!(failed, [0; 0], "pairs that were not told right");
+}
+
+/// `SKINRIG_PAIRS=20-40`: from and to which pair, counted from 1; all without it.
+fn range(given: Option<String>) -> (usize, usize) {
+    let Some(given) = given else {
+        return (1, usize::MAX);
+    };
+    let (from, to) = given.split_once('-').unwrap_or((&given, &given));
+    (from.parse().unwrap(), to.parse().unwrap())
+}
