@@ -2,9 +2,7 @@
 
 use std::time::{SystemTime, UNIX_EPOCH};
 
-use skinrig_controller::{
-    ControlHandle, ControllerError, ControllerSettings, Jog, Moved, Touched, Trip,
-};
+use skinrig_controller::{ControlHandle, ControllerError, ControllerSettings, Jog, Moved, Touched};
 use skinrig_device::{Clock, DeviceError, Indenter, MotionLimits, RobotSample};
 use skinrig_model::{HostDuration, HostTime, Point2, Point3, PoseSample, Robot, Setting, Skin};
 use skinrig_nightly::{Evidence, EvidenceKind};
@@ -13,9 +11,9 @@ use skinrig_protocol::rig::RigFile;
 use skinrig_protocol::{Surface, TouchSearch};
 
 use crate::bench::{Bench, Trouble};
+use crate::cause;
 use crate::findings::Findings;
 use crate::room::{CLEARANCE_MM, Room};
-use crate::trouble;
 
 /// How close to its target a move ends, mm: near enough to measure where exactly.
 const ARRIVED_MM: f64 = 0.5;
@@ -438,30 +436,9 @@ pub fn hold_in_air(
 
 /// The evidence that an error of the guard is.
 pub(crate) fn of(e: ControllerError) -> Trouble {
-    let kind = match &e {
-        ControllerError::Device(device) => return trouble::of(device),
-        ControllerError::Watchdog(Trip::Feedback { .. } | Trip::Stale { .. })
-        | ControllerError::PoseStream { .. } => EvidenceKind::DeviceLost,
-        ControllerError::Watchdog(Trip::Late { .. }) => EvidenceKind::HostLate,
-        ControllerError::Watchdog(_) => EvidenceKind::Trip,
-        ControllerError::NotArrived { .. } => EvidenceKind::State,
-        ControllerError::Guard(_) => EvidenceKind::Refused,
-        _ => EvidenceKind::Software,
-    };
-    let next = match kind {
-        EvidenceKind::DeviceLost => {
-            "look at the robot's power, its light and its cable, then `skinrig doctor`"
-        }
-        EvidenceKind::HostLate => "see what else this computer does at that time",
-        EvidenceKind::Trip | EvidenceKind::State => {
-            "look at the arm: is anything in its way, does it move freely by hand?"
-        }
-        EvidenceKind::Refused => {
-            "compare `limits` and `frame` of the rig file with where the arm and the skin are"
-        }
-        _ => "this is a fault of the program: please report it with the night's folder",
-    };
-    Box::new(Evidence::new(kind, "robot", e.to_string()).next(next))
+    let rows = cause::of(&e).into_iter();
+    let software = || Evidence::new(EvidenceKind::Software, "robot", e.to_string());
+    Box::new(rows.last().unwrap_or_else(software))
 }
 
 fn stopped() -> Trouble {

@@ -5,6 +5,7 @@
 
 pub mod arm;
 pub mod bench;
+pub mod cause;
 pub mod checks;
 pub mod findings;
 pub mod history;

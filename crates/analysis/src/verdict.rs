@@ -365,6 +365,7 @@ mod tests {
                 number: 1,
             },
             verdict: PressVerdict::Valid,
+            faults: Vec::new(),
             timing: Some(skinrig_model::PressTiming {
                 approach: skinrig_model::HostTime(0),
                 contact: skinrig_model::HostTime(1),

@@ -457,6 +457,9 @@ fn end_only(
     let missed = count(|v| matches!(v, PressVerdict::Missed(_)));
     Ok(RunReport {
         end: RunEnd::Completed,
+        causes: Vec::new(),
+        press_faults: Vec::new(),
+        valid_presses: Vec::new(),
         ended_at: HostTime::ZERO,
         planned,
         valid,

@@ -3,7 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use chrono::{DateTime, SecondsFormat, Utc};
-use skinrig_controller::{Preflight, Run, RunReport, execute_checked};
+use skinrig_controller::{
+    ControllerError, Preflight, Problem, Run, RunReport, SinkFault, execute_checked,
+};
 use skinrig_device::Rig;
 use skinrig_model::{
     AnalysisSettings, CameraId, HostDuration, InterruptionKind, PressVerdict, RunEnd, RunHeader,
@@ -104,16 +106,17 @@ pub fn record(
 /// Seals the session, and tells what went wrong besides.
 pub(crate) fn close(sink: SessionSink, mut report: RunReport, operator: &Operator) -> RunReport {
     if let Err(error) = sink.seal() {
-        let error = error.to_string();
-        match &report.end {
-            RunEnd::Completed => report.end = RunEnd::Faulted(format!("recorder: {error}")),
-            RunEnd::Faulted(reason) if reason.contains(&error) => {}
-            _ => report.problems.push(error),
+        let error = ControllerError::from(SinkFault(error.to_string()));
+        if report.end == RunEnd::Completed {
+            report.end = RunEnd::Faulted(error.to_string());
+            report.causes.push(error);
+        } else if !report.causes.contains(&error) {
+            report.problems.push(Problem { doing: "", error });
         }
     }
     operator.run_is_over();
     for problem in &report.problems {
-        if !matches!(&report.end, RunEnd::Faulted(reason) if reason == problem) {
+        if !report.causes.contains(&problem.error) {
             errln!("warning: {problem}");
         }
     }

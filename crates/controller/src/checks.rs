@@ -3,8 +3,8 @@
 use skinrig_device::DeviceError;
 use skinrig_model::pulse::{LOOPBACK, decode_marks};
 use skinrig_model::{
-    CameraId, DeviceIdentity, DeviceRole, HostDuration, PreflightCheck, RawChunk, Record, Setting,
-    TriggerEdge,
+    CameraId, CheckKind, DeviceIdentity, DeviceRole, HostDuration, PreflightCheck, RawChunk,
+    Record, Setting, TriggerEdge,
 };
 use skinrig_protocol::rig::RigFile;
 
@@ -169,21 +169,27 @@ pub fn identity_checks(
     identity: &DeviceIdentity,
 ) -> Vec<PreflightCheck> {
     let serial = wanted.and_then(|w| w.serial.as_deref());
-    let mut checks = vec![PreflightCheck::new(
-        format!("{role}: identity"),
-        serial.map_or_else(|| "any serial number".to_owned(), |s| format!("serial {s}")),
-        format!("{} {}", identity.model, identity.serial),
-        serial.is_none_or(|s| s == identity.serial),
-        "connect the right device, or correct its serial number in the rig file",
-    )];
+    let mut checks = vec![
+        PreflightCheck::new(
+            format!("{role}: identity"),
+            serial.map_or_else(|| "any serial number".to_owned(), |s| format!("serial {s}")),
+            format!("{} {}", identity.model, identity.serial),
+            serial.is_none_or(|s| s == identity.serial),
+            "connect the right device, or correct its serial number in the rig file",
+        )
+        .about(CheckKind::Identity(role)),
+    ];
     for version in wanted.iter().flat_map(|w| &w.versions) {
-        checks.push(PreflightCheck::new(
-            format!("{role}: version"),
-            version.as_str(),
-            identity.firmware.as_str(),
-            says_version(&identity.firmware, version),
-            "install the expected version, or accept this one in the rig file after testing it",
-        ));
+        checks.push(
+            PreflightCheck::new(
+                format!("{role}: version"),
+                version.as_str(),
+                identity.firmware.as_str(),
+                says_version(&identity.firmware, version),
+                "install the expected version, or accept this one in the rig file after testing it",
+            )
+            .about(CheckKind::Identity(role)),
+        );
     }
     checks
 }
@@ -209,13 +215,16 @@ impl Core<'_> {
         let mut checks = identity_checks(role, wanted, identity);
         for (name, value) in wanted.iter().flat_map(|w| &w.settings) {
             let found = settings.iter().find(|s| s.name == *name);
-            checks.push(PreflightCheck::new(
-                format!("{role}: {name}"),
-                value.as_str(),
-                found.map_or("not told", |s| s.read_back.as_str()),
-                found.is_some_and(|s| same(value, &s.read_back)),
-                "find out what changed, or accept the value in the rig file after testing it",
-            ));
+            checks.push(
+                PreflightCheck::new(
+                    format!("{role}: {name}"),
+                    value.as_str(),
+                    found.map_or("not told", |s| s.read_back.as_str()),
+                    found.is_some_and(|s| same(value, &s.read_back)),
+                    "find out what changed, or accept the value in the rig file after testing it",
+                )
+                .about(CheckKind::ReadBack(role)),
+            );
         }
         if role != DeviceRole::TriggerBox {
             checks.push(read_back(role, settings));
@@ -229,7 +238,8 @@ impl Core<'_> {
                     s.read_back.as_str(),
                     s.read_back == "true",
                     "initialise the robot by hand (calibration pole into the pit), or see docs/bench.md",
-                ),
+                )
+                .about(CheckKind::State(role)),
                 None => PreflightCheck::skipped(
                     "indenter: initialised",
                     "true",
@@ -263,13 +273,16 @@ impl Core<'_> {
                     (Some(a), Some(b)) => format!("from {a} to {b} us"),
                     _ => "no time".to_owned(),
                 };
-                self.checks.push(PreflightCheck::new(
-                    format!("{camera}: clock"),
-                    format!("advancing within {}", seconds(within)),
-                    found,
-                    watch.is_some_and(|w| w.advances(camera)),
-                    "power-cycle the camera; a slave camera needs its master's sync line",
-                ));
+                self.checks.push(
+                    PreflightCheck::new(
+                        format!("{camera}: clock"),
+                        format!("advancing within {}", seconds(within)),
+                        found,
+                        watch.is_some_and(|w| w.advances(camera)),
+                        "power-cycle the camera; a slave camera needs its master's sync line",
+                    )
+                    .about(CheckKind::Clock(DeviceRole::of_camera(camera))),
+                );
             }
         }
         let Some(loopback) = preflight.loopback else {
@@ -308,7 +321,8 @@ impl Core<'_> {
                 }),
                 watch.is_some_and(|w| w.saw_mark(camera, channel)),
                 "check the trigger cable, its channel in the rig file, and levels (docs/bench.md)",
-            ));
+            )
+            .about(CheckKind::Trigger(DeviceRole::of_camera(camera))));
         }
         Ok(())
     }
@@ -360,16 +374,7 @@ impl Core<'_> {
                 "`skinrig devices` shows what is connected",
             ));
         }
-        let failed: Vec<String> = checks
-            .iter()
-            .filter(|c| c.failed())
-            .map(|c| {
-                format!(
-                    "{}: expected {}, found {}; {}",
-                    c.check, c.expected, c.found, c.next_step
-                )
-            })
-            .collect();
+        let failed: Vec<PreflightCheck> = checks.iter().filter(|c| c.failed()).cloned().collect();
         self.journal.emit(Record::Preflight(checks))?;
         result?;
         if failed.is_empty() {
@@ -396,6 +401,7 @@ fn read_back(role: DeviceRole, settings: &[Setting]) -> PreflightCheck {
         differing.is_empty(),
         "power-cycle the device and try again",
     )
+    .about(CheckKind::ReadBack(role))
 }
 
 /// `2 s`, without zeros behind.

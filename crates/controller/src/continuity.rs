@@ -6,7 +6,7 @@ use skinrig_model::{CameraId, HostDuration, HostTime, RawChunk, Record};
 use crate::core::{Collect, Core};
 use crate::error::{ControllerError, Halt};
 use crate::press::cleared_at;
-use crate::verdict::Spoilt;
+use crate::press_fault::PressFault;
 
 /// How fast two clocks may drift apart: far beyond any quartz, parts per million.
 const DRIFT_PPM: i64 = 1_000;
@@ -119,7 +119,7 @@ impl Core<'_> {
         for camera in CameraId::ALL {
             let reached = self.continuity[camera.index()].reached();
             if reached.is_none_or(|t| t < end) {
-                let late = Spoilt::DataLate {
+                let late = PressFault::DataLate {
                     camera,
                     end,
                     waited: within,
@@ -157,7 +157,7 @@ impl Core<'_> {
             for camera in CameraId::ALL {
                 let rate = open.events[camera.index()] as f64 / seconds;
                 if rate > level {
-                    open.spoilt.push(Spoilt::Storm {
+                    open.spoilt.push(PressFault::Storm {
                         camera,
                         level_ev_s: level,
                         found_ev_s: rate,

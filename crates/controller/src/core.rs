@@ -17,13 +17,13 @@ use crate::guard::GuardedIndenter;
 use crate::invalid_run::InvalidRun;
 use crate::journal::Journal;
 use crate::moments::{PressTracker, Settling};
+use crate::press_fault::PressFault;
 use crate::run::{Resume, RunReport};
 use crate::settings::ControllerSettings;
 use crate::sink::RecordSink;
 use crate::states::{Event, Machine, State};
 use crate::suspend::Suspender;
 use crate::touch::TouchDetector;
-use crate::verdict::Spoilt;
 
 /// A press under way.
 pub(crate) struct OpenPress {
@@ -36,7 +36,7 @@ pub(crate) struct OpenPress {
     /// When its intent was made.
     pub(crate) began: HostTime,
     /// What spoilt its data, besides lost bytes.
-    pub(crate) spoilt: Vec<Spoilt>,
+    pub(crate) spoilt: Vec<PressFault>,
 }
 
 /// Everything that a run holds. Dropped before its end, it brings the rig to rest first.
@@ -65,6 +65,8 @@ pub(crate) struct Core<'a> {
     /// The search for the surface under way.
     pub(crate) touch: Option<TouchDetector>,
     pub(crate) invalid_run: InvalidRun,
+    /// What was wrong with each attempt so far.
+    pub(crate) press_faults: Vec<(AttemptId, PressFault)>,
     /// What to check before arming; nothing when absent.
     pub(crate) preflight: Option<Preflight>,
     pub(crate) checks: Vec<PreflightCheck>,
@@ -127,6 +129,7 @@ impl<'a> Core<'a> {
             settling: None,
             touch: None,
             invalid_run: InvalidRun::new(plan.max_consecutive_invalid),
+            press_faults: Vec::new(),
             preflight: None,
             checks: Vec::new(),
             watch: None,
@@ -193,7 +196,7 @@ impl<'a> Core<'a> {
         let line = self.observe_box();
         if self.ending {
             for e in [cameras, line].into_iter().filter_map(Result::err) {
-                self.journal.problem(e.to_string());
+                self.journal.problem("", e);
             }
             return poses;
         }
@@ -217,7 +220,7 @@ impl<'a> Core<'a> {
             // Something went by, and the box goes on: the alignment certificate weighs what is missing.
             Err(e @ DeviceError::State { .. }) => {
                 let (t, text) = (self.clock.now(), e.to_string());
-                self.journal.problem(text.clone());
+                self.journal.problem("", e);
                 self.journal.emit(Record::Note { t, text })
             }
             other => Ok(other?),

@@ -5,10 +5,10 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use skinrig_model::{CameraId, InterruptionKind, Record, RunEnd};
 
 use crate::core::Core;
-use crate::error::{ControllerError, Halt};
+use crate::error::{ControllerError, Halt, NotAtRest};
+use crate::press_fault::PressFault;
 use crate::run::RunReport;
 use crate::states::{Event, State};
-use crate::verdict::Trouble;
 
 /// How often a device that does not answer is told to rise, to disarm, to stop.
 const TRIES: u32 = 3;
@@ -32,13 +32,13 @@ impl Core<'_> {
     /// Like [`shielded`](Self::shielded), for the end: what fails is remembered, and the end goes on.
     fn attempt(
         &mut self,
-        what: &str,
+        what: &'static str,
         part: impl FnOnce(&mut Self) -> Result<(), ControllerError>,
     ) -> bool {
         match self.shielded(|core| Ok(part(core)?)) {
             Ok(()) => true,
             Err(Halt::Fault(e)) => {
-                self.journal.problem(format!("{what}: {e}"));
+                self.journal.problem(what, e);
                 false
             }
             // `part` cannot ask for these.
@@ -54,6 +54,7 @@ impl Core<'_> {
         let at = catch_unwind(AssertUnwindSafe(|| self.now())).ok();
         self.ending = true;
         self.journal.ending();
+        let mut causes = Vec::new();
         let (mut end, interruption) = match result {
             Ok(()) => (RunEnd::Completed, None),
             // The row was written when the operator asked.
@@ -70,17 +71,16 @@ impl Core<'_> {
             Err(Halt::PausedNow) => {
                 let lost = "a pause was caught by no motion";
                 self.machine.fire(Event::Fault);
-                (
-                    RunEnd::Faulted(ControllerError::Internal(lost.to_owned()).to_string()),
-                    Some(InterruptionKind::Fault),
-                )
+                let error = ControllerError::Internal(lost.to_owned());
+                let end = RunEnd::Faulted(error.to_string());
+                causes.push(error);
+                (end, Some(InterruptionKind::Fault))
             }
             Err(Halt::Fault(e)) => {
                 self.machine.fire(Event::Fault);
-                (
-                    RunEnd::Faulted(e.to_string()),
-                    Some(InterruptionKind::Fault),
-                )
+                let end = RunEnd::Faulted(e.to_string());
+                causes.push(e);
+                (end, Some(InterruptionKind::Fault))
             }
         };
 
@@ -97,14 +97,13 @@ impl Core<'_> {
         }
         let warning = match (retracted || self.halted_at.is_some(), disarmed) {
             (true, true) => None,
-            (false, true) => Some("the tip was not seen at clearance height: look where it is"),
-            (_, false) => {
-                Some("the robot did not confirm that it is disarmed: switch it off by hand")
-            }
+            (false, true) => Some(NotAtRest::NotClear),
+            (_, false) => Some(NotAtRest::NotDisarmed),
         };
         if let Some(warning) = warning {
+            causes.push(warning.into());
             end = RunEnd::Faulted(match end {
-                RunEnd::Completed => warning.to_owned(),
+                RunEnd::Completed => warning.to_string(),
                 RunEnd::Stopped(r) | RunEnd::Faulted(r) => format!("{r}; {warning}"),
             });
         }
@@ -118,16 +117,16 @@ impl Core<'_> {
         self.attempt("outcome", |core| {
             core.emit_poses()?;
             if core.open.is_some() {
-                core.close_press(Some(Trouble::cut_off(&reason)))?;
+                core.close_press(Some(PressFault::RunEnded(reason.clone())))?;
             }
             core.journal.miss_the_rest(&reason)
         });
         self.attempt("the operator's notes", Self::write_notes);
         let problems = self.journal.problems.clone();
-        for text in problems {
+        for problem in problems {
             let _ = self.journal.emit(Record::Note {
                 t: ended,
-                text: format!("while ending: {text}"),
+                text: format!("while ending: {problem}"),
             });
         }
         // What ended the run, then what the end itself met with.
@@ -154,6 +153,9 @@ impl Core<'_> {
         let [planned, valid, invalid, missed] = self.journal.counts();
         self.report = Some(RunReport {
             end,
+            causes,
+            press_faults: std::mem::take(&mut self.press_faults),
+            valid_presses: self.journal.valid(),
             ended_at: ended,
             planned,
             valid,
@@ -212,12 +214,12 @@ impl Core<'_> {
         while !self.indenter.is_clear() {
             let now = self.now();
             if now >= t + allowed {
-                return Err(self.not_arrived("straight up", target, allowed));
+                return Err(self.not_arrived("straight up", target, allowed).into());
             }
             self.clock.wait_until(now + self.settings.tick);
             self.observe()?;
             if self.hear_halt() {
-                return Err(self.not_arrived("straight up", target, now - t));
+                return Err(self.not_arrived("straight up", target, now - t).into());
             }
         }
         Ok(())

@@ -1,8 +1,9 @@
 //! What can end a run before its plan does.
 
 use skinrig_device::DeviceError;
-use skinrig_model::{HostDuration, Point3, Skin};
+use skinrig_model::{HostDuration, Point3, PreflightCheck, Skin};
 
+use crate::press_fault::PressFault;
 use crate::sink::SinkFault;
 use crate::watchdog::Trip;
 
@@ -104,6 +105,22 @@ pub enum GuardError {
     NotArmed,
 }
 
+/// A motion did not end where it should: the tip had not settled at its target in time.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("{what}: expected to settle within {tolerance_mm} mm of {} in {allowed}, found {}", point(.target), .found.as_ref().map_or_else(|| "no pose".to_owned(), point))]
+pub struct NotArrived {
+    /// Which motion.
+    pub what: String,
+    /// mm.
+    pub tolerance_mm: f64,
+    /// Where to.
+    pub target: Point3<Skin>,
+    /// How long it was given.
+    pub allowed: HostDuration,
+    /// Where the tip was then.
+    pub found: Option<Point3<Skin>>,
+}
+
 /// A run cannot start or go on. Every one of these ends the run safely.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ControllerError {
@@ -145,18 +162,18 @@ pub enum ControllerError {
         next: &'static str,
     },
     /// Presses went wrong one after the other.
-    #[error("invalid presses: expected fewer than {limit} in a row (`limits.max_consecutive_invalid`), found {limit}: {}", .reasons.join("; "))]
+    #[error("invalid presses: expected fewer than {limit} in a row (`limits.max_consecutive_invalid`), found {limit}: {}", joined(.faults))]
     InvalidInARow {
         /// So many are too many.
         limit: u32,
         /// Why, each reason once. Not empty.
-        reasons: Vec<String>,
+        faults: Vec<PressFault>,
     },
     /// A check before the run failed; nothing was powered.
-    #[error("preflight: {} failed: {}", count(.failed), .failed.join("; "))]
+    #[error("preflight: {} failed: {}", count(.failed), joined(&words(.failed)))]
     Preflight {
-        /// Each failed check: name, expected, found, next step. Not empty.
-        failed: Vec<String>,
+        /// Each failed check. Not empty.
+        failed: Vec<PreflightCheck>,
     },
     /// The pose stream did not begin, or says too little.
     #[error("pose stream: expected {expected}, found {found}")]
@@ -167,19 +184,8 @@ pub enum ControllerError {
         found: String,
     },
     /// A motion did not end where it should.
-    #[error("{what}: expected to settle within {tolerance_mm} mm of {} in {allowed}, found {}", point(.target), .found.as_ref().map_or_else(|| "no pose".to_owned(), point))]
-    NotArrived {
-        /// Which motion.
-        what: String,
-        /// mm.
-        tolerance_mm: f64,
-        /// Where to.
-        target: Point3<Skin>,
-        /// How long it was given.
-        allowed: HostDuration,
-        /// Where the tip was then.
-        found: Option<Point3<Skin>>,
-    },
+    #[error(transparent)]
+    NotArrived(#[from] NotArrived),
     /// A measured limit was broken.
     #[error(transparent)]
     Watchdog(#[from] Trip),
@@ -193,6 +199,9 @@ pub enum ControllerError {
         /// The number that came.
         found: u64,
     },
+    /// A session ended whose robot did not come to rest as it should.
+    #[error(transparent)]
+    NotAtRest(#[from] NotAtRest),
     /// The operator switched the motors off.
     #[error("operator: halt; the motors are off, the tip was left where it was")]
     Halted,
@@ -222,12 +231,58 @@ pub enum ControllerError {
     Internal(String),
 }
 
+/// How the robot was left at the end of a run, when it is not as it should be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum NotAtRest {
+    /// It may be in contact.
+    #[error("the tip was not seen at clearance height: look where it is")]
+    NotClear,
+    /// Its motors may be on.
+    #[error("the robot did not confirm that it is disarmed: switch it off by hand")]
+    NotDisarmed,
+}
+
+/// What went wrong besides what ended a run, mostly while it was brought to rest.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Problem {
+    /// Which part of the end failed, for example `disarm`; empty where the error says it.
+    pub doing: &'static str,
+    /// How.
+    pub error: ControllerError,
+}
+
+impl std::fmt::Display for Problem {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self.doing {
+            "" => self.error.fmt(f),
+            doing => write!(f, "{doing}: {}", self.error),
+        }
+    }
+}
+
 /// `1 check` or `2 checks`.
-fn count(failed: &[String]) -> String {
+fn count(failed: &[PreflightCheck]) -> String {
     match failed.len() {
         1 => "1 check".to_owned(),
         n => format!("{n} checks"),
     }
+}
+
+/// Each failed check in words.
+fn words(failed: &[PreflightCheck]) -> Vec<String> {
+    let one = |c: &PreflightCheck| {
+        format!(
+            "{}: expected {}, found {}; {}",
+            c.check, c.expected, c.found, c.next_step
+        )
+    };
+    failed.iter().map(one).collect()
+}
+
+/// With semicolons between.
+fn joined(parts: &[impl std::fmt::Display]) -> String {
+    let parts: Vec<String> = parts.iter().map(ToString::to_string).collect();
+    parts.join("; ")
 }
 
 /// `(x, y, z) mm` to the micrometre.

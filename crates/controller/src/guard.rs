@@ -148,6 +148,12 @@ impl<'a> GuardedIndenter<'a> {
         self.limits.clearance_mm - self.limits.position_tolerance_mm
     }
 
+    /// Where the tip was told to go last.
+    #[must_use]
+    pub const fn target(&self) -> Option<Point3<Skin>> {
+        self.target
+    }
+
     /// The point at clearance height straight above the tip: above the present target (which does not
     /// depend on when one looks) unless the tip is away from it sideways, then above the tip as measured.
     #[must_use]
@@ -157,7 +163,25 @@ impl<'a> GuardedIndenter<'a> {
         let near =
             held.plane().distance_mm(last.measured.plane()) <= self.limits.position_tolerance_mm;
         let foot = if near { held } else { last.measured };
-        Some(foot.plane().at_height(self.limits.clearance_mm))
+        Some(
+            self.inside(foot)
+                .plane()
+                .at_height(self.limits.clearance_mm),
+        )
+    }
+
+    /// `at`, or the nearest place of the workspace when that is within the tolerance sideways: a tip that was braked at its edge
+    /// may be found a little outside, and has to rise.
+    fn inside(&self, at: Point3<Skin>) -> Point3<Skin> {
+        let (min, max) = (self.limits.workspace_min_mm, self.limits.workspace_max_mm);
+        let x_mm = at.x_mm.max(min[0]).min(max[0]);
+        let y_mm = at.y_mm.max(min[1]).min(max[1]);
+        let inside = Point3::new(x_mm, y_mm, at.z_mm);
+        if inside.distance_mm(at) <= self.limits.position_tolerance_mm {
+            inside
+        } else {
+            at
+        }
     }
 
     /// Checks that the pose stream is alive.

@@ -11,7 +11,7 @@ use skinrig_protocol::TouchSearch;
 use skinrig_protocol::plan::RunLimits;
 
 use crate::control::ControlHandle;
-use crate::error::{ControllerError, GuardError};
+use crate::error::{ControllerError, GuardError, NotArrived};
 use crate::guard::{Floor, GuardedIndenter};
 use crate::moments::Settling;
 use crate::settings::ControllerSettings;
@@ -186,7 +186,7 @@ impl<'a> Jog<'a> {
         let t = self.command(target, speed_mm_s)?;
         let allowed =
             HostDuration::from_secs_f64(2.0 * way_mm / speed_mm_s) + self.settings.rise_allowance;
-        let mut settling = Settling::new(target, &self.limits, t);
+        let mut settling = Settling::before_a_motion(target, &self.limits, t);
         while settling.settled().is_none() {
             if stop() {
                 self.indenter.hold()?;
@@ -194,13 +194,14 @@ impl<'a> Jog<'a> {
             }
             if self.clock.now() >= t + allowed {
                 self.indenter.hold()?;
-                return Err(ControllerError::NotArrived {
+                return Err(NotArrived {
                     what: "jog".to_owned(),
                     tolerance_mm: self.limits.position_tolerance_mm,
                     target,
                     allowed,
                     found: self.indenter.position().map(|p| p.measured),
-                });
+                }
+                .into());
             }
             self.tick()?;
             self.fresh.iter().for_each(|s| settling.feed(s));

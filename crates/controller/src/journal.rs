@@ -4,8 +4,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use skinrig_model::{AttemptId, PressHistory, PressId, PressOutcome, PressVerdict, Record};
 
-use crate::error::ControllerError;
-use crate::sink::RecordSink;
+use crate::error::{ControllerError, Problem};
+use crate::sink::{RecordSink, SinkFault};
 
 /// What became of a planned press.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -26,7 +26,7 @@ pub(crate) struct Journal<'a> {
     /// While ending: a failing or panicking sink no longer stops anything.
     lenient: bool,
     /// What went wrong while ending.
-    pub(crate) problems: Vec<String>,
+    pub(crate) problems: Vec<Problem>,
 }
 
 impl<'a> Journal<'a> {
@@ -73,10 +73,13 @@ impl<'a> Journal<'a> {
         self.lenient = true;
     }
 
-    pub(crate) fn problem(&mut self, what: impl Into<String>) {
-        let what = what.into();
-        if !self.problems.contains(&what) {
-            self.problems.push(what);
+    pub(crate) fn problem(&mut self, doing: &'static str, error: impl Into<ControllerError>) {
+        let problem = Problem {
+            doing,
+            error: error.into(),
+        };
+        if !self.problems.contains(&problem) {
+            self.problems.push(problem);
         }
     }
 
@@ -87,8 +90,8 @@ impl<'a> Journal<'a> {
         }
         match catch_unwind(AssertUnwindSafe(|| self.sink.accept(record))) {
             Ok(Ok(())) => {}
-            Ok(Err(fault)) => self.problem(fault.to_string()),
-            Err(_) => self.problem("recorder: panicked"),
+            Ok(Err(fault)) => self.problem("", fault),
+            Err(_) => self.problem("", SinkFault("panicked".to_owned())),
         }
         Ok(())
     }
@@ -135,6 +138,15 @@ impl<'a> Journal<'a> {
             }
         }
         Ok(())
+    }
+
+    /// The presses that are valid.
+    pub(crate) fn valid(&self) -> Vec<PressId> {
+        let fates = self.fates.iter().zip(0..);
+        fates
+            .filter(|(f, _)| **f == Fate::Valid)
+            .map(|(_, i)| PressId(i))
+            .collect()
     }
 
     /// Presses planned, valid, invalid, missed.

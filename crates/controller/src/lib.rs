@@ -43,6 +43,7 @@ mod journal;
 pub mod moments;
 mod preflight;
 mod press;
+pub mod press_fault;
 pub mod progress;
 pub mod run;
 pub mod settings;
@@ -57,9 +58,10 @@ pub mod watchdog;
 
 pub use checks::{ExpectedDevice, Loopback, Preflight, differing, identity_checks, says_version};
 pub use control::{ControlHandle, NotesFull};
-pub use error::{ControllerError, GuardError};
+pub use error::{ControllerError, GuardError, NotArrived, NotAtRest, Problem};
 pub use guard::{Floor, GuardedIndenter};
 pub use jog::{Jog, Moved, Touched};
+pub use press_fault::{MomentFault, PressFault, TouchFault};
 pub use progress::{Progress, ProgressTracker};
 pub use run::{
     Armed, Finished, Planned, Resume, Run, RunReport, Running, execute, execute_checked,

@@ -3,8 +3,15 @@
 use skinrig_model::{HostDuration, HostTime, Point2, Point3, PoseSample, PressTiming, Skin};
 use skinrig_protocol::plan::RunLimits;
 
+use crate::press_fault::MomentFault;
+
 /// A set point that differs from where it was by more than this has begun to move, mm.
 const MOVED_MM: f64 = 1e-3;
+
+/// Share of the declared tolerance within which a motion counts as settled when another one is to follow that the guard holds
+/// against the whole tolerance. The band between them is one reading of the encoders: 0.01 mm (omega.3, a reseller's figure
+/// for its resolution, < 0.01 mm) of the default tolerance of 0.05 mm.
+pub const SETTLED_SHARE: f64 = 0.8;
 
 /// Waits for a tip that stays close to a target.
 #[derive(Debug, Clone)]
@@ -31,6 +38,15 @@ impl Settling {
             since: None,
             settled: None,
             near: false,
+        }
+    }
+
+    /// Settled a band closer than the guard demands of the motion that follows ([`SETTLED_SHARE`]).
+    #[must_use]
+    pub fn before_a_motion(target: Point3<Skin>, limits: &RunLimits, after: HostTime) -> Self {
+        Self {
+            tolerance_mm: SETTLED_SHARE * limits.position_tolerance_mm,
+            ..Self::new(target, limits, after)
         }
     }
 
@@ -234,9 +250,8 @@ impl PressTracker {
         self.depth = Some(Settling::new(target, &self.limits, t));
     }
 
-    /// The upward motion was commanded at `t`.
-    pub fn rise_from(&mut self, t: HostTime) {
-        let target = self.at.at_height(self.limits.clearance_mm);
+    /// The upward motion to `target` was commanded at `t`.
+    pub fn rise_to(&mut self, target: Point3<Skin>, t: HostTime) {
         self.up_from = Some(t);
         self.up = Some(Settling::new(target, &self.limits, t));
     }
@@ -286,11 +301,9 @@ impl PressTracker {
     /// All six moments, or the first one that is missing or out of order.
     ///
     /// # Errors
-    /// Why there is no timing, in words.
-    pub fn timing(&self) -> Result<PressTiming, String> {
-        let need = |t: Option<HostTime>, what: &str| {
-            t.ok_or_else(|| format!("expected a measured {what}, found none"))
-        };
+    /// Why there is no timing.
+    pub fn timing(&self) -> Result<PressTiming, MomentFault> {
+        let need = |t: Option<HostTime>, what: &'static str| t.ok_or(MomentFault::Missing(what));
         let timing = PressTiming {
             approach: need(self.approach, "begin of the approach")?,
             contact: need(self.contact, "contact")?,
@@ -310,7 +323,7 @@ impl PressTracker {
         if order.is_sorted() {
             Ok(timing)
         } else {
-            Err(format!("expected the moments in order, found {order:?}"))
+            Err(MomentFault::OutOfOrder(order))
         }
     }
 
@@ -333,16 +346,17 @@ impl PressTracker {
     /// Checks the hold against the plan.
     ///
     /// # Errors
-    /// What is off, in words.
-    pub fn check_hold(&self) -> Result<(), String> {
+    /// What is off.
+    pub fn check_hold(&self) -> Result<(), MomentFault> {
         match self.worst {
-            None => Err("expected samples during the hold, found none".to_owned()),
-            Some((off, at)) if off > self.limits.position_tolerance_mm => Err(format!(
-                "hold: expected within {} mm of {}, found {}",
-                self.limits.position_tolerance_mm,
-                crate::error::point(&self.bottom()),
-                crate::error::point(&at)
-            )),
+            None => Err(MomentFault::NoHold),
+            Some((off, found)) if off > self.limits.position_tolerance_mm => {
+                Err(MomentFault::Hold {
+                    tolerance_mm: self.limits.position_tolerance_mm,
+                    target: self.bottom(),
+                    found,
+                })
+            }
             Some(_) => Ok(()),
         }
     }
@@ -396,6 +410,16 @@ mod tests {
         // Samples up to the command do not count.
         assert_eq!(settled(1_000_000, &[0.0, 0.0, 0.0]), None);
         assert_eq!(settled(0, &[0.0, 0.0, 0.0]), Some(HostTime(3_000_000)));
+        // What another motion follows settles a band closer.
+        let before = |z_mm: f64| {
+            let mut settling = Settling::before_a_motion(target, &LIMITS, HostTime(0));
+            samples(&[z_mm; 3]).for_each(|s| settling.feed(&s));
+            settling.settled()
+        };
+        assert_eq!(
+            (before(0.09), before(0.08)),
+            (None, Some(HostTime(3_000_000)))
+        );
     }
 
     #[test]
@@ -411,7 +435,7 @@ mod tests {
                 tracker.indent_from(HostTime(3_000_000));
             }
             if s.t == HostTime(9_000_000) {
-                tracker.rise_from(HostTime(8_000_000));
+                tracker.rise_to(at.at_height(1.0), HostTime(8_000_000));
             }
             tracker.feed(&s);
         }
@@ -435,13 +459,7 @@ mod tests {
         let mut tracker = PressTracker::new(at, 2.0, &LIMITS, HostTime(0), None);
         samples(&[1.0, 0.9, 0.5]).for_each(|s| tracker.feed(&s));
         let found = tracker.timing();
-        assert_eq!(
-            found,
-            Err("expected a measured contact, found none".to_owned())
-        );
-        assert_eq!(
-            tracker.check_hold(),
-            Err("expected samples during the hold, found none".to_owned())
-        );
+        assert_eq!(found, Err(MomentFault::Missing("contact")));
+        assert_eq!(tracker.check_hold(), Err(MomentFault::NoHold));
     }
 }

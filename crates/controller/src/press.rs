@@ -6,10 +6,10 @@ use skinrig_protocol::plan::PressStep;
 
 use crate::core::{Collect, Core, OpenPress};
 use crate::error::{ControllerError, Halt};
-use crate::invalid_run::PAUSED;
 use crate::moments::PressTracker;
+use crate::press_fault::PressFault;
 use crate::touch::Probe;
-use crate::verdict::{Trouble, judge};
+use crate::verdict::judge;
 
 impl Core<'_> {
     /// Executes one press. A press that goes wrong without harm ends invalid and the run goes on, after it was taken again
@@ -51,20 +51,20 @@ impl Core<'_> {
         self.touch = None;
         // A durable intent may have taken a while: know the present pose before moving.
         self.observe()?;
-        let trouble = self.press_motion(step)?;
+        let fault = self.press_motion(step)?;
         self.await_streams()?;
-        Ok(self.close_press(trouble)?)
+        Ok(self.close_press(fault)?)
     }
 
     /// The motion. `Some` says why the press is invalid although the tip is back at clearance height.
-    fn press_motion(&mut self, step: &PressStep) -> Result<Option<Trouble>, Halt> {
+    fn press_motion(&mut self, step: &PressStep) -> Result<Option<PressFault>, Halt> {
         let began = self.now();
         if let Surface::Touch(search) = step.surface {
             self.breakable = true;
             let tared = self.tare(Probe::of(step), search);
-            let tared = tared.map(|t| t.err().map(Trouble::stays));
-            if let Some(trouble) = self.unless_paused(tared)? {
-                return Ok(Some(trouble)); // the tip never left clearance height
+            let tared = tared.map(|t| t.err().map(PressFault::Touch));
+            if let Some(fault) = self.unless_paused(tared)? {
+                return Ok(Some(fault)); // the tip never left clearance height
             }
         }
         let start = self.indenter.position();
@@ -72,7 +72,11 @@ impl Core<'_> {
             Surface::Known => 0.0,
             Surface::Touch(search) => search.band_mm,
         };
-        let down = self.command(step.at.at_height(first_stop_mm), step.approach_speed_mm_s)?;
+        let first_stop = step.at.at_height(first_stop_mm);
+        let down = match self.command_when_steady(first_stop, step.approach_speed_mm_s)? {
+            Ok(t) => t,
+            Err(aside) => return Err(aside.not_arrived(&step.press.to_string()).into()),
+        };
         // The deadline of a press that tares counts from the tare on.
         let deadline = match step.surface {
             Surface::Known => down + step.deadline,
@@ -85,12 +89,14 @@ impl Core<'_> {
         self.with_open(|open| open.tracker = Some(tracker));
         self.breakable = true;
         let went = self.go_down(step, down, deadline);
-        let trouble = self.unless_paused(went)?;
+        let fault = self.unless_paused(went)?;
         self.settling = None; // a search that was broken off leaves it
 
-        let target = step.at.at_height(self.plan.limits.clearance_mm);
+        // Straight up, wherever the hold has left the tip.
+        let at_clearance = step.at.at_height(self.plan.limits.clearance_mm);
+        let target = self.indenter.point_above().unwrap_or(at_clearance);
         let up = self.command(target, step.retract_speed_mm_s)?;
-        self.with_tracker(|t| t.rise_from(up));
+        self.with_tracker(|t| t.rise_to(target, up));
         let height = self.plan.limits.clearance_mm + step.depth_mm;
         let (_, grace) = self.own_motion(height);
         let slow = height / step.retract_speed_mm_s;
@@ -103,26 +109,27 @@ impl Core<'_> {
             self.tick(Some(self.line_free_at()))?;
         }
         let clear = self.tracker().and_then(PressTracker::clear);
-        Ok(trouble.or_else(|| {
+        Ok(fault.or_else(|| {
             let clear = clear.filter(|clear| *clear > deadline)?;
-            Some(Trouble::passing(format!(
-                "expected to be back at clearance height within {}, found {}",
-                step.deadline,
-                clear - down
-            )))
+            Some(PressFault::ClearLate {
+                allowed: step.deadline,
+                found: clear - down,
+            })
         }))
     }
 
     /// What became of a part of the press that `pause_now` may break off.
     fn unless_paused(
         &mut self,
-        part: Result<Option<Trouble>, Halt>,
-    ) -> Result<Option<Trouble>, Halt> {
+        part: Result<Option<PressFault>, Halt>,
+    ) -> Result<Option<PressFault>, Halt> {
         self.breakable = false;
         match part {
             Err(Halt::PausedNow) => {
-                let why = self.suspender.reason().unwrap_or(PAUSED);
-                Ok(Some(Trouble::passing(why.to_owned())))
+                let suspended = self.suspender.reason().map(ToOwned::to_owned);
+                Ok(Some(
+                    suspended.map_or(PressFault::Paused, PressFault::Suspended),
+                ))
             }
             other => other,
         }
@@ -134,11 +141,14 @@ impl Core<'_> {
         step: &PressStep,
         down: HostTime,
         deadline: HostTime,
-    ) -> Result<Option<Trouble>, Halt> {
+    ) -> Result<Option<PressFault>, Halt> {
         let late = |core: &Self, what: &str, z_mm: f64| {
             let target = step.at.at_height(z_mm);
-            let reason = core.not_arrived(what, target, step.deadline).to_string();
-            Some(Trouble::passing(reason))
+            Some(PressFault::Late(core.not_arrived(
+                what,
+                target,
+                step.deadline,
+            )))
         };
         let surface_mm = match step.surface {
             Surface::Known if self.until(PressTracker::at_surface, deadline)? => 0.0,
@@ -149,13 +159,16 @@ impl Core<'_> {
                         self.with_tracker(|t| t.touched(&found));
                         found.measured.z_mm
                     }
-                    Err(trouble) => return Ok(Some(Trouble::stays(trouble))),
+                    Err(fault) => return Ok(Some(PressFault::Touch(fault))),
                 }
             }
         };
         let bottom_mm = surface_mm - step.depth_mm;
         let depth = step.at.at_height(bottom_mm);
-        let t = self.command(depth, step.indent_speed_mm_s)?;
+        let t = match self.command_when_steady(depth, step.indent_speed_mm_s)? {
+            Ok(t) => t,
+            Err(aside) => return Ok(Some(aside.fault())),
+        };
         self.with_tracker(|tracker| tracker.indent_from(t));
         if !self.until(|t| t.at_depth().is_some(), deadline)? {
             return Ok(late(self, "indentation", bottom_mm));
@@ -206,12 +219,12 @@ impl Core<'_> {
     /// Hands over all bytes and poses up to now, then the outcome. Gives whether the press is worth another attempt.
     pub(crate) fn close_press(
         &mut self,
-        trouble: Option<Trouble>,
+        fault: Option<PressFault>,
     ) -> Result<bool, ControllerError> {
         let flushed = self.observe().and(self.collect(Collect::Flush));
         if self.ending {
             if let Err(e) = flushed {
-                self.journal.problem(e.to_string());
+                self.journal.problem("", e);
             }
         } else {
             flushed?;
@@ -221,9 +234,12 @@ impl Core<'_> {
         let Some(open) = &self.open else {
             return Ok(false);
         };
-        let (outcome, again) = judge(open, trouble);
-        self.invalid_run.attempt(&outcome.verdict);
-        self.journal.outcome(outcome)?;
+        let judged = judge(open, fault);
+        let again = judged.again();
+        self.invalid_run.attempt(&judged.faults);
+        self.press_faults
+            .extend(judged.faults.into_iter().map(|f| (open.attempt, f)));
+        self.journal.outcome(judged.outcome)?;
         self.open = None;
         Ok(again)
     }

@@ -3,12 +3,14 @@
 use std::marker::PhantomData;
 
 use skinrig_device::Rig;
-use skinrig_model::{HostTime, PressHistory, ResumeHeader, RunEnd, RunHeader};
+use skinrig_model::{AttemptId, HostTime, PressHistory, PressId, ResumeHeader, RunEnd, RunHeader};
 use skinrig_protocol::plan::Plan;
 
 use crate::checks::Preflight;
 use crate::control::ControlHandle;
 use crate::core::Core;
+use crate::error::{ControllerError, Problem};
+use crate::press_fault::PressFault;
 use crate::settings::ControllerSettings;
 use crate::sink::RecordSink;
 use crate::states::Event;
@@ -28,6 +30,13 @@ pub struct Resume {
 pub struct RunReport {
     /// How it ended, as in the last record.
     pub end: RunEnd,
+    /// Why it ended before its plan did, typed: what ended it, and how the robot was left when that is not as it should be. Empty
+    /// after a completed run and after the operator's stop.
+    pub causes: Vec<ControllerError>,
+    /// What was wrong with each attempt of this leg, in order.
+    pub press_faults: Vec<(AttemptId, PressFault)>,
+    /// The presses that are valid, all legs together.
+    pub valid_presses: Vec<PressId>,
     /// When.
     pub ended_at: HostTime,
     /// Presses of the plan.
@@ -43,7 +52,15 @@ pub struct RunReport {
     /// True when the robot confirmed that it is disarmed.
     pub disarmed: bool,
     /// What else went wrong while ending.
-    pub problems: Vec<String>,
+    pub problems: Vec<Problem>,
+}
+
+impl RunReport {
+    /// True for a press whose last attempt, in whichever leg, was valid.
+    #[must_use]
+    pub fn is_valid(&self, press: PressId) -> bool {
+        self.valid_presses.contains(&press)
+    }
 }
 
 /// State of a [`Run`]: nothing has been opened.
@@ -180,6 +197,9 @@ impl Core<'_> {
         // Concluding always leaves a report; an absent one must not read as success.
         self.report.take().unwrap_or_else(|| RunReport {
             end: RunEnd::Faulted("internal error: no report".to_owned()),
+            causes: vec![ControllerError::Internal("no report".to_owned())],
+            press_faults: Vec::new(),
+            valid_presses: Vec::new(),
             ended_at: HostTime::ZERO,
             planned: self.plan.presses.len(),
             valid: 0,

@@ -27,6 +27,8 @@ pub struct ControllerSettings {
     pub rise_speed_mm_s: f64,
     /// What a motion that is not in the plan may take beyond twice its length divided by its speed.
     pub rise_allowance: HostDuration,
+    /// How long a motion may be asked for again that the guard refused because of where the tip was last measured.
+    pub steady_within: HostDuration,
     /// Longest time for which a trigger box may stay busy.
     pub mark_within: HostDuration,
     /// Pose samples per record, at least 1.
@@ -45,6 +47,7 @@ impl Default for ControllerSettings {
             data_within: HostDuration::from_millis(1_000),
             rise_speed_mm_s: 20.0,
             rise_allowance: HostDuration::from_millis(3_000),
+            steady_within: HostDuration::from_millis(500),
             mark_within: HostDuration::from_millis(1_000),
             pose_block: 256,
         }

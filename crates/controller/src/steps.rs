@@ -4,8 +4,9 @@ use skinrig_model::{HostDuration, HostTime, Point3, Skin};
 use skinrig_protocol::plan::Step;
 
 use crate::core::Core;
-use crate::error::{ControllerError, Halt};
+use crate::error::{ControllerError, GuardError, Halt, NotArrived};
 use crate::moments::Settling;
+use crate::press_fault::PressFault;
 use crate::states::{Action, Event, State};
 
 impl Core<'_> {
@@ -87,8 +88,11 @@ impl Core<'_> {
         speed_mm_s: f64,
         allowed: HostDuration,
     ) -> Result<(), Halt> {
-        let t = self.command(target, speed_mm_s)?;
-        let mut settling = Some(Settling::new(target, &self.plan.limits, t));
+        let t = match self.command_when_steady(target, speed_mm_s)? {
+            Ok(t) => t,
+            Err(aside) => return Err(aside.not_arrived(what).into()),
+        };
+        let mut settling = Some(Settling::before_a_motion(target, &self.plan.limits, t));
         std::mem::swap(&mut self.settling, &mut settling);
         loop {
             self.tick(None)?;
@@ -106,13 +110,45 @@ impl Core<'_> {
         }
     }
 
+    /// Commands a motion once the newest sample allows it. A tip at rest is measured a little off at times; what the guard
+    /// refuses because of where the tip was last measured is asked again at the next looks, and the guard bears no more than
+    /// before. `Err`: the tip does not come to its place.
+    pub(crate) fn command_when_steady(
+        &mut self,
+        target: Point3<Skin>,
+        speed_mm_s: f64,
+    ) -> Result<Result<HostTime, Aside>, Halt> {
+        let within = self.settings.steady_within;
+        let until = self.now() + within;
+        loop {
+            match self.command(target, speed_mm_s) {
+                Err(ControllerError::Guard(GuardError::Lateral { .. })) if self.now() < until => {
+                    self.tick(Some(until))?;
+                }
+                // Where the tip is told to be; without such a place the refusal says all.
+                Err(ControllerError::Guard(refused @ GuardError::Lateral { .. })) => {
+                    let Some(held) = self.indenter.target() else {
+                        return Err(refused.into());
+                    };
+                    return Ok(Err(Aside {
+                        held,
+                        within,
+                        tolerance_mm: self.plan.limits.position_tolerance_mm,
+                        found: self.indenter.position().map(|p| p.measured),
+                    }));
+                }
+                other => return Ok(Ok(other?)),
+            }
+        }
+    }
+
     pub(crate) fn not_arrived(
         &self,
         what: &str,
         target: Point3<Skin>,
         allowed: HostDuration,
-    ) -> ControllerError {
-        ControllerError::NotArrived {
+    ) -> NotArrived {
+        NotArrived {
             what: what.to_owned(),
             tolerance_mm: self.plan.limits.position_tolerance_mm,
             target,
@@ -147,6 +183,36 @@ impl Core<'_> {
                     _ => return Err(internal("safe point", self.machine.state())),
                 },
             }
+        }
+    }
+}
+
+/// A tip that is not where it was told to be before a motion.
+pub(crate) struct Aside {
+    held: Point3<Skin>,
+    within: HostDuration,
+    tolerance_mm: f64,
+    found: Option<Point3<Skin>>,
+}
+
+impl Aside {
+    /// As the end of a run: the motion before `what` did not keep its place.
+    pub(crate) fn not_arrived(self, what: &str) -> NotArrived {
+        NotArrived {
+            what: format!("before {what}"),
+            tolerance_mm: self.tolerance_mm,
+            target: self.held,
+            allowed: self.within,
+            found: self.found,
+        }
+    }
+
+    /// As a fault of a press.
+    pub(crate) fn fault(self) -> PressFault {
+        PressFault::Aside {
+            tolerance_mm: self.tolerance_mm,
+            target: self.held,
+            found: self.found,
         }
     }
 }

@@ -6,6 +6,7 @@ use skinrig_protocol::plan::Step;
 
 use crate::core::Core;
 use crate::error::{ControllerError, Halt};
+use crate::press_fault::TouchFault;
 use crate::touch::Probe;
 
 /// What to do about a surface that is not where the frame says.
@@ -23,7 +24,7 @@ impl Core<'_> {
         for at in &check.points {
             let found = self.touch_point(check, *at)?;
             let sound = matches!(found, Ok(mm) if mm.abs() <= check.tolerance_mm);
-            let words = found.map_or_else(|why| why, |mm| format!("{mm:.3} mm"));
+            let words = found.map_or_else(|why| why.to_string(), |mm| format!("{mm:.3} mm"));
             let name = format!("surface at ({}, {}) mm, {when}", at.x_mm, at.y_mm);
             if !sound {
                 failed.push(format!("{name}: expected {expected}, found {words}"));
@@ -86,7 +87,7 @@ impl Core<'_> {
         &mut self,
         check: &SurfaceCheck,
         at: Point2,
-    ) -> Result<Result<f64, String>, Halt> {
+    ) -> Result<Result<f64, TouchFault>, Halt> {
         loop {
             let paused = self.safe_point()?;
             self.begin += paused;
@@ -110,7 +111,7 @@ impl Core<'_> {
         &mut self,
         check: &SurfaceCheck,
         at: Point2,
-    ) -> Result<Result<f64, String>, Halt> {
+    ) -> Result<Result<f64, TouchFault>, Halt> {
         let search = check.search;
         let (approach_speed_mm_s, way) = self.own_motion(self.plan.limits.clearance_mm);
         let slow = HostDuration::from_secs_f64(4.0 * search.band_mm / search.speed_mm_s);
@@ -121,10 +122,14 @@ impl Core<'_> {
             approach_speed_mm_s,
             within,
         };
-        if let Err(trouble) = self.tare(probe, search)? {
-            return Ok(Err(trouble));
+        if let Err(fault) = self.tare(probe, search)? {
+            return Ok(Err(fault));
         }
-        let down = self.command(at.at_height(search.band_mm), approach_speed_mm_s)?;
+        let band = at.at_height(search.band_mm);
+        let down = match self.command_when_steady(band, approach_speed_mm_s)? {
+            Ok(t) => t,
+            Err(aside) => return Err(aside.not_arrived("the touch of a check point").into()),
+        };
         let found = self.find_surface(probe, search, down, down + within)?;
         Ok(found.map(|sample| sample.measured.z_mm))
     }

@@ -5,8 +5,9 @@ use skinrig_protocol::TouchSearch;
 use skinrig_protocol::plan::PressStep;
 
 use crate::core::Core;
-use crate::error::{Halt, point};
+use crate::error::Halt;
 use crate::moments::Settling;
+use crate::press_fault::TouchFault;
 
 /// Follows the force through the pose stream, from the tare to the touch.
 ///
@@ -121,7 +122,7 @@ impl Probe {
 }
 
 /// Where the surface is, or why the press cannot go on.
-pub(crate) type Found = Result<PoseSample, String>;
+pub(crate) type Found = Result<PoseSample, TouchFault>;
 
 impl Core<'_> {
     /// Averages the force at clearance height, which the tip does not leave.
@@ -129,20 +130,20 @@ impl Core<'_> {
         &mut self,
         step: Probe,
         search: TouchSearch,
-    ) -> Result<Result<(), String>, Halt> {
+    ) -> Result<Result<(), TouchFault>, Halt> {
         let place = step.at.at_height(self.plan.limits.clearance_mm);
         // The command gives the tare its instant in the journal, and the tip its place.
-        let from = self.command(place, step.approach_speed_mm_s)?;
+        let from = match self.command_when_steady(place, step.approach_speed_mm_s)? {
+            Ok(t) => t,
+            Err(aside) => return Err(aside.not_arrived("the tare").into()),
+        };
         self.touch = Some(TouchDetector::new(search, from));
         let deadline = from + search.tare + self.settings.first_pose_within;
         let done = self.until_touch(deadline, |t| t.is_blind() || t.tare_n().is_some())?;
         Ok(match self.touch() {
             Some(t) if done && !t.is_blind() => Ok(()),
-            Some(t) if t.is_blind() => Err("tare: expected forces, found none".to_owned()),
-            _ => Err(format!(
-                "tare: expected forces for {}, found fewer",
-                search.tare
-            )),
+            Some(t) if t.is_blind() => Err(TouchFault::NoForce { during: "tare" }),
+            _ => Err(TouchFault::FewForces(search.tare)),
         })
     }
 
@@ -156,7 +157,7 @@ impl Core<'_> {
         deadline: HostTime,
     ) -> Result<Found, Halt> {
         let above = step.at.at_height(search.band_mm);
-        let mut settling = Some(Settling::new(above, &self.plan.limits, down));
+        let mut settling = Some(Settling::before_a_motion(above, &self.plan.limits, down));
         std::mem::swap(&mut self.settling, &mut settling);
         while self
             .settling
@@ -166,7 +167,7 @@ impl Core<'_> {
             if self.now() >= deadline {
                 self.settling = None;
                 let late = self.not_arrived("approach", above, step.within);
-                return Ok(Err(late.to_string()));
+                return Ok(Err(TouchFault::Late(late)));
             }
             self.tick(Some(deadline))?;
         }
@@ -187,16 +188,13 @@ impl Core<'_> {
                 return Ok(self.believe(found, step, search));
             }
             if self.touch().is_some_and(TouchDetector::is_blind) {
-                return Ok(Err("search: expected forces, found none".to_owned()));
+                return Ok(Err(TouchFault::NoForce { during: "search" }));
             }
             if low(self) || self.now() >= until.min(deadline) {
-                return Ok(Err(format!(
-                    "expected the surface within {} mm of the frame's, found none down to {}",
-                    search.band_mm,
-                    self.indenter
-                        .position()
-                        .map_or_else(|| "an unknown place".to_owned(), |p| point(&p.measured))
-                )));
+                return Ok(Err(TouchFault::NotFound {
+                    band_mm: search.band_mm,
+                    lowest: self.indenter.position().map(|p| p.measured),
+                }));
             }
             self.tick(Some(until.min(deadline)))?;
         }
@@ -208,17 +206,18 @@ impl Core<'_> {
         let height_mm = found.measured.z_mm;
         let highest_mm = search.band_mm - limits.position_tolerance_mm;
         if height_mm >= highest_mm {
-            return Err(format!(
-                "expected the surface within {} mm of the frame's, found a touch at once, at {height_mm:.3} mm",
-                search.band_mm
-            ));
+            return Err(TouchFault::AtOnce {
+                band_mm: search.band_mm,
+                height_mm,
+            });
         }
         let deepest_mm = step.depth_mm - height_mm;
         if deepest_mm > limits.max_depth_mm {
-            return Err(format!(
-                "expected {} mm below the touched surface above the floor at -{} mm, found the surface at {height_mm:.3} mm",
-                step.depth_mm, limits.max_depth_mm
-            ));
+            return Err(TouchFault::TooLow {
+                depth_mm: step.depth_mm,
+                max_depth_mm: limits.max_depth_mm,
+                height_mm,
+            });
         }
         Ok(found)
     }

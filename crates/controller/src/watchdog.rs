@@ -128,8 +128,11 @@ pub struct Watchdog {
     last: Option<PoseSample>,
     /// Samples of the time over which a speed is taken, and the one before them.
     recent: VecDeque<(HostTime, Point3<Skin>)>,
-    /// The tip has been above the deepest place since it was armed.
-    above: bool,
+    /// Depth of the first sample since the robot was armed, mm, until the tip has been clear: a tip in contact sinks a little
+    /// when brakes open, and has to rise before anything else.
+    armed_at_mm: Option<f64>,
+    /// The tip has been clear since it was armed.
+    was_clear: bool,
     looked: Option<HostTime>,
 }
 
@@ -143,17 +146,20 @@ impl Watchdog {
             tripped: false,
             last: None,
             recent: VecDeque::new(),
-            above: false,
+            armed_at_mm: None,
+            was_clear: false,
             looked: None,
         }
     }
 
-    /// The robot is armed. Where it lies then is no fault: one that lies too deep may rise first.
+    /// The robot is armed. Where it lies then is no fault: until the tip has been clear it may lie as deep as it was found, plus
+    /// the tolerance.
     pub fn start(&mut self) {
         self.on = true;
         self.tripped = false;
         self.recent.clear();
-        self.above = false;
+        self.armed_at_mm = None;
+        self.was_clear = false;
         self.looked = None;
     }
 
@@ -252,10 +258,16 @@ impl Watchdog {
             });
         }
         let depth_mm = -s.measured.z_mm;
-        self.above |= depth_mm <= limits.deepest_mm;
-        if self.above && depth_mm > limits.deepest_mm {
+        self.was_clear |= s.measured.z_mm >= limits.clear_mm;
+        let found_at_mm = *self.armed_at_mm.get_or_insert(depth_mm);
+        let limit_mm = if self.was_clear {
+            limits.deepest_mm
+        } else {
+            limits.deepest_mm.max(found_at_mm + limits.tolerance_mm)
+        };
+        if depth_mm > limit_mm {
             return Err(Trip::Depth {
-                limit_mm: limits.deepest_mm,
+                limit_mm,
                 found_mm: depth_mm,
                 t: s.t,
             });

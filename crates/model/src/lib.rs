@@ -13,6 +13,7 @@ pub mod limit;
 pub mod pose;
 pub mod preflight;
 pub mod press;
+pub mod press_fault;
 pub mod pulse;
 pub mod record;
 pub mod scene;
@@ -29,8 +30,9 @@ pub use id::{AttemptId, CameraId, LocationId, PressId, RepetitionId, as_index};
 pub use lens::{LensAngle, LensModel};
 pub use limit::{Limit, Side};
 pub use pose::PoseSample;
-pub use preflight::{CheckVerdict, PreflightCheck};
+pub use preflight::{CheckKind, CheckVerdict, PreflightCheck};
 pub use press::{PlannedPress, PressHistory, PressOutcome, PressRole, PressTiming, PressVerdict};
+pub use press_fault::PressFaultKind;
 pub use pulse::{Label, Mark, MarkKind, PulseTrain, SeenMark, SeenSync, SentMark};
 pub use record::{
     DeviceIdentity, DeviceRole, InterruptionKind, MotionCommand, Record, ResumeHeader, RunEnd,

@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::record::DeviceRole;
+
 /// How a check ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -29,6 +31,30 @@ impl CheckVerdict {
     }
 }
 
+/// What a check before a run is about, for programs that name causes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum CheckKind {
+    /// Anything else.
+    #[default]
+    Other,
+    /// Free space where the session is written.
+    Disk,
+    /// The session file.
+    Recorder,
+    /// The place of the skin.
+    Frame,
+    /// Who a device says it is, and its versions.
+    Identity(DeviceRole),
+    /// Settings that read back as written.
+    ReadBack(DeviceRole),
+    /// The state in which a device has to be.
+    State(DeviceRole),
+    /// A camera's clock.
+    Clock(DeviceRole),
+    /// The way of a trigger mark to a camera.
+    Trigger(DeviceRole),
+}
+
 /// One check before a run.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PreflightCheck {
@@ -42,6 +68,9 @@ pub struct PreflightCheck {
     pub verdict: CheckVerdict,
     /// What to do about a failed check; empty for others.
     pub next_step: String,
+    /// What it is about; not kept in sessions.
+    #[serde(skip)]
+    pub kind: CheckKind,
 }
 
 impl PreflightCheck {
@@ -64,6 +93,7 @@ impl PreflightCheck {
                 CheckVerdict::Failed
             },
             next_step: if ok { String::new() } else { next_step.into() },
+            kind: CheckKind::Other,
         }
     }
 
@@ -80,7 +110,14 @@ impl PreflightCheck {
             found: why.into(),
             verdict: CheckVerdict::Skipped,
             next_step: String::new(),
+            kind: CheckKind::Other,
         }
+    }
+
+    /// The same check, about this.
+    #[must_use]
+    pub fn about(self, kind: CheckKind) -> Self {
+        Self { kind, ..self }
     }
 
     /// True when it failed.

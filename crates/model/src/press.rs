@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::frame::Point2;
 use crate::id::{AttemptId, LocationId, PressId, RepetitionId, as_index};
+use crate::press_fault::PressFaultKind;
 use crate::time::HostTime;
 
 /// What a press is for. Presses that calibrate never score.
@@ -115,6 +116,9 @@ impl PressVerdict {
 pub struct PressHistory {
     /// Attempts so far; 0: nothing is known of it.
     pub attempts: u32,
+    /// How many of them count against the limit of retakes: all but those that ended for what passes
+    /// ([`PressFaultKind::is_of_the_place`]), which the rig or the operator cost, and which are given back.
+    pub spent: u32,
     /// The verdict of the last one; absent when there was none, or when it was cut off.
     pub verdict: Option<PressVerdict>,
 }
@@ -126,6 +130,10 @@ pub struct PressOutcome {
     pub attempt: AttemptId,
     /// How it ended.
     pub verdict: PressVerdict,
+    /// Kinds of the faults that made it invalid, in the order of the verdict's reason; empty for other verdicts and in sessions
+    /// of older schemas.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub faults: Vec<PressFaultKind>,
     /// When; absent when the attempt broke off before its moments were known.
     pub timing: Option<PressTiming>,
     /// The mean measured tip position during the hold, skin frame: the ground truth of localisation.

@@ -2,8 +2,8 @@
 
 use skinrig_model::{
     AttemptId, CameraId, ChunkFacts, HostTime, LocationId, PlannedPress, Point2, PoseSample,
-    PressId, PressOutcome, PressTiming, PressVerdict, RepetitionId, RigidTransform, RunHeader,
-    StreamFormat, press::PressRole,
+    PressFaultKind, PressId, PressOutcome, PressTiming, PressVerdict, RepetitionId, RigidTransform,
+    RunHeader, StreamFormat, press::PressRole,
 };
 use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
@@ -11,7 +11,8 @@ use sqlx::sqlite::SqliteRow;
 use crate::codec::Codec;
 use crate::pose;
 use crate::query::{
-    Fault, int, later_real, named, num, opt_int, opt_num, opt_real, opt_text, real, sha, text,
+    Fault, int, later_real, later_text, named, num, opt_int, opt_num, opt_real, opt_text, real,
+    sha, text,
 };
 use crate::rows::{AttemptRow, ChunkMeta};
 
@@ -121,6 +122,7 @@ pub(crate) fn attempt_from(row: &SqliteRow) -> Result<AttemptRow, Fault> {
         Some(verdict) => Some(PressOutcome {
             attempt: id,
             verdict,
+            faults: faults(id, row)?,
             timing,
             measured_at: measured.0.zip(measured.1).map(|(x, y)| Point2::new(x, y)),
             measured_depth_mm: opt_real(row, "measured_depth_mm")?,
@@ -135,6 +137,18 @@ pub(crate) fn attempt_from(row: &SqliteRow) -> Result<AttemptRow, Fault> {
         intent: at("intent_ns")?,
         outcome,
     })
+}
+
+/// The kinds of faults of an attempt; none in a session of an older schema.
+fn faults(id: AttemptId, row: &SqliteRow) -> Result<Vec<PressFaultKind>, Fault> {
+    let kinds = later_text(row, "faults")?.unwrap_or_default();
+    kinds
+        .split_whitespace()
+        .map(|name| {
+            name.parse()
+                .map_err(|e| Fault::bad(id, "kinds of faults", e))
+        })
+        .collect::<Result<_, Fault>>()
 }
 
 pub(crate) fn chunk_from(row: &SqliteRow) -> Result<ChunkMeta, Fault> {

@@ -328,7 +328,7 @@ impl Journal {
         let mut update = sqlx::query(
             "UPDATE attempt SET verdict = ?, reason = ?, scheduled = ?, approach_ns = ?, contact_ns = ?,
                at_depth_ns = ?, retract_ns = ?, release_ns = ?, clear_ns = ?, measured_x_mm = ?,
-               measured_y_mm = ?, measured_depth_mm = ?, touched_mm = ?, peak_force_n = ?
+               measured_y_mm = ?, measured_depth_mm = ?, touched_mm = ?, peak_force_n = ?, faults = ?
              WHERE press = ? AND number = ? AND verdict IS NULL",
         )
         .bind(outcome.verdict.name())
@@ -348,7 +348,9 @@ impl Journal {
         for number in numbers {
             update = update.bind(number);
         }
+        let faults: Vec<&str> = outcome.faults.iter().map(|kind| kind.name()).collect();
         let rows = update
+            .bind((!faults.is_empty()).then(|| faults.join(" ")))
             .bind(id.press.index())
             .bind(id.number)
             .execute(&mut self.conn)

@@ -124,6 +124,14 @@ pub fn later_real(row: &SqliteRow, column: &str) -> Result<Option<f64>, Fault> {
     }
 }
 
+/// A text column that older schemas do not have.
+pub fn later_text(row: &SqliteRow, column: &str) -> Result<Option<String>, Fault> {
+    match row.try_get(column) {
+        Err(sqlx::Error::ColumnNotFound(_)) => Ok(None),
+        other => Ok(other?),
+    }
+}
+
 /// A text column.
 pub fn text(row: &SqliteRow, column: &str) -> Result<String, Fault> {
     Ok(row.try_get(column)?)

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use skinrig_model::{PressVerdict, ResumeHeader, RunEnd, StreamFormat};
+use skinrig_model::{PressFaultKind, PressVerdict, ResumeHeader, RunEnd, StreamFormat};
 use sqlx::sqlite::{SqliteConnection, SqliteRow};
 use sqlx::{Connection, Sqlite, Transaction};
 
@@ -96,9 +96,10 @@ async fn write(conn: &mut SqliteConnection, header: &ResumeHeader) -> Result<Beg
     let (joint, formats) = joint(&mut all).await?;
     let number = insert_leg(&mut all, header, &joint).await?;
     sqlx::query(
-        "UPDATE attempt SET verdict = 'invalid', reason = ?, scheduled = 0 WHERE verdict IS NULL",
+        "UPDATE attempt SET verdict = 'invalid', reason = ?, scheduled = 0, faults = ? WHERE verdict IS NULL",
     )
     .bind(PressVerdict::cut_off(number - 1).reason())
+    .bind(PressFaultKind::RunEnded.name())
     .execute(&mut *all)
     .await?;
     // The box's clock in this leg does not go on from the one before.

@@ -13,7 +13,7 @@ use crate::error::RecorderError;
 use crate::query::{Fault, each_row};
 
 /// The schema version that this build writes, and the newest that it reads (`PRAGMA user_version`).
-pub const SCHEMA_VERSION: u32 = 7;
+pub const SCHEMA_VERSION: u32 = 8;
 
 /// `skrg` in ASCII (`PRAGMA application_id`).
 pub const APPLICATION_ID: u32 = u32::from_be_bytes(*b"skrg");
@@ -370,6 +370,7 @@ mod tests {
                 "DROP TABLE leg",
                 "DROP TABLE gap",
                 "ALTER TABLE attempt DROP COLUMN touched_mm",
+                "ALTER TABLE attempt DROP COLUMN faults",
                 "DELETE FROM _sqlx_migrations WHERE version > 20261121000000",
                 "PRAGMA user_version = 1",
                 "PRAGMA journal_mode = DELETE",

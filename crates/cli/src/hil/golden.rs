@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use sha2::{Digest, Sha256};
+use skinrig_hil::cause;
 use skinrig_hil::findings::Findings;
 use skinrig_hil::{Bench, GoldenRun, Trouble};
 use skinrig_model::RunEnd;
@@ -11,7 +12,6 @@ use skinrig_protocol::{Plan, Protocol};
 
 use super::bench::RealBench;
 use super::golden_numbers::numbers;
-use super::run_fault;
 use crate::exit::Failure;
 use crate::results::{self, Choices};
 use crate::rig::{bench, gates};
@@ -38,14 +38,10 @@ pub fn golden(bench: &mut RealBench, file: &Path) -> Result<GoldenRun, Trouble> 
     )
     .map_err(|f| trouble(EvidenceKind::Disk, "computer", &f))?;
     let mut findings = Findings::default();
-    match &report.end {
-        RunEnd::Completed => {}
-        RunEnd::Stopped(why) => findings.saw(EvidenceKind::TimeOut, "robot", why.as_str()),
-        RunEnd::Faulted(why) => findings.evidence.push(run_fault::of(why)),
+    if let RunEnd::Stopped(why) = &report.end {
+        findings.saw(EvidenceKind::TimeOut, "robot", why.as_str());
     }
-    for problem in &report.problems {
-        findings.evidence.push(run_fault::of(problem));
-    }
+    findings.evidence.extend(cause::of_run(&report));
     let mut golden = GoldenRun {
         files: Golden {
             session: name(&session),

@@ -12,7 +12,6 @@ pub mod hold;
 pub mod lease;
 mod live;
 pub mod run;
-mod run_fault;
 pub mod trend;
 mod trouble;
 

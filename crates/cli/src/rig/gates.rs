@@ -5,7 +5,7 @@ use std::path::Path;
 use chrono::Utc;
 use skinrig_controller::{ExpectedDevice, Loopback, Preflight};
 use skinrig_device::Rig;
-use skinrig_model::{HostDuration, PreflightCheck};
+use skinrig_model::{CheckKind, HostDuration, PreflightCheck};
 use skinrig_protocol::rig::{Frame, PreflightLimits, RigFile, RigKind};
 
 /// Space that must be left on the disk after a session of the simulated rig, bytes.
@@ -69,6 +69,7 @@ pub fn recorder(session: &Path) -> PreflightCheck {
         true,
         "",
     )
+    .about(CheckKind::Recorder)
 }
 
 fn loopback(rig: &Rig, within: HostDuration) -> Option<Loopback> {
@@ -100,6 +101,7 @@ fn disk(folder: &Path, session_b: f64, reserve_b: f64) -> PreflightCheck {
         Ok(free_b) => PreflightCheck::new("disk", expected, size(free_b), free_b >= need_b, next),
         Err(e) => PreflightCheck::new("disk", expected, e, false, next),
     }
+    .about(CheckKind::Disk)
 }
 
 #[cfg(unix)]
@@ -161,7 +163,7 @@ fn frame(frame: &Frame, limits: &PreflightLimits) -> Vec<PreflightCheck> {
         ),
         None => PreflightCheck::skipped("frame: residual", "touched points", "the frame is given"),
     };
-    vec![age, fit]
+    [age, fit].map(|c| c.about(CheckKind::Frame)).into()
 }
 
 /// The table for people: check, expected, found, verdict, and under a failed check the next step.

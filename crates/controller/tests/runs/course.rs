@@ -148,7 +148,7 @@ fn a_good_run() {
     told.check("good");
     assert_eq!(told.report.end, RunEnd::Completed, "{:?}", told.report);
     assert_eq!(told.verdicts(), ["valid"; 3], "{:?}", told.outcomes());
-    assert_eq!(told.report.problems, Vec::<String>::new());
+    assert_eq!(told.report.problems, Vec::new());
     let w = lock(&told.world);
     let limits = w.limits.as_ref().map(|l| (l.min_mm, l.max_mm));
     // Skin x -40..60, y -50..55, z -3..40, each 0.05 wider, turned by a quarter and shifted.

@@ -165,7 +165,11 @@ fn a_run_that_ends_during_a_press_cuts_it_off() {
 }
 
 fn history(attempts: u32, verdict: Option<PressVerdict>) -> PressHistory {
-    PressHistory { attempts, verdict }
+    PressHistory {
+        attempts,
+        spent: attempts,
+        verdict,
+    }
 }
 
 /// The mock's plan with its first press made a sync press.

@@ -86,7 +86,7 @@ fn too_much_force_ends_at_clearance_height() {
                 assert!(told.end().starts_with(&wanted), "{case}: {}", told.end());
                 told.check_presses(&case);
                 told.check_safe(&case);
-                assert_eq!(told.report.problems, Vec::<String>::new(), "{case}");
+                assert_eq!(told.report.problems, Vec::new(), "{case}");
             }
         }
     }

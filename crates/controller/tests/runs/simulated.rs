@@ -43,7 +43,7 @@ fn presses_on_the_simulated_rig_are_valid_and_reproducible() {
             &mut sink,
         );
         assert_eq!(report.end, RunEnd::Completed, "{report:?}");
-        assert_eq!(report.problems, Vec::<String>::new());
+        assert_eq!(report.problems, Vec::new());
         assert!(report.retracted && report.disarmed);
         sink.records
     };

@@ -226,10 +226,12 @@ fn a_further_leg_checks_the_surface_before_it_presses() {
         let plan = checked_plan(false);
         let cut_off = PressHistory {
             attempts: 1,
+            spent: 0,
             verdict: None,
         };
         let done = PressHistory {
             attempts: 1,
+            spent: 0,
             verdict: Some(PressVerdict::Valid),
         };
         let histories = vec![done, cut_off, PressHistory::default()];

@@ -58,6 +58,7 @@ fn what_was_not_done_is_wanted_after_the_sync_presses() {
     assert!(sync > 0);
     let done = PressHistory {
         attempts: 1,
+        spent: 0,
         verdict: Some(PressVerdict::Valid),
     };
     let mut histories = vec![done; plan.presses.len()];
@@ -74,20 +75,24 @@ fn what_was_not_done_is_wanted_after_the_sync_presses() {
 
 #[test]
 fn a_press_is_final_when_it_is_good_or_has_no_attempt_left() {
-    let wants = |attempts, verdict| {
+    let wants = |spent, verdict| {
         let retakes = Retakes {
             per_press: 2,
             per_session: 0,
         };
-        retakes.wants(&PressHistory { attempts, verdict })
+        retakes.wants(&PressHistory {
+            attempts: 9,
+            spent,
+            verdict,
+        })
     };
     let invalid = |reason: &str| Some(PressVerdict::Invalid(reason.into()));
     assert!(wants(0, None));
     assert!(wants(7, None));
     assert!(wants(7, Some(PressVerdict::Missed("stop".into()))));
     assert!(wants(7, invalid("cut off: the process was gone")));
-    assert!(wants(2, invalid("camera 1 lost 4 bytes")));
-    assert!(!wants(3, invalid("camera 1 lost 4 bytes")));
+    assert!(wants(2, invalid("hold: expected within 0.05 mm")));
+    assert!(!wants(3, invalid("hold: expected within 0.05 mm")));
     assert!(!wants(1, Some(PressVerdict::Valid)));
     assert!(!wants(1, Some(PressVerdict::Excluded("rule".into()))));
 }

@@ -1,7 +1,7 @@
 //! What happened: presses and their attempts, commands, marks, remarks, the end.
 
 use skinrig_model::{
-    BoxReport, CheckVerdict, HostTime, InterruptionKind, Mark, MarkKind, MotionCommand,
+    BoxReport, CheckKind, CheckVerdict, HostTime, InterruptionKind, Mark, MarkKind, MotionCommand,
     PlannedPress, Point3, PreflightCheck, PressId, PressOutcome, RunEnd, SentMark,
 };
 
@@ -64,6 +64,7 @@ impl SessionReader {
         }
         self.all(DOING, "SELECT * FROM preflight ORDER BY id", |row| {
             Ok(PreflightCheck {
+                kind: CheckKind::Other,
                 check: text(row, "name")?,
                 expected: text(row, "expected")?,
                 found: text(row, "found")?,

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use skinrig_model::{CameraId, HostTime, PressHistory, ResumeHeader, RunEnd};
+use skinrig_model::{CameraId, HostTime, PressHistory, PressVerdict, ResumeHeader, RunEnd};
 
 use super::SessionReader;
 use crate::error::RecorderError;
@@ -54,8 +54,18 @@ impl SessionReader {
         let known = |attempts: Vec<crate::rows::AttemptRow>| {
             let last = attempts.last()?;
             let verdict = last.outcome.as_ref().map(|o| o.verdict.clone());
+            // An attempt without an outcome was cut off, one without kinds is of an older schema: its cause is not known.
+            let spends = |a: &&crate::rows::AttemptRow| match &a.outcome {
+                Some(o) if matches!(o.verdict, PressVerdict::Invalid(_)) => {
+                    !o.verdict.is_cut_off()
+                        && (o.faults.is_empty() || o.faults.iter().any(|f| f.is_of_the_place()))
+                }
+                _ => false,
+            };
+            let spent = attempts.iter().filter(spends).count();
             Some(PressHistory {
                 attempts: last.id.number,
+                spent: u32::try_from(spent).unwrap_or(u32::MAX),
                 verdict: verdict.filter(|v| !v.is_cut_off()),
             })
         };

@@ -139,6 +139,10 @@ pub fn outcome(attempt: AttemptId, t: i64, verdict: PressVerdict) -> PressOutcom
     let at = |ms: i64| HostTime(t + ms * 1_000_000);
     PressOutcome {
         attempt,
+        faults: match verdict {
+            PressVerdict::Invalid(_) => vec![PressFaultKind::DataLost, PressFaultKind::Hold],
+            _ => Vec::new(),
+        },
         verdict,
         timing: Some(PressTiming {
             approach: at(1),

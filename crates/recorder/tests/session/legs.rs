@@ -349,6 +349,7 @@ fn a_session_of_an_older_schema_goes_on() {
                 "DROP TABLE leg",
                 "DROP TABLE gap",
                 "ALTER TABLE attempt DROP COLUMN touched_mm",
+                "ALTER TABLE attempt DROP COLUMN faults",
                 "DELETE FROM _sqlx_migrations WHERE version > 20261121120000",
                 "PRAGMA user_version = 2",
             ],

@@ -434,6 +434,7 @@ fn sessions_of_the_first_schema_are_read() {
         for sql in [
             "DROP TABLE preflight",
             "ALTER TABLE attempt DROP COLUMN touched_mm",
+            "ALTER TABLE attempt DROP COLUMN faults",
             "PRAGMA user_version = 1",
         ] {
             conn.execute(sql).await.unwrap();

@@ -92,6 +92,10 @@ pub struct Faults {
     pub operator: Option<(u64, Press)>,
     /// A halt this many ticks after it.
     pub halt_after: Option<u64>,
+    /// The encoders' readings: seed, counts of 0.01 mm by which they are off at most, and how far the tip rests aside, mm.
+    pub encoders: Option<(u64, i64, f64)>,
+    /// A braked tip in contact sinks so far when its brakes open, mm, until it has risen.
+    pub sinks_mm: f64,
     /// N per mm of indentation.
     pub stiffness_n_mm: f64,
     pub train_ms: i64,
@@ -203,6 +207,17 @@ impl World {
             {
                 tip[2] = tip[2].max(floor);
             }
+            if self.armed && self.faults.sinks_mm > 0.0 {
+                // In turn: what sinks also swings back.
+                tip[2] -= if ms % 8 >= 4 {
+                    self.faults.sinks_mm
+                } else {
+                    0.0
+                };
+                if tip[2] > 0.0 {
+                    self.faults.sinks_mm = 0.0;
+                }
+            }
             if self.faults.stuck_sideways_ms.is_some_and(|from| ms >= from) {
                 (tip[0], tip[1]) = (self.tip[0], self.tip[1]);
             }
@@ -217,12 +232,34 @@ impl World {
                 let sample = RobotSample {
                     t: HostTime(self.sampled_to),
                     commanded: to_robot(self.set_point),
-                    measured: to_robot(tip),
+                    measured: to_robot(self.reading(tip)),
                     force_n: (-tip[2]).max(0.0) * self.faults.stiffness_n_mm,
                 };
                 self.deliver(sample, tip);
             }
         }
+    }
+
+    /// What the encoders tell of a tip: whole counts, each off by some of them at random.
+    fn reading(&mut self, tip: [f64; 3]) -> [f64; 3] {
+        const COUNT_MM: f64 = 0.01;
+        let Some((random, counts, aside_mm)) = &mut self.faults.encoders else {
+            return tip;
+        };
+        let mut draw = || {
+            // xorshift64: Marsaglia, "Xorshift RNGs", J. Stat. Softw. 8 (2003).
+            *random ^= *random << 13;
+            *random ^= *random >> 7;
+            *random ^= *random << 17;
+            *random
+        };
+        // Now and then a jolt in free air, beyond the tolerance.
+        let jolted = tip[2] > self.clearance_mm - COUNT_MM && draw() % 200 == 0;
+        let jolt_mm = if jolted { 6.0 * COUNT_MM } else { 0.0 };
+        [tip[0] + *aside_mm + jolt_mm, tip[1], tip[2]].map(|mm| {
+            let off = (draw() % (2 * counts.unsigned_abs() + 1)) as i64 - *counts;
+            ((mm / COUNT_MM).round() + off as f64) * COUNT_MM
+        })
     }
 
     /// Keeps a sample, changed by the strike while the arm is low.

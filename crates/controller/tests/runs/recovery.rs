@@ -1,0 +1,88 @@
+//! A robot that was braked in contact rises first, whatever a pose in contact looks like; and only straight up, and no deeper.
+
+use skinrig_controller::{ControllerError, ControllerSettings, Trip, WatchLimits, Watchdog};
+use skinrig_model::{HostTime, Point3, PoseSample, RunEnd};
+use skinrig_protocol::plan::OnTrip;
+
+use crate::course::{Told, faults, run_plan};
+use crate::mock::*;
+
+/// A run that begins with the tip there, on a robot that sinks so far when its brakes open.
+fn from(start: [f64; 3], sinks_mm: f64, on_trip: OnTrip) -> Told {
+    let mut plan = plan();
+    plan.limits.on_trip = on_trip;
+    let faults = Faults {
+        sinks_mm,
+        stiffness_n_mm: 0.1,
+        ..faults()
+    };
+    run_plan(&plan, faults, start, Sink::default())
+}
+
+/// In contact, at the limit of depth (3.05 mm with its tolerance), below it, beside the plan, and at the workspace's edge.
+#[test]
+fn a_braked_arm_in_contact_rises_before_anything_else() {
+    let starts = [
+        [10.0, 2.0, -2.0],
+        [10.0, 2.0, -3.04],
+        [10.0, 2.0, -3.06],
+        [10.0, 2.0, -3.4],
+        [55.0, 50.0, -3.04],
+        [60.03, 2.0, -3.04],
+        [-40.03, -50.02, -1.0],
+    ];
+    for start in starts {
+        for on_trip in [OnTrip::Retract, OnTrip::Brake] {
+            let told = from(start, 0.03, on_trip);
+            let case = format!("{start:?} {on_trip:?}: {:?}", told.report.causes);
+            assert_eq!(told.report.end, RunEnd::Completed, "{case}");
+            let w = lock(&told.world);
+            let at_edge = start[0] > 60.0 || start[0] < -40.0;
+            assert!(at_edge || w.violations.is_empty(), "{case}");
+            let (first, ..) = w.commands[0];
+            assert_eq!(first[2], LIMITS.clearance_mm, "straight up: {case}");
+            let aside = (first[0] - start[0]).hypot(first[1] - start[1]);
+            assert!(aside <= LIMITS.position_tolerance_mm, "{case}");
+        }
+    }
+}
+
+/// Beyond the tolerance a tip in contact that sinks further is stopped, as ever.
+#[test]
+fn a_tip_that_goes_deeper_than_it_was_found_trips() {
+    for start_mm in [-3.04, -3.4] {
+        let told = from([10.0, 2.0, start_mm], 0.08, OnTrip::Retract);
+        let depth =
+            |e: &ControllerError| matches!(e, ControllerError::Watchdog(Trip::Depth { .. }));
+        assert!(
+            told.report.causes.iter().any(depth),
+            "{:?}",
+            told.report.causes
+        );
+        assert!(told.report.retracted && told.report.disarmed);
+    }
+}
+
+/// Once it was clear the whole limit holds again.
+#[test]
+fn the_slack_ends_at_clearance_height() {
+    let mut dog = Watchdog::new(WatchLimits::of(&LIMITS, &ControllerSettings::default()));
+    dog.start();
+    let mut see = |s: i64, z_mm: f64| {
+        let at = Point3::new(10.0, 2.0, z_mm);
+        dog.see(&PoseSample {
+            t: HostTime(s * 1000 * MS),
+            commanded: at,
+            measured: at,
+            force_n: 0.0,
+        })
+    };
+    for (s, z_mm) in [(1, -3.4), (2, -3.44), (3, 4.0), (4, -3.44), (5, 5.0)] {
+        assert_eq!(see(s, z_mm), Ok(()), "at {s} s");
+    }
+    let limit = match see(6, -3.06) {
+        Err(Trip::Depth { limit_mm, .. }) => limit_mm,
+        other => panic!("{other:?}"),
+    };
+    assert_eq!(limit, 3.05);
+}

@@ -1,0 +1,114 @@
+//! Encoder noise: a healthy robot's readings refuse no motion, and a robot that is aside is named as that.
+
+use skinrig_controller::{ControllerError, PressFault, RunReport, execute};
+use skinrig_model::*;
+use skinrig_protocol::plan::{Plan, Step};
+
+use crate::mock::*;
+
+/// Keeps nothing.
+struct Nowhere;
+
+impl skinrig_controller::RecordSink for Nowhere {
+    fn accept(&mut self, _record: Record) -> Result<(), skinrig_controller::SinkFault> {
+        Ok(())
+    }
+}
+
+/// So many short presses, at two places in turn.
+fn presses(n: usize) -> Plan {
+    let mut plan = plan();
+    let steps = std::mem::take(&mut plan.steps);
+    let listed = std::mem::take(&mut plan.presses);
+    let block: Vec<Step> = steps
+        .into_iter()
+        .filter(|s| !matches!(s, Step::Pause { .. } | Step::Begin { .. }))
+        .collect();
+    plan.steps.push(Step::Begin {
+        repetition: Some(0),
+    });
+    for i in 0..n {
+        let from = 2 * (i % 2) * 2;
+        let mut pair: Vec<Step> = block[from..from + 2].to_vec();
+        let mut planned = listed[2 * (i % 2)];
+        planned.id = PressId(i as u32);
+        if let Some(Step::Press(p)) = pair.last_mut() {
+            (p.press, p.start_after_begin) = (planned.id, None);
+            p.hold = HostDuration::from_millis(5);
+            p.marks.clear();
+        }
+        plan.presses.push(planned);
+        plan.steps.extend(pair);
+    }
+    plan
+}
+
+fn run(plan: &Plan, encoders: (u64, i64, f64)) -> (RunReport, Vec<String>) {
+    let faults = Faults {
+        encoders: Some(encoders),
+        train_ms: 10,
+        ..Faults::default()
+    };
+    let world = World::shared(faults, [0.0, 0.0, 10.0]);
+    let control = lock(&world).control.clone();
+    let report = execute(plan, header(plan), rig(&world), &control, &mut Nowhere);
+    let violations = lock(&world).violations.clone();
+    (report, violations)
+}
+
+/// Readings within one count of a tip that rests up to two of five counts aside, and in free air a jolt of six counts in one
+/// reading of 200: what settles is pressed. 10,000 presses.
+#[test]
+fn noisy_encoders_refuse_no_motion() {
+    let presses_each = 500;
+    let plan = presses(presses_each);
+    let mut pressed = 0;
+    for seed in 1..=20_u64 {
+        let aside_mm = 0.01 * (seed % 3) as f64;
+        let (report, violations) = run(&plan, (seed, 1, aside_mm));
+        assert_eq!(report.causes, Vec::new(), "seed {seed}");
+        assert_eq!(
+            (report.end, report.valid),
+            (RunEnd::Completed, presses_each),
+            "seed {seed}: {:?}",
+            report.press_faults.first()
+        );
+        assert_eq!(violations, Vec::<String>::new());
+        pressed += report.valid;
+    }
+    assert_eq!(pressed, 10_000);
+}
+
+/// Beyond what counts as settled the run ends, and the robot is named, not a refused motion.
+#[test]
+fn a_tip_that_rests_aside_is_the_robots_fault() {
+    let plan = presses(4);
+    for aside_mm in [0.06, 0.2] {
+        let (report, _) = run(&plan, (7, 0, aside_mm));
+        assert!(
+            matches!(report.causes.first(), Some(ControllerError::NotArrived(_))),
+            "{:?}",
+            report.causes
+        );
+        assert!(report.retracted && report.disarmed);
+    }
+}
+
+/// Noise beyond the tolerance never settles: a fault of the robot as well.
+#[test]
+fn encoders_beyond_the_tolerance_are_the_robots_fault() {
+    let (report, violations) = run(&presses(4), (3, 12, 0.0));
+    let refused = |e: &ControllerError| matches!(e, ControllerError::Guard(_));
+    assert!(
+        !report.causes.is_empty() && !report.causes.iter().any(refused),
+        "{:?}",
+        report.causes
+    );
+    assert_eq!(violations, Vec::<String>::new());
+    assert!(
+        report
+            .press_faults
+            .iter()
+            .all(|(_, f)| !matches!(f, PressFault::Paused))
+    );
+}

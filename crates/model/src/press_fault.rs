@@ -1,0 +1,111 @@
+//! Kinds of faults that make an attempt at a press invalid.
+
+use std::fmt;
+use std::str::FromStr;
+
+use serde::{Deserialize, Serialize};
+
+/// Kind of fault that made an attempt invalid. Programs decide by it; people read the reason beside it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PressFaultKind {
+    /// A camera lost bytes.
+    DataLost,
+    /// A camera sent no bytes at all.
+    NoData,
+    /// A camera's data had not come when the verdict could wait no longer.
+    DataLate,
+    /// A camera sent more events per second than the plan bears.
+    Storm,
+    /// The tip came too late: to the surface, to depth or back to clearance height.
+    Late,
+    /// The tip was pushed aside on its way down.
+    Aside,
+    /// The operator or a suspension broke the press off.
+    Paused,
+    /// The run ended during the press.
+    RunEnded,
+    /// The surface was not where it may be, or was not found.
+    Surface,
+    /// The robot reported no force, or too few.
+    NoForce,
+    /// A moment of the press was not measured.
+    Unmeasured,
+    /// The tip left its place during the hold.
+    Hold,
+}
+
+impl PressFaultKind {
+    /// All kinds.
+    pub const ALL: [Self; 12] = [
+        Self::DataLost,
+        Self::NoData,
+        Self::DataLate,
+        Self::Storm,
+        Self::Late,
+        Self::Aside,
+        Self::Paused,
+        Self::RunEnded,
+        Self::Surface,
+        Self::NoForce,
+        Self::Unmeasured,
+        Self::Hold,
+    ];
+
+    /// The name used in sessions.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::DataLost => "data_lost",
+            Self::NoData => "no_data",
+            Self::DataLate => "data_late",
+            Self::Storm => "storm",
+            Self::Late => "late",
+            Self::Aside => "aside",
+            Self::Paused => "paused",
+            Self::RunEnded => "run_ended",
+            Self::Surface => "surface",
+            Self::NoForce => "no_force",
+            Self::Unmeasured => "unmeasured",
+            Self::Hold => "hold",
+        }
+    }
+
+    /// True for what the skin or the robot is like at that place: pressing it again would only wear it. False for what
+    /// passes: lost data, a late motion, an operator who broke the press off, the end of the run.
+    #[must_use]
+    pub const fn is_of_the_place(self) -> bool {
+        matches!(
+            self,
+            Self::Surface | Self::NoForce | Self::Unmeasured | Self::Hold
+        )
+    }
+}
+
+impl fmt::Display for PressFaultKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for PressFaultKind {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let found = Self::ALL.into_iter().find(|kind| kind.name() == text);
+        found.ok_or_else(|| format!("expected a kind of press fault, found `{text}`"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_read_back() {
+        for kind in PressFaultKind::ALL {
+            assert_eq!(kind.name().parse(), Ok(kind));
+        }
+        assert!("other".parse::<PressFaultKind>().is_err());
+    }
+}
