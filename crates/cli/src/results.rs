@@ -166,7 +166,7 @@ fn settings(
     }
     all.extend_from_slice(choices.overrides);
     let text = header.protocol_text.as_bytes();
-    let loader = |p: &Path| std::fs::read(p);
+    let loader = skinrig_formats::regular::read_text;
     if header.rig_kind == "imported" {
         skinrig_protocol::schedule::Schedule::parse(&header.protocol_name, text, &all)
             .map(|s| s.analysis)

@@ -14,6 +14,7 @@ pub mod pose;
 pub mod preflight;
 pub mod press;
 pub mod pulse;
+pub mod range;
 pub mod record;
 pub mod scene;
 pub mod settings;
@@ -32,6 +33,7 @@ pub use pose::PoseSample;
 pub use preflight::{CheckVerdict, PreflightCheck};
 pub use press::{PlannedPress, PressHistory, PressOutcome, PressRole, PressTiming, PressVerdict};
 pub use pulse::{Label, Mark, MarkKind, PulseTrain, SeenMark, SeenSync, SentMark};
+pub use range::ValueRange;
 pub use record::{
     DeviceIdentity, DeviceRole, InterruptionKind, MotionCommand, Record, ResumeHeader, RunEnd,
     RunHeader, Setting,

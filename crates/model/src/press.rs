@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::frame::Point2;
 use crate::id::{AttemptId, PressId};
-use crate::time::HostTime;
+use crate::time::{HostDuration, HostTime};
 
 /// What a press is for. Presses that calibrate never score.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
@@ -50,6 +50,21 @@ pub struct PressTiming {
     pub release: HostTime,
     /// The tip settled at the clearance height.
     pub clear: HostTime,
+}
+
+impl PressTiming {
+    /// The same moments, each `delay` later.
+    #[must_use]
+    pub fn after(self, delay: HostDuration) -> Self {
+        Self {
+            approach: self.approach + delay,
+            contact: self.contact + delay,
+            at_depth: self.at_depth + delay,
+            retract: self.retract + delay,
+            release: self.release + delay,
+            clear: self.clear + delay,
+        }
+    }
 }
 
 /// How a press ended. Planned = valid + missed + invalid + excluded, always.
