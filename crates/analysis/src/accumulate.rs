@@ -18,7 +18,7 @@ use crate::held::Held;
 use crate::keeper::{KeepPlan, Keeper};
 use crate::kept::KeptEvent;
 use crate::rates::RateHistogram;
-use crate::result::{Activity, PicturePixel, PressPicture, PressView, RateZoom};
+use crate::result::{Activity, OffSensor, PicturePixel, PressPicture, PressView, RateZoom};
 use crate::segment::Window;
 use crate::width::width_u;
 
@@ -82,6 +82,7 @@ pub struct Accumulator<'a> {
     quiet_until_us: u64,
     newest_us: u64,
     late: u64,
+    off_sensor: OffSensor,
     thinning: Thinning,
     dbscan: Dbscan,
     /// An estimator other than clusters of single pixels, and the windows keep their events for it.
@@ -157,6 +158,8 @@ pub struct Accumulated {
     pub held: Option<Held>,
     /// Events that came more than [`SLACK_US`] after newer ones.
     pub late: u64,
+    /// Events outside the sensor, left out; all zero for a pass over held events.
+    pub off_sensor: OffSensor,
 }
 
 impl<'a> Accumulator<'a> {
@@ -193,6 +196,7 @@ impl<'a> Accumulator<'a> {
             quiet_until_us: 0,
             newest_us: 0,
             late: 0,
+            off_sensor: OffSensor::default(),
             thinning: Thinning::new(settings.thinning, camera, settings.seed),
             dbscan: Dbscan::new(settings.eps_px, settings.min_samples),
             estimator: (settings.estimator != Estimator::Dbscan || settings.bin_px > 1)
@@ -217,19 +221,16 @@ impl<'a> Accumulator<'a> {
             // Looks at every event without a branch; only a bad slice is searched.
             let (mut on_sensor, mut in_order, mut last_us) = (true, true, 0);
             for e in slice {
-                on_sensor &= (e.x < SENSOR_WIDTH) & (e.y < SENSOR_HEIGHT);
+                on_sensor &= is_on_sensor(e);
                 in_order &= last_us <= e.t_us;
                 last_us = e.t_us;
             }
-            let off_sensor = |e: &&CdEvent| e.x >= SENSOR_WIDTH || e.y >= SENSOR_HEIGHT;
-            if !on_sensor && let Some(event) = slice.iter().find(off_sensor) {
-                self.error = Some(AnalysisError::OffSensor {
-                    camera: self.camera,
-                    x: event.x,
-                    y: event.y,
-                    t_us: event.t_us,
-                });
-                return;
+            self.off_sensor.of += slice.len() as u64;
+            if !on_sensor {
+                let on: Vec<CdEvent> = slice.iter().filter(|e| is_on_sensor(e)).copied().collect();
+                self.off_sensor.events += (slice.len() - on.len()) as u64;
+                on.chunks(1).for_each(|event| self.take_in_order(event));
+                continue;
             }
             if in_order {
                 self.take_in_order(slice);
@@ -512,8 +513,13 @@ impl<'a> Accumulator<'a> {
             pictures: self.pictures,
             held: self.held.filter(|_| self.late == 0),
             late: self.late,
+            off_sensor: self.off_sensor,
         })
     }
+}
+
+fn is_on_sensor(event: &CdEvent) -> bool {
+    (event.x < SENSOR_WIDTH) & (event.y < SENSOR_HEIGHT)
 }
 
 /// The place of the first event, by time, from `time_us` on.

@@ -16,7 +16,7 @@ use crate::metrics::{Exclusions, metrics, penalised};
 use crate::rates::RateHistogram;
 use crate::result::{
     ANALYSIS_VERSION, Activity, Alignment, Analysis, ClockFit, ClockMap, ContactTiming,
-    DepthResult, MapName, PressPicture, PressResult, PressView, RateSeries, RateZoom,
+    DepthResult, MapName, OffSensor, PressPicture, PressResult, PressView, RateSeries, RateZoom,
 };
 use crate::segment::{Window, windows};
 use crate::sets::ScoreSet;
@@ -165,6 +165,7 @@ pub fn analyze_and_keep(
         reference: None,
         findings: Vec::new(),
         activity: [one.activity, two.activity].into_iter().flatten().collect(),
+        off_sensor: [one.off_sensor, two.off_sensor],
         rates: [one.rates, two.rates],
         presses,
         warnings: [one.warnings, two.warnings, warnings].concat(),
@@ -249,6 +250,7 @@ struct CameraResult {
     zooms: Vec<RateZoom>,
     kept: Vec<KeepPlan>,
     activity: Option<Activity>,
+    off_sensor: OffSensor,
     warnings: Vec<String>,
 }
 
@@ -307,6 +309,7 @@ fn camera_pass(
     let mut rates = Some(RateHistogram::new(rate_bin_us(settings)));
     let mut activity = None;
     let mut held = None;
+    let mut off_sensor = OffSensor::default();
     let by_marks = |channel| fit_marks(&input.edges[k], channel, &input.marks);
     let marks = input
         .rig
@@ -343,6 +346,7 @@ fn camera_pass(
         let empty = Accumulator::new(camera, settings, wanted);
         let first = pass(source, camera, empty)?;
         (rates, activity, held) = (first.rates, first.activity, first.held);
+        off_sensor = first.off_sensor;
         let found = rates
             .as_ref()
             .map_or_else(|| Err(String::new()), |r| fit_rates(r, &spans(input)));
@@ -371,6 +375,7 @@ fn camera_pass(
             activity,
             held: None,
             late: 0,
+            off_sensor,
         },
         (Some(clock), rates) => {
             let aligned_by_rates = clock.method == crate::result::ClockMethod::EventRates;
@@ -391,7 +396,8 @@ fn camera_pass(
             let mut done = match held {
                 Some(held) => {
                     accumulator.take_held(&held);
-                    accumulator.finish()?
+                    let done = accumulator.finish()?;
+                    Accumulated { off_sensor, ..done }
                 }
                 None => pass(source, camera, accumulator)?,
             };
@@ -424,6 +430,17 @@ fn camera_pass(
             "{beyond} events lie days away from the others and are not in the event rates"
         ));
     }
+    let off_sensor = collected.off_sensor;
+    if off_sensor.share() > OffSensor::MAX_SHARE {
+        let OffSensor { events, of } = off_sensor;
+        return Err(AnalysisError::OffSensor { camera, events, of });
+    }
+    if off_sensor.share() > OffSensor::WARNING_SHARE {
+        warnings.push(format!(
+            "{} of {} events lie outside the sensor and are left out: is the recording damaged, or of another sensor?",
+            off_sensor.events, off_sensor.of
+        ));
+    }
     let series = collected
         .rates
         .map(|r| r.series(clock.as_ref()))
@@ -438,6 +455,7 @@ fn camera_pass(
         zooms: collected.zooms,
         kept: collected.kept,
         activity: collected.activity,
+        off_sensor,
         warnings: warnings
             .into_iter()
             .map(|w| format!("{camera}: {w}"))

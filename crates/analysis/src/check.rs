@@ -1,18 +1,19 @@
 //! What an analysis asks of its input before it begins.
 
-use skinrig_model::{AnalysisSettings, CameraId, Point2, RigGeometry, SENSOR_HEIGHT};
+use skinrig_model::range::analysis as limits;
+use skinrig_model::{
+    AnalysisSettings, CameraId, PlannedPress, Point2, PressId, RigGeometry, SENSOR_HEIGHT,
+    SkinOutline, ValueRange,
+};
 
+use crate::cmre::ContactMap;
 use crate::error::AnalysisError;
 use crate::estimators::BIN_SIDES_PX;
 use crate::input::SessionInput;
 
-/// Largest DBSCAN radius, px.
-const MAX_EPS_PX: f64 = 50.0;
 /// Largest coordinate, length or skew that is taken for one: 1000 km. Squares of it and sums of them stay exact
 /// enough to be distances.
 const MAX_COORDINATE_MM: f64 = 1e9;
-/// Most bootstrap resamples.
-const MAX_RESAMPLES: u32 = 1_000_000;
 
 /// Journal and plan fit together, settings are in range, the geometry can be used.
 pub fn input(input: &SessionInput) -> Result<(), AnalysisError> {
@@ -32,8 +33,39 @@ pub fn input(input: &SessionInput) -> Result<(), AnalysisError> {
             });
         }
     }
-    settings(input)?;
-    for planned in &input.planned {
+    settings(&input.settings)?;
+    presses(&input.planned)?;
+    geometry(&input.rig)
+}
+
+/// Checks before anything is recorded what an analysis would refuse afterwards: the settings, the plan, and whether the
+/// two fit each other and the skin's outline.
+///
+/// # Errors
+/// [`AnalysisError::Setting`] or [`AnalysisError::Plan`].
+pub fn before_recording(
+    planned: &[PlannedPress],
+    chosen: &AnalysisSettings,
+    outline: &SkinOutline,
+) -> Result<(), AnalysisError> {
+    settings(chosen)?;
+    presses(planned)?;
+    ContactMap::new(outline, &chosen.cmre)?;
+    for number in &chosen.exclude_presses {
+        if !planned.iter().any(|p| p.id.0 == *number) {
+            return Err(AnalysisError::Setting {
+                name: "exclude_presses",
+                expected: format!("presses of the plan, which has {}", planned.len()),
+                found: PressId(*number).to_string(),
+            });
+        }
+    }
+    Ok(())
+}
+
+/// Places and depths of the plan are numbers that distances can be taken of.
+fn presses(all: &[PlannedPress]) -> Result<(), AnalysisError> {
+    for planned in all {
         let numbers = [planned.at.x_mm, planned.at.y_mm, planned.depth_mm];
         if !numbers.iter().all(|n| n.abs() <= MAX_COORDINATE_MM) {
             return Err(AnalysisError::Plan {
@@ -45,7 +77,7 @@ pub fn input(input: &SessionInput) -> Result<(), AnalysisError> {
             });
         }
     }
-    geometry(&input.rig)
+    Ok(())
 }
 
 /// True for a point with finite coordinates within 1000 km of the origin.
@@ -54,7 +86,10 @@ pub fn is_place(p: &Point2) -> bool {
 }
 
 /// Cameras and outline are such that rays, areas and distances are numbers.
-fn geometry(rig: &RigGeometry) -> Result<(), AnalysisError> {
+///
+/// # Errors
+/// [`AnalysisError::Geometry`] or [`AnalysisError::Outline`].
+pub fn geometry(rig: &RigGeometry) -> Result<(), AnalysisError> {
     for camera in CameraId::ALL {
         let model = &rig.nominal.cameras[camera.index()];
         let (p, a) = (model.position, model.aim);
@@ -95,119 +130,110 @@ fn geometry(rig: &RigGeometry) -> Result<(), AnalysisError> {
     }
 }
 
-fn settings(input: &SessionInput) -> Result<(), AnalysisError> {
-    let s = &input.settings;
-    let number = |name, ok: bool, expected, found: f64| {
-        if ok {
+/// Every setting is in its range.
+///
+/// # Errors
+/// [`AnalysisError::Setting`] for the first setting out of its range.
+pub fn settings(s: &AnalysisSettings) -> Result<(), AnalysisError> {
+    let number = |name, range: ValueRange, found: f64| {
+        if range.contains(found) {
             Ok(())
         } else {
             Err(AnalysisError::Setting {
                 name,
-                expected,
+                expected: range.describe(""),
                 found: found.to_string(),
             })
         }
     };
-    let ms = |v: f64| (-10_000.0..=10_000.0).contains(&v);
-    number(
-        "eps_px",
-        s.eps_px > 0.0 && s.eps_px <= MAX_EPS_PX,
-        "a radius above 0 and up to 50 px",
-        s.eps_px,
-    )?;
-    number(
-        "min_samples",
-        s.min_samples > 0,
-        "at least 1 event",
-        f64::from(s.min_samples),
-    )?;
-    let within = "a time between -10 s and 10 s";
-    number(
-        "window_before_ms",
-        ms(s.window_before_ms),
-        within,
-        s.window_before_ms,
-    )?;
-    number(
-        "window_after_ms",
-        ms(s.window_after_ms),
-        within,
-        s.window_after_ms,
-    )?;
-    number(
-        "rate_bin_ms",
-        (0.1..=10_000.0).contains(&s.rate_bin_ms),
-        "a bin between 0.1 ms and 10 s",
-        s.rate_bin_ms,
-    )?;
-    number(
-        "min_response_sigma",
-        (0.0..=1e6).contains(&s.min_response_sigma),
-        "a number of standard errors, 0 or more",
-        s.min_response_sigma,
-    )?;
-    number(
-        "min_ray_sine",
-        (0.0..1.0).contains(&s.min_ray_sine),
-        "a sine from 0 up to 1",
-        s.min_ray_sine,
-    )?;
+    let optional =
+        |name, range, found: Option<f64>| found.map_or(Ok(()), |found| number(name, range, found));
+    let both = |name, range, (first, last): (f64, f64)| {
+        number(name, range, first)?;
+        number(name, range, last)?;
+        in_order(name, first, last)
+    };
+    let (r, l, c) = (&s.reduction, &s.latency, &s.cmre);
+    let few = &l.reduced;
+    number("eps_px", limits::EPS_PX, s.eps_px)?;
+    number("min_samples", limits::MIN_SAMPLES, s.min_samples.into())?;
+    // Negative margins cut the ends off a press; no protocol asks for them.
+    let margin = limits::WINDOW_MARGIN_MS;
+    number("window_before_ms", margin, s.window_before_ms.abs())?;
+    number("window_after_ms", margin, s.window_after_ms.abs())?;
+    let after = limits::WINDOW_AFTER_CONTACT_MS;
+    optional("window_after_contact_ms", after, s.window_after_contact_ms)?;
+    number("rate_bin_ms", limits::RATE_BIN_MS, s.rate_bin_ms)?;
+    let sigma = limits::MIN_RESPONSE_SIGMA;
+    number("min_response_sigma", sigma, s.min_response_sigma)?;
+    number("min_ray_sine", limits::MIN_RAY_SINE, s.min_ray_sine)?;
+    let events = limits::MIN_CLUSTER_EVENTS;
+    number("min_cluster_events", events, s.min_cluster_events.into())?;
+    let resamples = limits::BOOTSTRAP_RESAMPLES;
     number(
         "bootstrap_resamples",
-        s.bootstrap_resamples <= MAX_RESAMPLES,
-        "at most a million resamples",
-        f64::from(s.bootstrap_resamples),
+        resamples,
+        s.bootstrap_resamples.into(),
     )?;
-    let positive = |v: f64, most: f64| v > 0.0 && v <= most;
-    number(
+    optional(
         "failure_penalty_mm",
-        s.failure_penalty_mm.is_none_or(|mm| positive(mm, 1e6)),
-        "a length above 0",
-        s.failure_penalty_mm.unwrap_or(0.0),
+        limits::LENGTH_MM,
+        s.failure_penalty_mm,
     )?;
+    number("within_mm", limits::LENGTH_MM, s.within_mm)?;
+    number("bits_per_event", limits::BITS_PER_EVENT, s.bits_per_event)?;
     number(
-        "within_mm",
-        positive(s.within_mm, 1e6),
-        "a length above 0",
-        s.within_mm,
+        "study_presses",
+        limits::STUDY_PRESSES,
+        s.study_presses.into(),
     )?;
+    number("forget_ms", limits::FORGET_MS, s.forget_ms)?;
+    number("thinning", limits::THINNING, s.thinning.into())?;
+    let power = limits::REDUCTION_MAX_POWER;
+    number("reduction.max_power", power, r.max_power.into())?;
+    number("reduction.seeds", limits::REDUCTION_SEEDS, r.seeds.into())?;
+    let samples = limits::REDUCTION_MIN_SAMPLES;
+    number("reduction.min_samples", samples, r.min_samples.into())?;
+    number("latency.bin_ms", limits::LATENCY_BIN_MS, l.bin_ms)?;
+    number("latency.sigma_ms", limits::LATENCY_SIGMA_MS, l.sigma_ms)?;
+    number("latency.alpha", limits::LATENCY_ALPHA, l.alpha)?;
+    let (count, threshold) = (limits::LATENCY_COUNT, limits::LATENCY_THRESHOLD);
+    number("latency.consecutive", count, l.consecutive.into())?;
+    both("latency.threshold_range", threshold, l.threshold_range)?;
+    number("latency.thresholds", count, l.thresholds.into())?;
+    number("latency.target_rate", limits::SHARE, l.target_rate)?;
+    number("latency.window_ms", limits::LATENCY_WINDOW_MS, l.window_ms)?;
     number(
-        "bits_per_event",
-        positive(s.bits_per_event, 1024.0),
-        "a number above 0 and up to 1024",
-        s.bits_per_event,
+        "latency.reduced.factor",
+        limits::THINNING,
+        few.factor.into(),
     )?;
+    both(
+        "latency.reduced.threshold_range",
+        threshold,
+        few.threshold_range,
+    )?;
+    number("latency.reduced.thresholds", count, few.thresholds.into())?;
     number(
-        "forget_ms",
-        s.forget_ms >= 0.1 && s.forget_ms <= 60_000.0,
-        "a time between 0.1 ms and 60 s",
-        s.forget_ms,
+        "latency.reduced.target_rate",
+        limits::SHARE,
+        few.target_rate,
     )?;
-    number(
-        "thinning",
-        (1..=1 << 20).contains(&s.thinning),
-        "a factor from 1 to 1048576",
-        f64::from(s.thinning),
-    )?;
-    number(
-        "bin_px",
-        BIN_SIDES_PX.contains(&s.bin_px),
-        "1, 2, 4, 8 or 16 px",
-        f64::from(s.bin_px),
-    )?;
-    number(
-        "window_after_contact_ms",
-        s.window_after_contact_ms
-            .is_none_or(|v| positive(v, 60_000.0)),
-        "a time above 0 and up to 60 s",
-        s.window_after_contact_ms.unwrap_or(0.0),
-    )?;
-    studies(s, &number)?;
+    number("cmre.cell_mm", limits::CMRE_CELL_MM, c.cell_mm)?;
+    number("cmre.sigma_mm", limits::CMRE_WIDTH_MM, c.sigma_mm)?;
+    number("cmre.sr_mm", limits::CMRE_WIDTH_MM, c.sr_mm)?;
+    if !BIN_SIDES_PX.contains(&s.bin_px) {
+        return Err(AnalysisError::Setting {
+            name: "bin_px",
+            expected: "1, 2, 4, 8 or 16 px".into(),
+            found: s.bin_px.to_string(),
+        });
+    }
     for (from, to) in s.crop_v {
         if from > to || to >= SENSOR_HEIGHT {
             return Err(AnalysisError::Setting {
                 name: "crop_v",
-                expected: "first and last row, in order, within 0..=479",
+                expected: "first and last row, in order, within 0..=479".into(),
                 found: format!("{from}..={to}"),
             });
         }
@@ -215,115 +241,14 @@ fn settings(input: &SessionInput) -> Result<(), AnalysisError> {
     Ok(())
 }
 
-/// Ranges of the studies' settings. `number` makes the error.
-fn studies(
-    s: &AnalysisSettings,
-    number: &impl Fn(&'static str, bool, &'static str, f64) -> Result<(), AnalysisError>,
-) -> Result<(), AnalysisError> {
-    let positive = |v: f64, most: f64| v > 0.0 && v <= most;
-    let (r, l, c) = (&s.reduction, &s.latency, &s.cmre);
-    number(
-        "reduction.max_power",
-        r.max_power <= 20,
-        "a power of 2 from 0 to 20",
-        f64::from(r.max_power),
-    )?;
-    number(
-        "reduction.seeds",
-        (1..=1000).contains(&r.seeds),
-        "1 to 1000 seeds",
-        f64::from(r.seeds),
-    )?;
-    number(
-        "latency.bin_ms",
-        (0.01..=10.0).contains(&l.bin_ms),
-        "a bin between 0.01 ms and 10 ms",
-        l.bin_ms,
-    )?;
-    number(
-        "latency.sigma_ms",
-        (0.0..=50.0).contains(&l.sigma_ms),
-        "a width between 0 and 50 ms",
-        l.sigma_ms,
-    )?;
-    number(
-        "latency.alpha",
-        l.alpha > 1.0 && l.alpha <= 1000.0,
-        "a rate increase above 1 and up to 1000",
-        l.alpha,
-    )?;
-    number(
-        "latency.consecutive",
-        (1..=1000).contains(&l.consecutive),
-        "1 to 1000 bins",
-        f64::from(l.consecutive),
-    )?;
-    let in_order = |(first, last)| positive(first, 1e6) && positive(last, 1e6) && first <= last;
-    number(
-        "latency.threshold_range",
-        in_order(l.threshold_range),
-        "two thresholds above 0 in order",
-        l.threshold_range.0,
-    )?;
-    number(
-        "latency.thresholds",
-        (1..=1000).contains(&l.thresholds),
-        "1 to 1000 thresholds",
-        f64::from(l.thresholds),
-    )?;
-    number(
-        "latency.target_rate",
-        (0.0..=1.0).contains(&l.target_rate),
-        "a share from 0 to 1",
-        l.target_rate,
-    )?;
-    let few = &l.reduced;
-    number(
-        "latency.reduced.factor",
-        (1..=1 << 20).contains(&few.factor),
-        "a factor from 1 to 2^20",
-        f64::from(few.factor),
-    )?;
-    number(
-        "latency.reduced.threshold_range",
-        in_order(few.threshold_range),
-        "two thresholds above 0 in order",
-        few.threshold_range.0,
-    )?;
-    number(
-        "latency.reduced.thresholds",
-        (1..=1000).contains(&few.thresholds),
-        "1 to 1000 thresholds",
-        f64::from(few.thresholds),
-    )?;
-    number(
-        "latency.reduced.target_rate",
-        (0.0..=1.0).contains(&few.target_rate),
-        "a share from 0 to 1",
-        few.target_rate,
-    )?;
-    number(
-        "latency.window_ms",
-        positive(l.window_ms, 10_000.0),
-        "a time above 0 and up to 10 s",
-        l.window_ms,
-    )?;
-    number(
-        "cmre.cell_mm",
-        (0.5..=100.0).contains(&c.cell_mm),
-        "a side between 0.5 mm and 100 mm",
-        c.cell_mm,
-    )?;
-    number(
-        "cmre.sigma_mm",
-        (0.001..=1000.0).contains(&c.sigma_mm),
-        "a length between 0.001 mm and 1 m",
-        c.sigma_mm,
-    )?;
-    number(
-        "cmre.sr_mm",
-        (0.001..=1e6).contains(&c.sr_mm),
-        "a length between 0.001 mm and 1 km",
-        c.sr_mm,
-    )
+/// The ends of a grid are in order.
+fn in_order(name: &'static str, first: f64, last: f64) -> Result<(), AnalysisError> {
+    if first <= last {
+        return Ok(());
+    }
+    Err(AnalysisError::Setting {
+        name,
+        expected: "first and last, in order".into(),
+        found: format!("{first} to {last}"),
+    })
 }

@@ -88,7 +88,7 @@ impl ContactMap {
             } else {
                 Err(AnalysisError::Setting {
                     name,
-                    expected: "a length above 0 mm",
+                    expected: "a length above 0 mm".into(),
                     found: value.to_string(),
                 })
             }
@@ -102,7 +102,7 @@ impl ContactMap {
         if !(1.0..=MAX_CELLS).contains(&most) {
             return Err(AnalysisError::Setting {
                 name: "cmre.cell_mm",
-                expected: "a cell that fits at most 200 times along the skin",
+                expected: "a cell that fits at most 200 times along the skin".into(),
                 found: cell_mm.to_string(),
             });
         }

@@ -29,7 +29,7 @@ pub enum AnalysisError {
         /// Its name in the protocol.
         name: &'static str,
         /// What is allowed.
-        expected: &'static str,
+        expected: String,
         /// What was given.
         found: String,
     },
@@ -71,17 +71,15 @@ pub enum AnalysisError {
     },
     /// An event lies off the sensor.
     #[error(
-        "expected events within 640 x 480 px, found ({x}, {y}) at {t_us} µs of {camera}; the stream was decoded with the wrong format or sensor"
+        "expected events within 640 x 480 px but for at most 1 %, found {events} of {of} outside ({camera}); the stream is another sensor's or was decoded with the wrong format: `skinrig inspect` shows its header"
     )]
     OffSensor {
         /// Which camera.
         camera: CameraId,
-        /// Column.
-        x: u16,
-        /// Row.
-        y: u16,
-        /// Camera time, µs.
-        t_us: u64,
+        /// Events outside the sensor.
+        events: u64,
+        /// Events in all.
+        of: u64,
     },
     /// More events in the windows of presses than a counter holds, or than an estimator that needs them all may keep.
     #[error(

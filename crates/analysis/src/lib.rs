@@ -15,7 +15,7 @@ pub mod audit;
 pub mod bit_rates;
 pub mod calibrate;
 mod caveats;
-mod check;
+pub mod check;
 pub mod clock;
 mod closeups;
 pub mod cmre;

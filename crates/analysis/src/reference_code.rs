@@ -17,7 +17,8 @@ use crate::kept::Kept;
 use crate::metrics::{mean, quantile, root_mean_square};
 use crate::reduction::{Attempt, Outcome, Trials};
 use crate::result::{
-    Analysis, LocationOutcome, PressResult, ReferenceCode, ReferenceReduction, Thinning,
+    Analysis, CalibrationResult, LocationOutcome, PressResult, ReferenceCode, ReferenceReduction,
+    Thinning,
 };
 use crate::sets::CalibrationSet;
 use crate::triangulate::locate;
@@ -32,7 +33,7 @@ const ERROR_OF_NOTHING_MM: f64 = 1.0;
 #[must_use]
 pub fn reference_code(input: &SessionInput, analysis: &Analysis, kept: &Kept) -> ReferenceCode {
     let mut presses = used(input, analysis);
-    let (geometry, calibrated) = calibrated_on_all(input, &mut presses);
+    let (geometry, fit) = calibrated_on_all(input, &mut presses);
     for press in &mut presses {
         press.location_outcome = locate(&geometry, &analysis.rig.outline, columns(press));
     }
@@ -51,7 +52,8 @@ pub fn reference_code(input: &SessionInput, analysis: &Analysis, kept: &Kept) ->
     let mut lengths: Vec<f64> = x.iter().zip(&y).map(|(x, y)| libm::hypot(*x, *y)).collect();
     ReferenceCode {
         presses: judged.len() as u32,
-        calibrated,
+        calibrated: fit.is_some(),
+        parameters: fit.map_or_else(Vec::new, |f| f.names.into_iter().zip(f.values).collect()),
         with_centroids: with_centroids.count() as u32,
         inside: lengths.len() as u32,
         std_of_errors_mm: population_std(&lengths),
@@ -84,9 +86,12 @@ fn columns(press: &PressResult) -> [Option<f64>; 2] {
     [0, 1].map(|k| press.views[k].and_then(|v| v.centroid_u))
 }
 
-/// The paper's eight parameters on all of `presses`, which are marked as calibrating; the nominal geometry and false
+/// The paper's eight parameters on all of `presses`, which are marked as calibrating; the nominal geometry alone
 /// where they do not determine it.
-fn calibrated_on_all(input: &SessionInput, presses: &mut [PressResult]) -> (StereoGeometry, bool) {
+fn calibrated_on_all(
+    input: &SessionInput,
+    presses: &mut [PressResult],
+) -> (StereoGeometry, Option<CalibrationResult>) {
     for press in presses.iter_mut() {
         press.role = PressRole::Calibrate;
     }
@@ -96,7 +101,7 @@ fn calibrated_on_all(input: &SessionInput, presses: &mut [PressResult]) -> (Ster
     }
     let set = CalibrationSet::from_presses(presses);
     let fit = calibrate(&set, &start, CalibrationModel::Full, input.settings.seed);
-    fit.map_or((start, false), |(geometry, _)| (geometry, true))
+    fit.map_or((start, None), |(geometry, fit)| (geometry, Some(fit)))
 }
 
 /// Share of the presses that pass as the public code counts: an error strictly below the threshold, a press without an

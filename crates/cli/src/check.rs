@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use skinrig_formats::regular;
 use skinrig_protocol::{Diagnostics, Plan, Protocol, Step, path_svg};
 
 use crate::args::{PlanArgs, ProtocolArgs};
@@ -31,10 +32,10 @@ pub fn load(path: &Path, overrides: &[String]) -> Result<Checked, Failure> {
 }
 
 fn read(path: &Path, overrides: &[String]) -> Result<Result<Checked, Box<Refused>>, Failure> {
-    let bytes = std::fs::read(path).map_err(|e| {
+    let bytes = regular::read_text(path).map_err(|e| {
         Failure::input(format!("{}: cannot read the protocol: {e}", path.display()))
     })?;
-    let loader = |p: &Path| std::fs::read(p);
+    let loader = regular::read_text;
     let protocol = match Protocol::parse(&path.to_string_lossy(), &bytes, overrides, &loader) {
         Ok(protocol) => protocol,
         Err(found) => {
@@ -44,6 +45,11 @@ fn read(path: &Path, overrides: &[String]) -> Result<Result<Checked, Box<Refused
     };
     let plan = protocol.compile();
     let held = protocol.check(&plan);
+    if held.is_ok() {
+        let outline = &protocol.surroundings.outline;
+        skinrig_analysis::check::before_recording(&plan.presses, &protocol.analysis, outline)
+            .map_err(|e| Failure::input(format!("{}: {e}", path.display())))?;
+    }
     let checked = Checked { protocol, plan };
     Ok(match held {
         Ok(()) => Ok(checked),

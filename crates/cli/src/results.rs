@@ -208,7 +208,7 @@ fn settings(
         )));
     }
     let text = header.protocol_text.as_bytes();
-    let loader = |p: &Path| std::fs::read(p);
+    let loader = skinrig_formats::regular::read_text;
     if header.rig_kind == "imported" {
         skinrig_protocol::schedule::Schedule::parse_recorded(&header.protocol_name, text, &all)
             .map(|s| s.analysis)

@@ -250,7 +250,7 @@ fn go_on(
 /// The session's own protocol, read again: its text is in the session, files that it names are where they were.
 fn protocol_of(found: &Unfinished) -> Result<Protocol, Failure> {
     let header = &found.header;
-    let loader = |p: &Path| std::fs::read(p);
+    let loader = skinrig_formats::regular::read_text;
     Protocol::parse(
         &header.protocol_name,
         header.protocol_text.as_bytes(),

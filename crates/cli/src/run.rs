@@ -8,8 +8,8 @@ use skinrig_controller::{
 };
 use skinrig_device::Rig;
 use skinrig_model::{
-    AnalysisSettings, CameraId, HostDuration, InterruptionKind, PressVerdict, RunEnd, RunHeader,
-    SimLevel,
+    AnalysisSettings, CameraId, HostDuration, HostTime, InterruptionKind, PressVerdict, RunEnd,
+    RunHeader, SimLevel,
 };
 use skinrig_protocol::{Plan, PlantedFault, Protocol};
 use skinrig_recorder::{RecorderError, SessionReader, SessionWriter};
@@ -69,6 +69,10 @@ pub fn record(
     preflight: Option<Preflight>,
     operator: &Operator,
 ) -> Result<(PathBuf, RunReport), Failure> {
+    let outline = &rig.geometry.outline;
+    skinrig_analysis::check::before_recording(&plan.presses, intent.analysis, outline)
+        .and_then(|()| skinrig_analysis::check::geometry(&rig.geometry))
+        .map_err(|e| Failure::input(format!("{}: {e}", intent.file_name)))?;
     let started = Utc::now();
     let started_at = started.to_rfc3339_opts(SecondsFormat::Secs, true);
     let header = header(intent, plan, &rig, &started_at)?;
@@ -469,6 +473,17 @@ fn foreknowledge(reader: &SessionReader) -> Result<Foreknowledge, RecorderError>
         PressVerdict::Excluded(rule) => Some((o.attempt.press, rule.clone())),
         _ => None,
     });
+    // Of a schedule, since the attempt began; what was measured is measured again.
+    let presses = reader.presses()?;
+    let attempts = presses.iter().filter_map(|(_, attempts)| attempts.last());
+    let timings = attempts.filter_map(|attempt| {
+        let outcome = attempt.outcome.as_ref().filter(|o| o.scheduled)?;
+        let begun = attempt.intent? - HostTime::ZERO;
+        Some((
+            attempt.id.press,
+            outcome.timing?.after(HostDuration(-begun.0)),
+        ))
+    });
     let interruptions = reader.interruptions()?;
     let ending = interruptions.last().filter(|i| {
         use InterruptionKind as K;
@@ -476,6 +491,7 @@ fn foreknowledge(reader: &SessionReader) -> Result<Foreknowledge, RecorderError>
     });
     Ok(Foreknowledge {
         scheduled: outcomes().any(|o| o.scheduled),
+        timings: timings.collect(),
         excluded: excluded.collect(),
         interruption: ending.map(|i| (i.t, i.kind)),
     })

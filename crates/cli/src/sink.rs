@@ -4,7 +4,9 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use skinrig_controller::{ControlHandle, RecordSink, SinkFault};
-use skinrig_model::{HostTime, InterruptionKind, PressId, PressVerdict, Record};
+use skinrig_model::{
+    HostTime, InterruptionKind, PressId, PressOutcome, PressTiming, PressVerdict, Record,
+};
 use skinrig_recorder::{RecorderError, Sealed, SessionWriter};
 
 use crate::fault::Saboteur;
@@ -17,10 +19,28 @@ use crate::rig::gates;
 pub struct Foreknowledge {
     /// Times and positions come from a schedule; nothing was measured.
     pub scheduled: bool,
+    /// When each scheduled press happens, each moment as the time since its attempt began. The controller sees its poses
+    /// at intervals; a schedule is exact.
+    pub timings: BTreeMap<PressId, PressTiming>,
     /// Presses that are left out, with the rule that says so.
     pub excluded: BTreeMap<PressId, String>,
     /// When and how the operator ended the recorded run.
     pub interruption: Option<(HostTime, InterruptionKind)>,
+}
+
+impl Foreknowledge {
+    /// Adds to the outcome of an attempt that began at `begun` what no device can say.
+    fn complete(&self, outcome: &mut PressOutcome, begun: HostTime) {
+        outcome.scheduled |= self.scheduled;
+        let scheduled = self.timings.get(&outcome.attempt.press);
+        if let (Some(timing), Some(scheduled)) = (&mut outcome.timing, scheduled) {
+            *timing = scheduled.after(begun - HostTime::ZERO);
+        }
+        let rule = self.excluded.get(&outcome.attempt.press);
+        if let (PressVerdict::Valid, Some(rule)) = (&outcome.verdict, rule) {
+            outcome.verdict = PressVerdict::Excluded(rule.clone());
+        }
+    }
 }
 
 /// Writes every record to the session file and shows it.
@@ -28,6 +48,8 @@ pub struct SessionSink {
     writer: SessionWriter,
     view: ProgressView,
     known: Foreknowledge,
+    /// When the present attempt began.
+    begun: HostTime,
     /// Where the session lies, when its free space matters.
     folder: Option<PathBuf>,
     /// Remarks to be written once the leg has begun.
@@ -45,6 +67,7 @@ impl SessionSink {
             writer,
             view,
             known,
+            begun: HostTime::ZERO,
             folder: None,
             notes: Vec::new(),
             saboteur: Saboteur::default(),
@@ -124,12 +147,10 @@ impl RecordSink for SessionSink {
     }
 
     fn accept(&mut self, mut record: Record) -> Result<(), SinkFault> {
-        if let Record::Outcome(outcome) = &mut record {
-            outcome.scheduled |= self.known.scheduled;
-            let rule = self.known.excluded.get(&outcome.attempt.press);
-            if let (PressVerdict::Valid, Some(rule)) = (&outcome.verdict, rule) {
-                outcome.verdict = PressVerdict::Excluded(rule.clone());
-            }
+        match &mut record {
+            Record::Intent { t, .. } => self.begun = *t,
+            Record::Outcome(outcome) => self.known.complete(outcome, self.begun),
+            _ => {}
         }
         if let Record::Preflight(checks) = &record {
             self.view.say(&gates::table(checks));

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use skinrig_analysis::{EventSource, LegStart};
-use skinrig_formats::{Decoder, Scanner};
+use skinrig_formats::{Decoder, Geometry, Scanner};
 use skinrig_model::{CameraId, CdEvent, ChunkFacts, StreamFormat, TriggerEdge};
 use skinrig_recorder::{ChunkScanner, SessionReader};
 
@@ -65,8 +65,9 @@ struct LegDecoder {
 
 impl LegDecoder {
     fn new(format: StreamFormat) -> Self {
+        // Events outside the sensor are delivered too: the analysis counts them and leaves them out.
         Self {
-            decoder: Decoder::new(format),
+            decoder: Decoder::with_geometry(format, Geometry::ANY),
             by_us: 0,
             moved: Vec::new(),
         }

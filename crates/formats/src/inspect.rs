@@ -1,6 +1,5 @@
 //! What is in a file of events: kind, header, counts, time span, rate, gaps. Streamed, for files of any size.
 
-use std::fs::File;
 use std::io::Read as _;
 use std::path::Path;
 
@@ -9,6 +8,7 @@ use skinrig_model::{CdEvent, Polarity, StreamFormat, TriggerEdge};
 use crate::error::FormatsError;
 use crate::hdf5::Container;
 use crate::raw::RawReader;
+use crate::regular;
 use crate::stream::{Discontinuity, EventSink, Geometry, StreamStats};
 
 /// Gaps and discontinuities beyond this number are counted but not listed.
@@ -34,7 +34,7 @@ impl FileKind {
     /// [`FormatsError::Io`].
     pub fn detect(path: &Path) -> Result<Self, FormatsError> {
         let mut start = Vec::new();
-        File::open(path)
+        regular::open(path)
             .and_then(|file| file.take(16).read_to_end(&mut start))
             .map_err(FormatsError::io(path))?;
         Ok(match &start[..] {

@@ -9,6 +9,7 @@ pub mod hdf5;
 pub mod inspect;
 pub mod positions;
 pub mod raw;
+pub mod regular;
 pub mod stream;
 
 pub use error::FormatsError;

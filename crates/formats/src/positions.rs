@@ -4,13 +4,13 @@
 //! allowed only after the last press; they are reported, with their lines, and are no presses. A row with some
 //! values must have x and y, and z when the table has that column.
 
-use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use csv::{ReaderBuilder, StringRecord, Trim};
 
 use crate::error::FormatsError;
+use crate::regular;
 
 /// Coordinates beyond this are not positions on a bench, mm.
 const MAX_MM: f64 = 10_000.0;
@@ -63,8 +63,8 @@ impl PositionTable {
     /// # Errors
     /// [`FormatsError::Io`], or [`FormatsError::Table`] as [`Self::parse`].
     pub fn read(path: &Path, unit: LengthUnit) -> Result<Self, FormatsError> {
-        let file = File::open(path).map_err(FormatsError::io(path))?;
-        Self::parse(file, path, unit)
+        let text = regular::read_text(path).map_err(FormatsError::io(path))?;
+        Self::parse(&text[..], path, unit)
     }
 
     /// Reads a table from `source`; `path` is its name in messages.

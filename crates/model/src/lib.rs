@@ -15,6 +15,7 @@ pub mod preflight;
 pub mod press;
 pub mod press_fault;
 pub mod pulse;
+pub mod range;
 pub mod record;
 pub mod scene;
 pub mod settings;
@@ -34,6 +35,7 @@ pub use preflight::{CheckKind, CheckVerdict, PreflightCheck};
 pub use press::{PlannedPress, PressHistory, PressOutcome, PressRole, PressTiming, PressVerdict};
 pub use press_fault::PressFaultKind;
 pub use pulse::{Label, Mark, MarkKind, PulseTrain, SeenMark, SeenSync, SentMark};
+pub use range::ValueRange;
 pub use record::{
     DeviceIdentity, DeviceRole, InterruptionKind, MotionCommand, Record, ResumeHeader, RunEnd,
     RunHeader, Setting,

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::frame::Point2;
 use crate::id::{AttemptId, LocationId, PressId, RepetitionId, as_index};
 use crate::press_fault::PressFaultKind;
-use crate::time::HostTime;
+use crate::time::{HostDuration, HostTime};
 
 /// What a press is for. Presses that calibrate never score.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
@@ -54,6 +54,21 @@ pub struct PressTiming {
     pub release: HostTime,
     /// The tip settled at the clearance height.
     pub clear: HostTime,
+}
+
+impl PressTiming {
+    /// The same moments, each `delay` later.
+    #[must_use]
+    pub fn after(self, delay: HostDuration) -> Self {
+        Self {
+            approach: self.approach + delay,
+            contact: self.contact + delay,
+            at_depth: self.at_depth + delay,
+            retract: self.retract + delay,
+            release: self.release + delay,
+            clear: self.clear + delay,
+        }
+    }
 }
 
 /// How a press ended. Planned = valid + missed + invalid + excluded, always.

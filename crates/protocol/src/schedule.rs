@@ -89,6 +89,20 @@ pub struct PressPhases {
 }
 
 impl PressPhases {
+    /// The moments of a press since the begin of its downward motion, as host times from 0.
+    #[must_use]
+    pub fn since_approach(&self) -> PressTiming {
+        let at = |moment: HostDuration| HostTime(moment.0 - self.approach.0);
+        PressTiming {
+            approach: at(self.approach),
+            contact: at(self.contact),
+            at_depth: at(self.at_depth),
+            retract: at(self.retract),
+            release: at(self.release),
+            clear: at(self.clear),
+        }
+    }
+
     /// From the begin of the downward motion to the return to clearance height, s.
     fn length_s(&self) -> f64 {
         self.clear.as_secs_f64() - self.approach.as_secs_f64()

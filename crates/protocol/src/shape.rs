@@ -4,6 +4,8 @@
 //! needed. The reader turns a node into a [`Field`] by its shape, so a key that is not in a table cannot be read,
 //! and a key in a table is always in the schema.
 
+pub(crate) use skinrig_model::ValueRange as Range;
+
 use crate::quantity::Dimension;
 use crate::source::Span;
 
@@ -44,58 +46,6 @@ pub(crate) enum Need {
 
 /// A word that may stand for a value, and what it means.
 pub(crate) type Word = (&'static str, &'static str);
-
-/// The range of a number, in the unit that values are kept in.
-#[derive(Clone, Copy)]
-pub(crate) struct Range {
-    pub min: f64,
-    /// True when `min` itself is not allowed.
-    pub above: bool,
-    pub max: f64,
-}
-
-impl Range {
-    pub const fn above_zero(max: f64) -> Self {
-        Self {
-            min: 0.0,
-            above: true,
-            max,
-        }
-    }
-    pub const fn from_zero(max: f64) -> Self {
-        Self {
-            min: 0.0,
-            above: false,
-            max,
-        }
-    }
-    pub const fn between(min: f64, max: f64) -> Self {
-        Self {
-            min,
-            above: false,
-            max,
-        }
-    }
-    /// True when `value` is allowed.
-    pub fn contains(&self, value: f64) -> bool {
-        value <= self.max
-            && if self.above {
-                value > self.min
-            } else {
-                value >= self.min
-            }
-    }
-    /// For "expected".
-    pub fn describe(&self, unit: &str) -> String {
-        let unit = if unit.is_empty() {
-            String::new()
-        } else {
-            format!(" {unit}")
-        };
-        let low = if self.above { "more than" } else { "at least" };
-        format!("{low} {}{unit} and at most {}{unit}", self.min, self.max)
-    }
-}
 
 /// What a value looks like.
 pub(crate) enum Shape {

@@ -2,9 +2,11 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use skinrig_analysis::result::{Analysis, Latency, PressResult};
+use skinrig_analysis::result::{Analysis, Latency, OffSensor, PressResult};
 use skinrig_analysis::triangulate::locate;
-use skinrig_model::{LocationId, Point2, PressId, PressRole};
+use skinrig_model::{CameraId, LocationId, Point2, PressId, PressRole};
+
+use crate::format::grouped;
 
 /// True for the presses behind the headline: scored, valid, with a truth and an estimate.
 #[must_use]
@@ -215,6 +217,21 @@ pub struct Residual {
     pub before: Option<Point2>,
     /// Located with the calibrated geometry.
     pub after: Option<Point2>,
+}
+
+/// One line per camera with events outside the sensor, which no number uses.
+#[must_use]
+pub fn off_sensor(analysis: &Analysis) -> Vec<String> {
+    let cameras = CameraId::ALL.into_iter().zip(&analysis.off_sensor);
+    let found = cameras.filter(|(_, off)| off.events > 0);
+    let line = |(camera, off): (CameraId, &OffSensor)| {
+        format!(
+            "{camera}: {} of {} events lie outside the sensor",
+            grouped(off.events),
+            grouped(off.of)
+        )
+    };
+    found.map(line).collect()
 }
 
 /// One row per calibrating press with a truth and both centroids, in plan order; empty without a calibration.

@@ -104,3 +104,25 @@ mod rows {
             .collect()
     }
 }
+
+/// Events that a camera's stream places outside the sensor: none of them is used.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct OffSensor {
+    /// Events outside the sensor.
+    pub events: u64,
+    /// All events of the stream, these among them.
+    pub of: u64,
+}
+
+impl OffSensor {
+    /// A larger share is a warning.
+    pub const WARNING_SHARE: f64 = 1e-4;
+    /// With a larger share there is no analysis: the stream is another sensor's, or broken.
+    pub const MAX_SHARE: f64 = 0.01;
+
+    /// The share of the events outside the sensor, 0 to 1.
+    #[must_use]
+    pub fn share(&self) -> f64 {
+        self.events as f64 / self.of.max(1) as f64
+    }
+}

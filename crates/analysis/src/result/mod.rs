@@ -14,7 +14,7 @@ pub use alignment::{
 };
 pub use audit::{Fault, Finding, Law};
 pub use calibration::{CalibrationResult, ModelComparison, ThresholdChoice};
-pub use coverage::{Activity, BitRates, Cmre, Coverage};
+pub use coverage::{Activity, BitRates, Cmre, Coverage, OffSensor};
 pub use latency::{
     ContactLatency, ContactTiming, Latency, LatencyCourse, ReducedLatency, ThresholdRow,
     TrialBackground,
@@ -81,6 +81,9 @@ pub struct Analysis {
     pub findings: Vec<Finding>,
     /// Events per pixel over the whole recording, camera 1 and camera 2.
     pub activity: Vec<Activity>,
+    /// Events outside the sensor, left out of everything, camera 1 and camera 2.
+    #[serde(default)]
+    pub off_sensor: [OffSensor; 2],
     /// The RMSE of the scored presses at each depth, shallowest first; empty when one depth was scored.
     pub depths: Vec<DepthResult>,
     /// Event-rate course of each camera over the whole session.

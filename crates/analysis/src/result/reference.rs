@@ -9,6 +9,10 @@ pub struct ReferenceCode {
     pub presses: u32,
     /// False when they determine no plausible geometry: the nominal one judges, and the numbers say nothing about the skin.
     pub calibrated: bool,
+    /// The parameters of its calibration, by name: positions in mm, skews in degrees, distortions without unit; empty when
+    /// it was not calibrated.
+    #[serde(default)]
+    pub parameters: Vec<(String, f64)>,
     /// How many have two centroids.
     pub with_centroids: u32,
     /// How many of those have their estimate in the enclosing square.

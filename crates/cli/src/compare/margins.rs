@@ -17,7 +17,7 @@ pub(super) fn choices(args: &CompareArgs) -> Result<Choices, Failure> {
     let file = named.or_else(|| Some(Path::new(FILE)).filter(|p| p.is_file()));
     let read = file.map(|path| {
         let name = path.display().to_string();
-        let bytes = std::fs::read(path).map_err(|e| {
+        let bytes = skinrig_formats::regular::read_text(path).map_err(|e| {
             Failure::input(format!(
                 "{name}: cannot read: {e}\n  next: name a file of limits with --limits"
             ))

@@ -147,7 +147,7 @@ fn keep(night: &Night, folder: &Path, history: Option<&Path>) -> Result<Told, St
 }
 
 fn load(path: &Path) -> Result<Suite, Failure> {
-    let bytes = std::fs::read(path)
+    let bytes = skinrig_formats::regular::read_text(path)
         .map_err(|e| Failure::input(format!("cannot read {}: {e}", path.display())))?;
     Suite::parse(&path.display().to_string(), &bytes).map_err(|found| Failure::findings(&found))
 }

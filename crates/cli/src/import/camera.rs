@@ -70,7 +70,13 @@ impl ChunkFeed {
                 self.send()?;
                 self.chunk_from_us = end;
             }
-            if let Some(Err(e)) = self.encoder.as_mut().map(|x| x.cd(*event, &mut self.bytes)) {
+            // Outside the sensor in any case: EVT2 has room for no larger number.
+            let event = CdEvent {
+                x: event.x.min(evt2::MAX_COORDINATE),
+                y: event.y.min(evt2::MAX_COORDINATE),
+                ..*event
+            };
+            if let Some(Err(e)) = self.encoder.as_mut().map(|x| x.cd(event, &mut self.bytes)) {
                 return self.fail(e.to_string());
             }
             if self.bytes.len() >= CHUNK_BYTES {

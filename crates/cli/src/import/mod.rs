@@ -17,6 +17,7 @@ use skinrig_formats::hdf5::Container;
 use skinrig_formats::inspect::FileKind;
 use skinrig_formats::positions::{LengthUnit, PositionTable};
 use skinrig_formats::raw::RawReader;
+use skinrig_formats::regular;
 use skinrig_model::{
     CameraId, DeviceIdentity, HostDuration, LocationId, Point2, RigidTransform, StreamFormat,
 };
@@ -40,7 +41,10 @@ const SMALLEST_PATH_MM: f64 = 1.0;
 /// [`Failure::input`] for files that are not what they should be, [`Failure::rig`] when a file breaks off inside.
 pub fn import(args: &ImportArgs, command_line: &str, json: bool) -> Outcome {
     let name = args.schedule.to_string_lossy();
-    let bytes = std::fs::read(&args.schedule)
+    for file in [&args.camera1, &args.camera2, &args.presses] {
+        regular::check(file).map_err(|e| Failure::input(format!("{}: {e}", file.display())))?;
+    }
+    let bytes = regular::read_text(&args.schedule)
         .map_err(|e| Failure::input(format!("{name}: cannot read the schedule: {e}")))?;
     let schedule = Schedule::parse(&name, &bytes, &args.overrides)
         .map_err(|found| Failure::findings(&found))?;
@@ -53,6 +57,10 @@ pub fn import(args: &ImportArgs, command_line: &str, json: bool) -> Outcome {
         .map(|p| (p.id, unused.clone()));
     let known = Foreknowledge {
         scheduled: true,
+        timings: presses
+            .iter()
+            .map(|p| (p.id, schedule.phases.since_approach()))
+            .collect(),
         excluded: excluded.collect(),
         interruption: None,
     };

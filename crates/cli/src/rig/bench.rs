@@ -26,7 +26,7 @@ use crate::exit::Failure;
 /// # Errors
 /// [`Failure::input`] when it cannot be read; every finding in it at once.
 pub fn load(path: &Path) -> Result<RigFile, Failure> {
-    let bytes = std::fs::read(path)
+    let bytes = skinrig_formats::regular::read_text(path)
         .map_err(|e| Failure::input(format!("cannot read {}: {e}", path.display())))?;
     let environment = |name: &str| std::env::var(name).ok();
     RigFile::parse(&path.display().to_string(), &bytes, &environment)

@@ -1,4 +1,4 @@
-//! One integer column of a dvs dictionary, of whatever width the file has.
+//! One column of whole numbers of a dvs dictionary, of whatever type and width the file has.
 
 use std::path::Path;
 
@@ -15,7 +15,7 @@ pub(super) struct IntColumn {
 
 macro_rules! buffers {
     ($($variant:ident $int:ty, $size:literal $signed:literal;)*) => {
-        enum Buffer { $($variant(Vec<$int>),)* }
+        enum Buffer { $($variant(Vec<$int>),)* F32(Vec<f32>), F64(Vec<f64>) }
 
         impl Buffer {
             fn of_type(size: u32, signed: bool) -> Option<Self> {
@@ -26,13 +26,13 @@ macro_rules! buffers {
             }
 
             /// Reads `rows` values from `start` on and stores them in `out`; what does not fit becomes
-            /// `u16::MAX`, which no valid value has.
+            /// `u16::MAX`, which no valid value has. Gives the first row whose value is no whole number.
             fn read(
                 &mut self,
                 dataset: &H5Dataset,
                 start: usize,
                 out: &mut [u16],
-            ) -> Result<(), Hdf5Error> {
+            ) -> Result<Option<usize>, Hdf5Error> {
                 match self {
                     $(Self::$variant(values) => {
                         values.resize(out.len(), 0);
@@ -51,18 +51,63 @@ macro_rules! buffers {
                             }
                         }
                     })*
+                    Self::F32(values) => {
+                        values.resize(out.len(), 0.0);
+                        dataset.read_slice_into(values, &[start], &[out.len()])?;
+                        return Ok(whole(values.iter().map(|v| f64::from(*v)), out));
+                    }
+                    Self::F64(values) => {
+                        values.resize(out.len(), 0.0);
+                        dataset.read_slice_into(values, &[start], &[out.len()])?;
+                        return Ok(whole(values.iter().copied(), out));
+                    }
                 }
-                Ok(())
+                Ok(None)
             }
 
             /// The value at `row` of the last slice, for messages.
             fn value(&self, row: usize) -> Option<String> {
                 match self {
                     $(Self::$variant(values) => values.get(row).map(ToString::to_string),)*
+                    Self::F32(values) => values.get(row).map(ToString::to_string),
+                    Self::F64(values) => values.get(row).map(ToString::to_string),
                 }
             }
         }
     };
+}
+
+/// Stores floating-point values as whole numbers; gives the first row that is none.
+fn whole(values: impl Iterator<Item = f64>, out: &mut [u16]) -> Option<usize> {
+    let mut broken = None;
+    for (row, (value, out)) in values.zip(out).enumerate() {
+        if value.is_nan() || value.fract() != 0.0 {
+            broken = broken.or(Some(row));
+        }
+        // Saturates; negative numbers are no pixels either.
+        *out = if value < 0.0 { u16::MAX } else { value as u16 };
+    }
+    broken
+}
+
+/// A datatype in words, for messages.
+pub(super) fn type_name(datatype: &DatatypeMessage) -> String {
+    match datatype {
+        DatatypeMessage::FixedPoint { size, signed, .. } => {
+            let sign = if *signed { "signed" } else { "unsigned" };
+            format!("{sign} integers of {} bits", 8 * size)
+        }
+        DatatypeMessage::FloatingPoint { size, .. } => {
+            format!("floating-point numbers of {} bits", 8 * size)
+        }
+        DatatypeMessage::FixedString { .. } | DatatypeMessage::VarLenString { .. } => {
+            "text".to_owned()
+        }
+        DatatypeMessage::Compound { .. } => "compound values".to_owned(),
+        DatatypeMessage::Enum { base, .. } => format!("an enumeration of {}", type_name(base)),
+        DatatypeMessage::Opaque { size, .. } => format!("opaque values of {size} bytes"),
+        _ => "values that are no numbers".to_owned(),
+    }
 }
 
 buffers! {
@@ -77,12 +122,13 @@ buffers! {
 }
 
 impl IntColumn {
-    /// Takes an opened dataset of integers, or of an enumeration (h5py's booleans).
+    /// Takes an opened dataset of integers, of an enumeration (h5py's booleans), or of floating-point numbers, which must
+    /// be whole.
     pub fn new(dataset: H5Dataset, name: &str, path: &Path) -> Result<Self, FormatsError> {
         let wrong = |found: String| FormatsError::Dataset {
             path: path.into(),
             dataset: name.into(),
-            expected: "integers or booleans".into(),
+            expected: "whole numbers or booleans".into(),
             found,
         };
         let datatype = dataset.datatype().map_err(|e| wrong(e.to_string()))?;
@@ -92,10 +138,12 @@ impl IntColumn {
         };
         let buffer = match integer {
             DatatypeMessage::FixedPoint { size, signed, .. } => Buffer::of_type(*size, *signed),
+            DatatypeMessage::FloatingPoint { size: 4, .. } => Some(Buffer::F32(Vec::new())),
+            DatatypeMessage::FloatingPoint { size: 8, .. } => Some(Buffer::F64(Vec::new())),
             _ => None,
         };
         Ok(Self {
-            buffer: buffer.ok_or_else(|| wrong(format!("{datatype:?}")))?,
+            buffer: buffer.ok_or_else(|| wrong(type_name(&datatype)))?,
             dataset,
             name: name.into(),
         })
@@ -103,9 +151,11 @@ impl IntColumn {
 
     /// Reads the values from row `start` on into `out`.
     pub fn read(&mut self, start: usize, out: &mut [u16], path: &Path) -> Result<(), FormatsError> {
-        self.buffer
-            .read(&self.dataset, start, out)
-            .map_err(|error| unreadable(path, &self.name, start, out.len(), &error))
+        let broken = self.buffer.read(&self.dataset, start, out);
+        match broken.map_err(|error| unreadable(path, &self.name, start, out.len(), &error))? {
+            None => Ok(()),
+            Some(row) => Err(self.bad_value(start, row, "a whole number".into(), path)),
+        }
     }
 
     /// The error for the value at `row` of the last slice, which began at `start`.

@@ -45,7 +45,7 @@ impl Container {
     /// When the file is not readable HDF5, or holds no dvs dictionary: then the message says what it is
     /// instead, or which dataset is missing.
     pub fn open(path: &Path) -> Result<Self, FormatsError> {
-        std::fs::File::open(path).map_err(FormatsError::io(path))?;
+        crate::regular::open(path).map_err(FormatsError::io(path))?;
         let file = H5File::open(path).map_err(FormatsError::hdf5(path))?;
         let names = file.dataset_names();
         let mut parents: BTreeMap<String, BTreeMap<String, String>> = BTreeMap::new();

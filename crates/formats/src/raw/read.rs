@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::header::{MAX_HEADER, RawHeader};
 use crate::error::FormatsError;
+use crate::regular;
 use crate::stream::{Decoder, Geometry};
 
 /// Bytes that are read at once.
@@ -27,7 +28,7 @@ impl RawReader {
     /// [`FormatsError::Io`], or [`FormatsError::Header`] as [`RawHeader::parse`].
     pub fn open(path: &Path) -> Result<Self, FormatsError> {
         let io = |e| FormatsError::io(path)(e);
-        let mut file = File::open(path).map_err(io)?;
+        let mut file = regular::open(path).map_err(io)?;
         let mut start = Vec::new();
         (&mut file)
             .take(MAX_HEADER as u64)

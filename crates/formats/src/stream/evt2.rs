@@ -7,7 +7,7 @@
 
 use skinrig_model::{CdEvent, Polarity, TriggerEdge};
 
-pub use super::evt2_encode::{Encoder, TIME_HIGH_CADENCE_US};
+pub use super::evt2_encode::{Encoder, MAX_COORDINATE, TIME_HIGH_CADENCE_US};
 
 use super::clock::TimeBase;
 use super::output::{BLOCK, Output};

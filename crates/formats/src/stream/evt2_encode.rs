@@ -8,6 +8,9 @@ use crate::error::FormatsError;
 /// examples show 16 µs; the sensor's documentation does not state it.
 pub const TIME_HIGH_CADENCE_US: u64 = 16;
 
+/// Largest column or row that the format's 11 bits hold.
+pub const MAX_COORDINATE: u16 = 2047;
+
 /// Writes an EVT2 stream: CD events, trigger edges, and a TIME_HIGH word at every multiple of the cadence.
 ///
 /// Items must come in time order; an item between two TIME_HIGH words is written between them. Times may
@@ -61,8 +64,8 @@ impl Encoder {
     /// coordinate above 2047. Nothing is written then.
     #[inline]
     pub fn cd(&mut self, event: CdEvent, out: &mut Vec<u8>) -> Result<(), FormatsError> {
-        check("x", 2047, event.x.into())?;
-        check("y", 2047, event.y.into())?;
+        check("x", MAX_COORDINATE.into(), event.x.into())?;
+        check("y", MAX_COORDINATE.into(), event.y.into())?;
         self.advance_to(event.t_us, out)?;
         let kind = match event.polarity {
             Polarity::Off => 0,

@@ -1,12 +1,29 @@
 //! Keys of the analysis, in protocols and in schedules.
 
-use super::{POSITIVE_LENGTH, SEED, SPAN, count, default, optional};
+use skinrig_model::range::analysis as limits;
+
+use super::{SEED, count, default, optional};
 use crate::quantity::Dimension::{Length, Pixels, Time};
 use crate::shape::{Range, Shape, Table, Word};
 
 pub(crate) const ROW: Shape = Shape::Quantity(&[Pixels], Range::between(0.0, 479.0));
 pub(crate) static ROW_ITEM: Shape = ROW;
 pub(crate) const ROWS: Shape = Shape::Tuple(&ROW_ITEM, &["first", "last"]);
+
+/// A whole number in a range that the analysis declares.
+const fn whole(range: Range) -> Shape {
+    count(range.min as i64, range.max as i64)
+}
+
+/// A time in a range that the analysis declares in milliseconds.
+const fn milliseconds(range: Range) -> Shape {
+    Shape::Quantity(&[Time], range.in_units_of(1e3))
+}
+
+/// A length in a range that the analysis declares.
+const fn millimetres(range: Range) -> Shape {
+    Shape::Quantity(&[Length], range)
+}
 
 /// Settings of an analysis, in protocols and in schedules.
 pub(crate) static ANALYSIS: Table = Table {
@@ -21,25 +38,25 @@ pub(crate) static ANALYSIS: Table = Table {
         ),
         default(
             "window_before",
-            SPAN,
+            milliseconds(limits::WINDOW_MARGIN_MS),
             "50 ms",
             "The press window begins this long before the measured contact.",
         ),
         default(
             "window_after",
-            SPAN,
+            milliseconds(limits::WINDOW_MARGIN_MS),
             "50 ms",
             "The press window ends this long after the measured release.",
         ),
         default(
             "eps",
-            Shape::Quantity(&[Pixels], Range::above_zero(640.0)),
+            Shape::Quantity(&[Pixels], limits::EPS_PX),
             "10 px",
             "Neighbourhood radius of DBSCAN.",
         ),
         default(
             "min_samples",
-            count(1, 1_000_000),
+            whole(limits::MIN_SAMPLES),
             "10",
             "Core threshold of DBSCAN, events.",
         ),
@@ -63,13 +80,13 @@ pub(crate) static ANALYSIS: Table = Table {
         ),
         default(
             "forget",
-            Shape::Quantity(&[Time], Range::between(0.0001, 60.0)),
+            milliseconds(limits::FORGET_MS),
             "100 ms",
             "After this time the streaming estimator has forgotten all but 1/e of an event.",
         ),
         default(
             "thinning",
-            count(1, 1 << 20),
+            whole(limits::THINNING),
             "1",
             "Only one event in this many is used, chosen at random; 1: all.",
         ),
@@ -81,7 +98,7 @@ pub(crate) static ANALYSIS: Table = Table {
         ),
         optional(
             "window_after_contact",
-            Shape::Quantity(&[Time], Range::above_zero(60.0)),
+            milliseconds(limits::WINDOW_AFTER_CONTACT_MS),
             "The press window ends this long after the measured contact, if it is not over before; when absent only the release ends it.",
         ),
         default(
@@ -98,7 +115,7 @@ pub(crate) static ANALYSIS: Table = Table {
         ),
         default(
             "min_cluster_events",
-            count(0, 1_000_000),
+            whole(limits::MIN_CLUSTER_EVENTS),
             "20",
             "A press with fewer clustered events than this in either camera is excluded; the least value of a calibrated threshold; 0 turns a fixed rule off.",
         ),
@@ -123,13 +140,13 @@ pub(crate) static ANALYSIS: Table = Table {
         ),
         default(
             "min_response_sigma",
-            Shape::Number(Range::from_zero(1000.0)),
+            Shape::Number(limits::MIN_RESPONSE_SIGMA),
             "5",
             "A press with fewer events than the idle rate predicts plus this many standard errors, in either camera, is excluded; 0 turns the rule off.",
         ),
         default(
             "min_ray_sine",
-            Shape::Number(Range::from_zero(1.0)),
+            Shape::Number(limits::MIN_RAY_SINE),
             "0.05",
             "A press whose rays meet at less than this sine is excluded as nearly parallel.",
         ),
@@ -153,24 +170,24 @@ pub(crate) static ANALYSIS: Table = Table {
         ),
         optional(
             "failure_penalty",
-            POSITIVE_LENGTH,
+            millimetres(limits::LENGTH_MM),
             "The error that a failed press counts in the penalised RMSE; when absent the RMS distance of the scored presses from their mean: the error of an answer that knows nothing.",
         ),
         default(
             "within",
-            POSITIVE_LENGTH,
+            millimetres(limits::LENGTH_MM),
             "5 mm",
             "Error up to which a press counts as within.",
         ),
         default(
             "bits_per_event",
-            Shape::Number(Range::above_zero(1024.0)),
+            Shape::Number(limits::BITS_PER_EVENT),
             "21",
             "Bits per event in the data rates; the paper's 21.",
         ),
         default(
             "study_presses",
-            count(0, 100_000),
+            whole(limits::STUDY_PRESSES),
             "300",
             "Most scored presses whose events are kept for the studies of data reduction and latency, chosen at random; 0 leaves the studies out.",
         ),
@@ -200,14 +217,14 @@ pub(crate) static ANALYSIS: Table = Table {
         ),
         default(
             "bootstrap_resamples",
-            count(1, 1_000_000),
+            whole(limits::BOOTSTRAP_RESAMPLES),
             "2000",
-            "Resamples of the bootstrap over locations.",
+            "Resamples of the bootstrap over locations; 0: no intervals.",
         ),
         default("seed", SEED, "1", "Seed of the bootstrap."),
         default(
             "rate_bin",
-            Shape::Quantity(&[Time], Range::above_zero(60.0)),
+            milliseconds(limits::RATE_BIN_MS),
             "10 ms",
             "Width of the event-rate bins.",
         ),
@@ -315,19 +332,19 @@ pub(crate) static REDUCTION: Table = Table {
     keys: &[
         default(
             "max_power",
-            count(0, 20),
+            whole(limits::REDUCTION_MAX_POWER),
             "12",
             "Thinning factors 1, 2, 4 ... up to 2 to this power; the paper's 10.",
         ),
         default(
             "seeds",
-            count(1, 1000),
+            whole(limits::REDUCTION_SEEDS),
             "10",
             "Random seeds per factor and kind of thinning.",
         ),
         default(
             "min_samples",
-            count(0, 1_000_000),
+            whole(limits::REDUCTION_MIN_SAMPLES),
             "0",
             "Core threshold of DBSCAN at all factors; 0 takes that of the analysis. The public code: 1.",
         ),
@@ -341,25 +358,25 @@ pub(crate) static LATENCY: Table = Table {
     keys: &[
         default(
             "bin",
-            Shape::Quantity(&[Time], Range::between(1e-5, 0.01)),
+            milliseconds(limits::LATENCY_BIN_MS),
             "0.2 ms",
             "Width of a bin.",
         ),
         default(
             "sigma",
-            Shape::Quantity(&[Time], Range::from_zero(0.05)),
+            milliseconds(limits::LATENCY_SIGMA_MS),
             "0.5 ms",
             "Standard deviation of the Gaussian kernel.",
         ),
         default(
             "alpha",
-            Shape::Number(Range::between(1.01, 1000.0)),
+            Shape::Number(limits::LATENCY_ALPHA),
             "4",
             "Rate increase that the detector is tuned to.",
         ),
         default(
             "consecutive",
-            count(1, 1000),
+            whole(limits::LATENCY_COUNT),
             "3",
             "Bins in a row above the threshold.",
         ),
@@ -371,13 +388,13 @@ pub(crate) static LATENCY: Table = Table {
         ),
         default(
             "target_rate",
-            Shape::Number(Range::from_zero(1.0)),
+            Shape::Number(limits::SHARE),
             "0.95",
             "The threshold with the fewest false alarms is chosen among those that detect at least this share.",
         ),
         default(
             "window",
-            Shape::Quantity(&[Time], Range::above_zero(10.0)),
+            milliseconds(limits::LATENCY_WINDOW_MS),
             "100 ms",
             "A detection counts when it lies within this of the median onset.",
         ),
@@ -403,7 +420,7 @@ pub(crate) static REDUCED: Table = Table {
     keys: &[
         default(
             "factor",
-            count(1, 1 << 20),
+            whole(limits::THINNING),
             "1024",
             "Of the events of a trial and of its background one in this many is used, chosen at random; the paper's 1024.",
         ),
@@ -415,7 +432,7 @@ pub(crate) static REDUCED: Table = Table {
         ),
         default(
             "target_rate",
-            Shape::Number(Range::from_zero(1.0)),
+            Shape::Number(limits::SHARE),
             "0.85",
             "The threshold with the fewest false alarms is chosen among those that detect at least this share; the public code's 0.85.",
         ),
@@ -429,17 +446,17 @@ pub(crate) static REDUCED_GRID: Table = Table {
     keys: &[
         default(
             "from",
-            Shape::Number(Range::above_zero(1e6)),
+            Shape::Number(limits::LATENCY_THRESHOLD),
             "3",
             "The first.",
         ),
         default(
             "to",
-            Shape::Number(Range::above_zero(1e6)),
+            Shape::Number(limits::LATENCY_THRESHOLD),
             "8",
             "The last.",
         ),
-        default("count", count(1, 1000), "6", "How many."),
+        default("count", whole(limits::LATENCY_COUNT), "6", "How many."),
     ],
     exactly_one: &[],
 };
@@ -450,17 +467,17 @@ pub(crate) static GRID: Table = Table {
     keys: &[
         default(
             "from",
-            Shape::Number(Range::above_zero(1e6)),
+            Shape::Number(limits::LATENCY_THRESHOLD),
             "1",
             "The first.",
         ),
         default(
             "to",
-            Shape::Number(Range::above_zero(1e6)),
+            Shape::Number(limits::LATENCY_THRESHOLD),
             "20",
             "The last.",
         ),
-        default("count", count(1, 1000), "20", "How many."),
+        default("count", whole(limits::LATENCY_COUNT), "20", "How many."),
     ],
     exactly_one: &[],
 };
@@ -470,7 +487,7 @@ pub(crate) const BACKGROUNDS: &[Word] = &[
     ("after", "after the press, as the public code does"),
 ];
 
-const SHARE: Shape = Shape::Number(Range::from_zero(1.0));
+const SHARE: Shape = Shape::Number(limits::SHARE);
 
 pub(crate) static ALIGNMENT: Table = Table {
     name: "alignment",
@@ -540,19 +557,19 @@ pub(crate) static CMRE: Table = Table {
     keys: &[
         default(
             "cell",
-            Shape::Quantity(&[Length], Range::between(0.5, 100.0)),
+            millimetres(limits::CMRE_CELL_MM),
             "5 mm",
             "Side of a square cell.",
         ),
         default(
             "sigma",
-            POSITIVE_LENGTH,
+            millimetres(limits::CMRE_WIDTH_MM),
             "1 mm",
             "Standard deviation of the estimate's Gaussian.",
         ),
         default(
             "sr",
-            POSITIVE_LENGTH,
+            millimetres(limits::CMRE_WIDTH_MM),
             "5 mm",
             "SR of the public code, a length whose meaning and value are not given; 5 mm makes the documented scores \
              (one cell off about 0.02).",

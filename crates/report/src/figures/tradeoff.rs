@@ -53,7 +53,7 @@ pub fn fronts(result: &Tradeoff, rig: &str, foot: &str) -> Figure {
     };
     let title = "Error against cost";
     let caption = format!(
-        "RMSE of {} ways to locate the same {} scored presses, against CPU time, data sent and delay, all logarithmic. \
+        "RMSE of {} ways to locate the same {} attempted scoring presses (those that count in each), against CPU time, data sent and delay, all logarithmic. \
          Lines: the fronts, what no other choice beats in both; bars: 95 % intervals over locations. Hollow: fewer than \
          {} % of the presses located, out of competition. The ring is the session's own choice. {rig}",
         result.rows.len(),

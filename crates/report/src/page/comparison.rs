@@ -241,6 +241,17 @@ pub(super) fn reference(a: &Analysis) -> Option<Grid> {
         mm(m.repeat_std_mm.value),
         published(published::REPEAT_STD_MM),
     ]);
+    let own = a.calibration.as_ref();
+    for (name, value) in &r.parameters {
+        let index = own.and_then(|c| c.names.iter().position(|n| n == name));
+        let ours = own.zip(index).and_then(|(c, i)| c.values.get(i));
+        grid.row([
+            name.clone(),
+            number(Some(*value), 3),
+            number(ours.copied(), 3),
+            NONE.to_owned(),
+        ]);
+    }
     grid.note(
         "In-sample: the presses that calibrated are the ones judged, and those outside the enclosing square are left out. \
          It favours what was fitted. Held-out: presses that did not calibrate.",

@@ -125,6 +125,7 @@ pub(crate) fn render(input: &ReportInput<'_>) -> Result<String, ReportError> {
         losses => p.lost_bytes.iter().enumerate().filter(|(_, b)| **b > 0)
             .map(|(i, b)| context! { camera => i + 1, bytes => grouped(*b), times => crate::course::losses(p, i) })
             .collect::<Vec<_>>(),
+        off_sensor => derive::off_sensor(a),
         rejections => rejections(a, false),
         sync_rejections => rejections(a, true),
         depths => a.depths.iter().filter(|_| usable)

@@ -314,6 +314,9 @@ pub(crate) fn table(input: &ReportInput<'_>, color: bool) -> String {
         }
         out += &paint.warn(&wrap("loss      ", &text));
     }
+    for text in crate::derive::off_sensor(a) {
+        out += &wrap("left out  ", &text);
+    }
     for leg in p.several_legs() {
         let first = format!("{:<10}", format!("leg {}", leg.number));
         out += &wrap(&first, &plain(&crate::course::leg(leg)));

@@ -216,6 +216,12 @@ fn reference(r: &ReferenceCode) -> String {
             "nominal camera geometry: these presses determine no plausible calibration under the public code's choices",
         );
     }
+    if !r.parameters.is_empty() {
+        let each = r.parameters.iter();
+        let each = each.map(|(name, value)| format!("{name} {}", number(Some(*value), 3)));
+        let text = format!("parameters: {}", each.collect::<Vec<_>>().join(", "));
+        out += &wrap("          ", &text);
+    }
     let shown = r
         .reduction
         .iter()
