@@ -2,8 +2,8 @@
 
 use skinrig_model::range::analysis as limits;
 use skinrig_model::{
-    AnalysisSettings, CameraId, PlannedPress, Point2, PressId, RigGeometry, SENSOR_HEIGHT,
-    SkinOutline, ValueRange,
+    AnalysisSettings, CameraId, PlannedPress, Point2, RigGeometry, SENSOR_HEIGHT, SkinOutline,
+    ValueRange,
 };
 
 use crate::cmre::ContactMap;
@@ -51,12 +51,12 @@ pub fn before_recording(
     settings(chosen)?;
     presses(planned)?;
     ContactMap::new(outline, &chosen.cmre)?;
-    for number in &chosen.exclude_presses {
-        if !planned.iter().any(|p| p.id.0 == *number) {
+    for press in &chosen.exclude_press_numbers {
+        if !planned.iter().any(|p| p.id == *press) {
             return Err(AnalysisError::Setting {
-                name: "exclude_presses",
+                name: "exclude_press_numbers",
                 expected: format!("presses of the plan, which has {}", planned.len()),
-                found: PressId(*number).to_string(),
+                found: press.to_string(),
             });
         }
     }

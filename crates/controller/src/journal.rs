@@ -145,7 +145,7 @@ impl<'a> Journal<'a> {
         let fates = self.fates.iter().zip(0..);
         fates
             .filter(|(f, _)| **f == Fate::Valid)
-            .map(|(_, i)| PressId(i))
+            .map(|(_, i)| PressId::from_index(i))
             .collect()
     }
 
