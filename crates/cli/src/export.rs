@@ -211,6 +211,51 @@ fn cameras(
         .collect()
 }
 
+/// What a bundle holds besides the session itself and what people said of it later: all of it follows from the session.
+///
+/// # Errors
+/// [`Failure::input`] for a session that cannot be analysed; [`Failure::internal`] when a file cannot be written.
+pub fn derived(
+    session: &Path,
+    reader: &SessionReader,
+    header: &RunHeader,
+    folder: &Folder,
+) -> Result<Vec<PathBuf>, Failure> {
+    let mut results = results::analyze_session(session, Choices::default())?;
+    // Measured on some machine at some time: it does not follow from the session.
+    results.tradeoff = None;
+    let (json, html) = results::documents(&results)?;
+    let mut written = Vec::new();
+    for (ending, text) in [(".results.json", json), (".report.html", html)] {
+        let file = folder.whole(ending, |to| {
+            std::fs::write(to, &text).map_err(|e| ExportError::File {
+                path: to.to_owned(),
+                found: e.to_string(),
+            })
+        });
+        written.push(file.map_err(refused)?);
+    }
+    let source = Source {
+        reader,
+        header,
+        analysis: Some(found(&results)),
+    };
+    for (kind, tables) in [
+        (ExportKind::Raw, &BUNDLED[..]),
+        (ExportKind::Parquet, &BUNDLED),
+        // The path of the robot is long, and a table of numbers only.
+        (ExportKind::Csv, &BUNDLED[..2]),
+    ] {
+        written.extend(one_kind(kind, &source, tables, folder).map_err(refused)?);
+    }
+    Ok(written)
+}
+
+/// The tables of a bundle.
+const BUNDLED: [TableName; 3] = [TableName::Presses, TableName::Results, TableName::Pose];
+/// What people said of the session later.
+pub const TAGS: &str = ".tags.jsonl";
+
 /// The session, what was found in it, its camera streams and its tables, in a folder that `verify` proves.
 fn bundle(
     session: &Path,
@@ -225,21 +270,14 @@ fn bundle(
             session.display()
         )));
     }
-    let tables = [TableName::Presses, TableName::Results, TableName::Pose];
-    let mut names = vec![
-        SESSION_SUFFIX,
-        ".results.json",
-        ".report.html",
-        ".tags.jsonl",
-    ]
-    .into_iter()
-    .map(str::to_owned)
-    .collect::<Vec<_>>();
+    let mut names = vec![SESSION_SUFFIX, ".results.json", ".report.html", TAGS]
+        .into_iter()
+        .map(str::to_owned)
+        .collect::<Vec<_>>();
     for kind in [ExportKind::Raw, ExportKind::Parquet, ExportKind::Csv] {
-        names.extend(endings(kind, &tables));
+        names.extend(endings(kind, &BUNDLED));
     }
     folder.check_free(&names).map_err(refused)?;
-    let results = results::analyze_session(session, Choices::default())?;
     let copy = |from: &Path, ending: &str| {
         folder.whole(ending, |to| {
             let copied = std::fs::copy(from, to);
@@ -252,24 +290,9 @@ fn bundle(
     let mut written = vec![copy(session, SESSION_SUFFIX).map_err(refused)?];
     let tags = tags_path(session);
     if tags.is_file() {
-        written.push(copy(&tags, ".tags.jsonl").map_err(refused)?);
+        written.push(copy(&tags, TAGS).map_err(refused)?);
     }
-    let (json, html) = (folder.file(".results.json"), folder.file(".report.html"));
-    let (json, html) = results::write_results(&results, Some(&json), Some(&html))?;
-    written.extend([json, html]);
-    let source = Source {
-        reader,
-        header,
-        analysis: Some(found(&results)),
-    };
-    for (kind, tables) in [
-        (ExportKind::Raw, &tables[..]),
-        (ExportKind::Parquet, &tables),
-        // The path of the robot is long, and a table of numbers only.
-        (ExportKind::Csv, &tables[..2]),
-    ] {
-        written.extend(one_kind(kind, &source, tables, folder).map_err(refused)?);
-    }
+    written.extend(derived(session, reader, header, folder)?);
     let name = |path: &PathBuf| {
         let name = path.file_name().unwrap_or_default();
         name.to_string_lossy().into_owned()

@@ -4,6 +4,7 @@
 #[macro_use]
 pub mod terminal;
 
+mod analyses;
 pub mod args;
 pub mod check;
 pub mod compare;

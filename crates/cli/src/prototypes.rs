@@ -1,21 +1,18 @@
 //! `skinrig prototypes`: which skin got how good, over all sessions of a folder.
 
 use std::collections::BTreeMap;
-use std::io::{Read, Seek, SeekFrom};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 use skinrig_analysis::result::Estimate;
 use skinrig_recorder::{SessionState, SessionSummary, list};
-use skinrig_report::Summary;
+use skinrig_report::Variant;
 
+use crate::analyses::summary;
 use crate::args::PrototypesArgs;
 use crate::exit::{Exit, Failure, Outcome};
-use crate::paths::beside;
-use crate::sessions::clip;
+use crate::sessions::{clip, copies, originals};
 
-/// The summary stands so near to the end of a file of results.
-const TAIL_BYTES: u64 = 8192;
 /// Sessions in a sparkline, the last ones.
 const SPARKS: usize = 16;
 
@@ -29,6 +26,11 @@ struct Point {
     rmse_mm: Option<Estimate>,
     /// Why there are none.
     without: Option<String>,
+    /// What the analysis changed of the session's own settings; none: it is the official one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    variant: Option<Variant>,
+    /// Values that were overridden when the session was recorded.
+    overrides: Vec<String>,
 }
 
 /// Sessions that can be laid beside one another: one prototype, one protocol, one kind of rig.
@@ -63,7 +65,10 @@ pub fn prototypes(args: &PrototypesArgs, json: bool) -> Outcome {
         crate::sessions::of_prototype(&args.folder, wanted)?;
         sessions.retain(|s| s.prototype() == Some(wanted));
     }
-    let all = gather(&sessions);
+    let all = gather(&sessions, args.analysis.as_deref());
+    for copy in copies(&sessions) {
+        errln!("note: {copy}");
+    }
     if json {
         crate::print_json(&serde_json::to_value(&all).map_err(Failure::internal)?);
     } else if all.is_empty() {
@@ -75,10 +80,10 @@ pub fn prototypes(args: &PrototypesArgs, json: bool) -> Outcome {
 }
 
 /// By prototype, then by protocol and kind of rig; the sessions of each in their order.
-fn gather(sessions: &[SessionSummary]) -> Vec<Prototype> {
+fn gather(sessions: &[SessionSummary], analysis: Option<&str>) -> Vec<Prototype> {
     type Groups = BTreeMap<(String, String), Vec<Point>>;
     let mut all: BTreeMap<String, (usize, String, Groups)> = BTreeMap::new();
-    for session in sessions {
+    for session in originals(sessions) {
         let SessionState::Readable {
             session_id,
             started_at,
@@ -94,14 +99,17 @@ fn gather(sessions: &[SessionSummary]) -> Vec<Prototype> {
         let (count, last, groups) = all.entry(prototype.clone()).or_default();
         *count += 1;
         last.clone_from(started_at);
-        let (rmse_mm, without) = match summary(&session.path, session_id) {
+        let found = summary(&session.path, session_id, analysis);
+        let (rmse_mm, without) = match &found {
             Ok(found) if !found.valid => (None, Some("INVALID: clocks not known".to_owned())),
             Ok(found) if found.rmse_mm.value.is_none() => {
                 (None, Some("no scored press located".to_owned()))
             }
             Ok(found) => (Some(found.rmse_mm), None),
-            Err(why) => (None, Some(why)),
+            Err(why) => (None, Some(why.clone())),
         };
+        let (variant, overrides) =
+            found.map_or_else(|_| (None, Vec::new()), |f| (f.variant, f.overrides));
         let key = (protocol_name.clone(), rig_kind.clone());
         groups.entry(key).or_default().push(Point {
             session: session.path.clone(),
@@ -109,6 +117,8 @@ fn gather(sessions: &[SessionSummary]) -> Vec<Prototype> {
             tags: sayings.tags.iter().cloned().collect(),
             rmse_mm,
             without,
+            variant,
+            overrides,
         });
     }
     let series = |((protocol, rig_kind), points): ((String, String), Vec<Point>)| {
@@ -132,33 +142,6 @@ fn gather(sessions: &[SessionSummary]) -> Vec<Prototype> {
             },
         )
         .collect()
-}
-
-/// What the results beside a session say in short, from their last bytes.
-fn summary(session: &Path, session_id: &str) -> Result<Summary, String> {
-    let path = beside(session, ".results.json");
-    let mut file = std::fs::File::open(&path).map_err(|e| match e.kind() {
-        std::io::ErrorKind::NotFound => "not analysed".to_owned(),
-        _ => e.to_string(),
-    })?;
-    let older = || "results of an older skinrig: analyze it again".to_owned();
-    let length = file.metadata().map_err(|e| e.to_string())?.len();
-    let from = SeekFrom::Start(length.saturating_sub(TAIL_BYTES));
-    let mut tail = Vec::new();
-    file.seek(from)
-        .and_then(|_| file.take(TAIL_BYTES).read_to_end(&mut tail))
-        .map_err(|e| e.to_string())?;
-    // A key of the outermost object; within a text of JSON no line ends.
-    let key = b"\n  \"summary\": ";
-    let at = tail.windows(key.len()).position(|w| w == key);
-    let text = &tail[at.ok_or_else(older)? + key.len()..];
-    let mut reader = serde_json::Deserializer::from_slice(text);
-    let found = Summary::deserialize(&mut reader).map_err(|_| older())?;
-    if found.session_id == session_id {
-        Ok(found)
-    } else {
-        Err("results of another session lie beside it".to_owned())
-    }
 }
 
 fn print(all: &[Prototype], each: bool) {
@@ -195,6 +178,16 @@ fn print(all: &[Prototype], each: bool) {
             );
             if each {
                 series.points.iter().for_each(print_point);
+            } else {
+                // The two numbers of the line: what stands behind them is said.
+                let value = |p: &&Point, e: Option<Estimate>| e.is_some() && p.rmse_mm == e;
+                let best = series.points.iter().find(|p| value(p, series.best));
+                let last = series.points.iter().rev().find(|p| value(p, series.last));
+                let same = best.zip(last).is_some_and(|(b, l)| std::ptr::eq(b, l));
+                best.iter().for_each(|p| print_changes("  best: ", p));
+                last.iter()
+                    .filter(|_| !same)
+                    .for_each(|p| print_changes("  last: ", p));
             }
         }
     }
@@ -215,6 +208,20 @@ fn print_point(point: &Point) {
         minute(&point.started_at),
         name.to_string_lossy()
     );
+    print_changes("    ", point);
+}
+
+/// What was changed for the number of a session: by the analysis, and when it was recorded.
+fn print_changes(indent: &str, point: &Point) {
+    if let Some(variant) = &point.variant {
+        outln!("{indent}{variant}");
+    }
+    if !point.overrides.is_empty() {
+        outln!(
+            "{indent}recorded with --set {}",
+            point.overrides.join(" --set ")
+        );
+    }
 }
 
 /// `2026-11-21 18:00`.

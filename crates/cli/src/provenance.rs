@@ -82,6 +82,7 @@ pub fn provenance(
         protocol_name: header.protocol_name.clone(),
         protocol_sha256: header.protocol_sha256.clone(),
         overrides: header.overrides.clone(),
+        variant: None,
         plan_sha256: header.plan_sha256.clone(),
         seed: header.seed,
         rig_kind: header.rig_kind.clone(),

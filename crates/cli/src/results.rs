@@ -13,11 +13,11 @@ use skinrig_model::{
     AnalysisSettings, CameraId, HostTime, PressId, RigGeometry, RunHeader, TriggerEdge,
 };
 use skinrig_recorder::{AttemptRow, RecorderError, SessionReader};
-use skinrig_report::{Provenance, ReportInput};
+use skinrig_report::{Provenance, ReportInput, Variant};
 
+use crate::analyses;
 use crate::args::{AnalyzeArgs, ReportArgs};
 use crate::exit::{Exit, Failure, Outcome};
-use crate::paths::beside;
 use crate::source::SessionEvents;
 
 /// What `RunHeader::rig_json` holds.
@@ -98,6 +98,8 @@ pub struct Choices<'a> {
     pub overrides: &'a [String],
     /// Make the choices of the public code before them, and judge its way too.
     pub reference_code: bool,
+    /// What the variant is to be called.
+    pub name: Option<&'a str>,
 }
 
 /// A session ready to be analysed.
@@ -106,6 +108,8 @@ pub(crate) struct Opened {
     pub(crate) header: RunHeader,
     pub(crate) input: SessionInput,
     pub(crate) events: SessionEvents,
+    /// How the settings differ from the session's own.
+    pub(crate) variant: Option<Variant>,
 }
 
 /// Opens a session with the settings it was recorded with or with others.
@@ -123,7 +127,10 @@ pub(crate) fn open(path: &Path, choices: Choices<'_>) -> Result<Opened, Failure>
             path.display()
         ))
     })?;
+    let own = document.analysis.clone();
     let settings = settings(&header, document.analysis, choices)?;
+    let changes = settings != own || choices.reference_code || choices.name.is_some();
+    let variant = changes.then(|| variant(choices));
     let mut input = session_input(&reader, settings, document.geometry).map_err(unreadable)?;
     skinrig_analysis::legs::align(&mut input);
     let events = SessionEvents::new(path, header.stream_formats, &input.legs);
@@ -132,7 +139,17 @@ pub(crate) fn open(path: &Path, choices: Choices<'_>) -> Result<Opened, Failure>
         header,
         input,
         events,
+        variant,
     })
+}
+
+fn variant(choices: Choices<'_>) -> Variant {
+    let own = || analyses::own_name(choices.overrides, choices.reference_code);
+    Variant {
+        name: choices.name.map_or_else(own, str::to_owned),
+        changed: choices.overrides.to_vec(),
+        reference_code: choices.reference_code,
+    }
 }
 
 /// Analyses a session, with the settings it was recorded with or with others.
@@ -154,8 +171,9 @@ pub fn analyze_session(path: &Path, choices: Choices<'_>) -> Result<Results, Fai
         .reference_code
         .then(|| reference_code(input, &analysis, &kept));
     analysis.motion = motion(&session.reader, &analysis).map_err(Failure::input)?;
-    let provenance = crate::provenance::provenance(&session.reader, &session.header, &analysis)
+    let mut provenance = crate::provenance::provenance(&session.reader, &session.header, &analysis)
         .map_err(|e: RecorderError| Failure::input(e))?;
+    provenance.variant = session.variant;
     Ok(Results {
         session: path.to_owned(),
         analysis,
@@ -269,7 +287,7 @@ fn earlier_attempt(attempt: &AttemptRow) -> Option<EarlierAttempt> {
     })
 }
 
-/// Writes the results beside the session (or to `json_path`) and the report; returns both paths.
+/// Writes the results beside the session (or to `json_path`) and the report; returns both paths. A variant has files of its own.
 ///
 /// # Errors
 /// [`Failure::internal`] when a file cannot be written.
@@ -278,17 +296,27 @@ pub fn write_results(
     json_path: Option<&Path>,
     html_path: Option<&Path>,
 ) -> Result<(PathBuf, PathBuf), Failure> {
-    let input = results.report_input();
-    let json_path =
-        json_path.map_or_else(|| beside(&results.session, ".results.json"), Path::to_owned);
-    let html_path =
-        html_path.map_or_else(|| beside(&results.session, ".report.html"), Path::to_owned);
-    let json =
-        serde_json::to_string_pretty(&skinrig_report::json(&input)).map_err(Failure::internal)?;
-    let html = skinrig_report::html(&input).map_err(Failure::internal)?;
+    let name = results.provenance.variant.as_ref().map(|v| v.name.as_str());
+    let own_place = || analyses::results_path(&results.session, name);
+    let json_path = json_path.map_or_else(own_place, Path::to_owned);
+    let own_place = || analyses::report_path(&results.session, name);
+    let html_path = html_path.map_or_else(own_place, Path::to_owned);
+    let (json, html) = documents(results)?;
     write(&json_path, json.as_bytes())?;
     write(&html_path, html.as_bytes())?;
     Ok((json_path, html_path))
+}
+
+/// The results as JSON and the report.
+///
+/// # Errors
+/// [`Failure::internal`] when one cannot be put together.
+pub fn documents(results: &Results) -> Result<(String, String), Failure> {
+    let input = results.report_input();
+    let json =
+        serde_json::to_string_pretty(&skinrig_report::json(&input)).map_err(Failure::internal)?;
+    let html = skinrig_report::html(&input).map_err(Failure::internal)?;
+    Ok((json, html))
 }
 
 /// Writes a whole file or none: a full disk leaves no half of it.
@@ -374,21 +402,50 @@ pub fn analyze(args: &AnalyzeArgs, json: bool) -> Outcome {
     let choices = Choices {
         overrides: &args.overrides,
         reference_code: args.reference_code,
+        name: args.name.as_deref(),
     };
     let results = analyze_session(&args.session, choices)?;
-    // The session's own results stay beside it.
-    let beside_own = || beside(&args.session, ".reference-code.results.json");
-    let out = args
-        .out
-        .clone()
-        .or_else(|| args.reference_code.then(beside_own));
-    let html = out.as_ref().map(|out| match args.out {
-        Some(_) => out.with_extension("html"),
-        None => beside(&args.session, ".reference-code.report.html"),
-    });
-    let paths = write_results(&results, out.as_deref(), html.as_deref())?;
+    if let (Some(variant), Some(out)) = (&results.provenance.variant, &args.out) {
+        not_official(&args.session, out, variant)?;
+    }
+    let html = args.out.as_ref().map(|out| out.with_extension("html"));
+    let older = replaced(&results, args.out.as_deref());
+    let paths = write_results(&results, args.out.as_deref(), html.as_deref())?;
+    older.iter().for_each(|note| errln!("{note}"));
     print_results(&results, json, &paths);
     check_limit(&results, args.max_rmse)
+}
+
+/// A variant in the place of the official results would be taken for them.
+fn not_official(session: &Path, out: &Path, variant: &Variant) -> Result<(), Failure> {
+    let official = analyses::results_path(session, None);
+    let place = |path: &Path| {
+        let folder = crate::paths::folder_of(path).canonicalize().ok();
+        (folder, path.file_name().map(std::ffi::OsStr::to_owned))
+    };
+    if place(&official) != place(out) {
+        return Ok(());
+    }
+    Err(Failure::input(format!(
+        "--out {}: expected another place for the variant `{}`, found that of the official results\n  next: leave --out out",
+        out.display(),
+        variant.name
+    )))
+}
+
+/// A remark when results of another version of the analysis are about to be replaced.
+fn replaced(results: &Results, out: Option<&Path>) -> Option<String> {
+    let name = results.provenance.variant.as_ref().map(|v| v.name.as_str());
+    let id = &results.provenance.session_id;
+    let before = analyses::summary(&results.session, id, name)
+        .ok()
+        .filter(|_| out.is_none())?;
+    let (then, now) = (before.analysis_version, results.analysis.version);
+    (then != now).then(|| {
+        format!(
+            "note: the results of analysis version {then} are replaced by those of version {now}"
+        )
+    })
 }
 
 /// `skinrig report`.
@@ -396,8 +453,23 @@ pub fn analyze(args: &AnalyzeArgs, json: bool) -> Outcome {
 /// # Errors
 /// See [`analyze_session`], [`write_results`].
 pub fn report(args: &ReportArgs, json: bool) -> Outcome {
-    let results = analyze_session(&args.session, Choices::default())?;
+    let variant = match &args.analysis {
+        None => None,
+        Some(name) => {
+            let reader = SessionReader::open(&args.session).map_err(Failure::input)?;
+            let id = reader.session_id().map_err(Failure::input)?;
+            Some(analyses::variant(&args.session, &id, name)?)
+        }
+    };
+    let choices = variant.as_ref().map_or_else(Choices::default, |v| Choices {
+        overrides: &v.changed,
+        reference_code: v.reference_code,
+        name: Some(&v.name),
+    });
+    let results = analyze_session(&args.session, choices)?;
+    let older = replaced(&results, None);
     let paths = write_results(&results, None, args.out.as_deref())?;
+    older.iter().for_each(|note| errln!("{note}"));
     if json {
         crate::print_json(&serde_json::json!({ "report": paths.1, "results": paths.0 }));
     } else {

@@ -1,5 +1,6 @@
 //! `skinrig sessions`, and which session of a folder is meant.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
@@ -117,6 +118,57 @@ pub fn of_prototype(folder: &Path, prototype: &str) -> Result<Vec<PathBuf>, Fail
         "{}: expected sessions of the prototype `{prototype}`, found {known}\n  next: `skinrig prototypes {0}` lists them",
         folder.display()
     )))
+}
+
+/// Of several files of one session, which copies are, the one that stands for it: a sealed one goes before one that is not (what `salvage`
+/// brings back is never sealed), the shorter name before the longer.
+fn stands_for<'a>(copies: &[&'a SessionSummary]) -> Option<&'a SessionSummary> {
+    let rank = |s: &&&SessionSummary| {
+        let sealed = matches!(s.state, SessionState::Readable { sealed: true, .. });
+        (!sealed, s.path.as_os_str().len(), s.path.clone())
+    };
+    copies.iter().min_by_key(rank).copied()
+}
+
+fn by_id(all: &[SessionSummary]) -> BTreeMap<&str, Vec<&SessionSummary>> {
+    let mut groups: BTreeMap<&str, Vec<&SessionSummary>> = BTreeMap::new();
+    for session in all {
+        if let SessionState::Readable { session_id, .. } = &session.state {
+            groups.entry(session_id).or_default().push(session);
+        }
+    }
+    groups
+}
+
+/// The sessions of a list in its order, each once: copies of a session (`skinrig salvage` makes one) are no sessions of their own.
+#[must_use]
+pub fn originals(all: &[SessionSummary]) -> Vec<&SessionSummary> {
+    let kept: BTreeSet<&Path> = by_id(all)
+        .values()
+        .filter_map(|copies| stands_for(copies).map(|s| s.path.as_path()))
+        .collect();
+    let broken = |s: &SessionSummary| matches!(s.state, SessionState::Broken { .. });
+    all.iter()
+        .filter(|s| broken(s) || kept.contains(s.path.as_path()))
+        .collect()
+}
+
+/// A remark on every copy that [`originals`] leaves out.
+#[must_use]
+pub fn copies(all: &[SessionSummary]) -> Vec<String> {
+    let mut remarks = Vec::new();
+    for copies in by_id(all).values() {
+        let Some(kept) = stands_for(copies) else {
+            continue;
+        };
+        for copy in copies.iter().filter(|s| s.path != kept.path) {
+            let (copy, kept) = (copy.path.display(), kept.path.display());
+            remarks.push(format!(
+                "{copy} is a copy of the session {kept}; it is not counted again"
+            ));
+        }
+    }
+    remarks
 }
 
 fn none_in(folder: &Path) -> Failure {

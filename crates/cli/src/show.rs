@@ -105,6 +105,7 @@ fn describe(args: &ShowArgs) -> Result<serde_json::Value, RecorderError> {
         "preflight": reader.preflight()?,
         "duration_s": end.as_ref().map(|(t, _)| t.as_secs_f64()),
     });
+    document["analyses"] = analysis_rows(&args.session, &reader.session_id()?);
     if args.protocol {
         document["protocol_text"] = header.protocol_text.into();
     }
@@ -112,6 +113,56 @@ fn describe(args: &ShowArgs) -> Result<serde_json::Value, RecorderError> {
         document["presses"] = press_rows(&reader)?.into();
     }
     Ok(document)
+}
+
+/// The analyses that lie beside the session: the official one first, then the variants with what they change.
+fn analysis_rows(session: &std::path::Path, session_id: &str) -> serde_json::Value {
+    let row = |listed: crate::analyses::Listed| {
+        let mut row = serde_json::json!({ "name": listed.name, "results": listed.results });
+        match listed.summary {
+            Ok(s) => {
+                row["rmse_mm"] = serde_json::json!(s.rmse_mm);
+                row["valid"] = s.valid.into();
+                row["analysis_version"] = s.analysis_version.into();
+                row["changes"] = serde_json::json!(s.variant.map(|v| v.to_string()));
+            }
+            Err(why) => row["trouble"] = why.into(),
+        }
+        row
+    };
+    crate::analyses::all(session, session_id)
+        .into_iter()
+        .map(row)
+        .collect()
+}
+
+fn print_analyses(rows: &serde_json::Value) {
+    for row in rows.as_array().into_iter().flatten() {
+        let name = row["name"].as_str().unwrap_or("official");
+        let number = |key: &str| row["rmse_mm"][key].as_f64();
+        let found = match (
+            row["trouble"].as_str(),
+            row["valid"].as_bool(),
+            number("value"),
+        ) {
+            (Some(why), ..) => why.to_owned(),
+            (_, Some(false), _) => "INVALID: clocks not known".to_owned(),
+            (.., Some(rmse)) => format!(
+                "RMSE {rmse:.2} mm ({:.2} to {:.2}), n {}",
+                number("low").unwrap_or(f64::NAN),
+                number("high").unwrap_or(f64::NAN),
+                row["rmse_mm"]["n"]
+            ),
+            (.., None) => "no scored press located".to_owned(),
+        };
+        let version = row["analysis_version"]
+            .as_u64()
+            .map(|v| format!("  analysis version {v}"));
+        outln!("analysis   {name}  {found}{}", version.unwrap_or_default());
+        if let Some(changes) = row["changes"].as_str() {
+            outln!("           {changes}");
+        }
+    }
 }
 
 /// Each leg: when it began, by whom, how it ended, and how many attempts it cut off.
@@ -268,6 +319,7 @@ fn print(d: &serde_json::Value) {
         p["excluded"],
         d["totals"]["sync"]["planned"]
     );
+    print_analyses(&d["analyses"]);
     print_preflight(&d["preflight"]);
     outln!("devices");
     for device in d["devices"].as_array().into_iter().flatten() {

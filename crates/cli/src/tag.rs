@@ -7,14 +7,14 @@ use skinrig_recorder::{Saying, Sayings, SessionReader, is_tag, say, sayings};
 
 use crate::args::TagArgs;
 use crate::exit::{Exit, Failure, Outcome};
-use crate::sessions;
 
 /// Writes it down, and tells what was said so far.
 ///
 /// # Errors
 /// [`Failure::input`] for what is no tag, no session, or no log of it.
 pub fn tag(args: &TagArgs, json: bool) -> Outcome {
-    let session = sessions::find(&args.session)?;
+    // As `show`: which session of a folder is meant is not to be guessed, for what is said of it stays.
+    let session = args.session.clone();
     let session_id = SessionReader::open(&session)
         .and_then(|reader| reader.session_id())
         .map_err(Failure::input)?;

@@ -4,16 +4,42 @@
 //! nothing that happens to the terminal ever stops a run. Any other fault of standard output, a full disk for
 //! example, is remembered, so that the program can end with an error.
 
+use std::borrow::Cow;
 use std::fmt::Arguments;
 use std::io::{ErrorKind, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use skinrig_model::text::{is_hidden, visible};
+
 static OUTPUT_FAILED: AtomicBool = AtomicBool::new(false);
+
+/// What this program writes itself to colour its own words, and no other sequence: no text can hide, move or erase anything with them.
+const STYLES: [&str; 10] = [
+    "[0m", "[1m", "[2m", "[32m", "[33m", "[34m", "[36m", "[1;31m", "[1;32m", "[1;35m",
+];
+
+/// `text` with everything written out that a terminal would obey, but for the colours of this program.
+fn harmless(text: &str) -> Cow<'_, str> {
+    if !text.contains(is_hidden) {
+        return Cow::Borrowed(text);
+    }
+    let mut parts = text.split('\u{1b}');
+    let mut out = visible(parts.next().unwrap_or_default()).into_owned();
+    for part in parts {
+        let style = STYLES.iter().any(|style| part.starts_with(style));
+        out.push_str(if style { "\u{1b}" } else { "\\u{1b}" });
+        out.push_str(&visible(part));
+    }
+    Cow::Owned(out)
+}
 
 /// Writes to standard output.
 pub fn out(text: Arguments<'_>) {
     let mut out = std::io::stdout().lock();
-    if let Err(e) = out.write_fmt(text).and_then(|()| out.flush())
+    let text = text.to_string();
+    if let Err(e) = out
+        .write_all(harmless(&text).as_bytes())
+        .and_then(|()| out.flush())
         && e.kind() != ErrorKind::BrokenPipe
     {
         OUTPUT_FAILED.store(true, Ordering::Relaxed);
@@ -22,7 +48,10 @@ pub fn out(text: Arguments<'_>) {
 
 /// Writes to standard error; there is nowhere to report a fault of it.
 pub fn err(text: Arguments<'_>) {
-    let _ = std::io::stderr().lock().write_fmt(text);
+    let text = text.to_string();
+    let _ = std::io::stderr()
+        .lock()
+        .write_all(harmless(&text).as_bytes());
 }
 
 /// Whether something that was to go to standard output did not, for another reason than a reader that went away.
@@ -42,4 +71,27 @@ macro_rules! errln {
     ($($text:tt)*) => {
         $crate::terminal::err(format_args!("{}\n", format_args!($($text)*)))
     };
+}
+
+#[cfg(test)]
+mod tests {
+    use super::harmless;
+
+    #[test]
+    fn a_terminal_obeys_our_colours_and_nothing_else() {
+        assert_eq!(
+            harmless("\u{1b}[33mwarning\u{1b}[0m: x"),
+            "\u{1b}[33mwarning\u{1b}[0m: x"
+        );
+        for (hostile, shown) in [
+            ("a\u{1b}[2Jb", "a\\u{1b}[2Jb"),
+            ("\u{1b}[8mhidden\u{1b}[0m", "\\u{1b}[8mhidden\u{1b}[0m"),
+            ("\u{1b}]0;title\u{7}", "\\u{1b}]0;title\\u{7}"),
+            ("\u{202e}gpj", "\\u{202e}gpj"),
+            ("over\rwrite", "over\\u{d}write"),
+            ("\u{9b}2J", "\\u{9b}2J"),
+        ] {
+            assert_eq!(harmless(hostile), shown);
+        }
+    }
 }

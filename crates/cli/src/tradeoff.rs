@@ -117,6 +117,7 @@ pub fn tradeoff(args: &TradeoffArgs, json: bool) -> Outcome {
     let choices = Choices {
         overrides: &args.overrides,
         reference_code: false,
+        name: None,
     };
     let Opened {
         input,

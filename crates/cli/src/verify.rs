@@ -1,12 +1,14 @@
 //! `skinrig verify`: a session, or a bundle with one.
 
-use std::path::Path;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
 
-use skinrig_export::verify_bundle;
+use skinrig_export::{BundleReport, Folder, same_bytes, verify_bundle};
 use skinrig_recorder::{RecorderError, SessionReader, verify as recheck};
 
 use crate::args::SessionArg;
 use crate::exit::{Exit, Failure, Outcome};
+use crate::export;
 use crate::source::Rescan;
 
 /// Recomputes everything in a session, and holds the files of a bundle against its manifest.
@@ -37,6 +39,10 @@ fn bundle(folder: &Path, json: bool) -> Outcome {
         }
         let session = recheck(&inside, &mut Rescan::default()).map_err(Failure::input)?;
         report.problems.extend(session.problems);
+        // A manifest can be written anew, the session's seal not: everything else must follow from it.
+        if report.problems.is_empty() {
+            report.problems.extend(made_anew(folder, &report)?);
+        }
     }
     let (name, problems) = (folder.display(), report.problems.len());
     if json {
@@ -49,10 +55,15 @@ fn bundle(folder: &Path, json: bool) -> Outcome {
         }
         if problems == 0 {
             outln!(
-                "{name}: sound; {} files as they were written, session {}",
-                report.files,
-                report.session_id
+                "{name}: sound; session {} as it was sealed, and the other {} files are what it gives",
+                report.session_id,
+                report.files - 1
             );
+            if report.names.iter().any(|n| n.ends_with(export::TAGS)) {
+                outln!(
+                    "{name}: but for the tags: people wrote them later, and no seal covers them"
+                );
+            }
         }
     }
     if problems == 0 {
@@ -62,6 +73,72 @@ fn bundle(folder: &Path, json: bool) -> Outcome {
             "{name}: {problems} problem(s); the bundle is not what was exported"
         )))
     }
+}
+
+/// Makes everything that a bundle derives from its session once more, in a folder of its own, and holds the files against that.
+fn made_anew(folder: &Path, report: &BundleReport) -> Result<Vec<String>, Failure> {
+    let place = scratch()?;
+    let found = held_against(folder, report, &place);
+    // What is left there is no fault of the bundle.
+    let _ = std::fs::remove_dir_all(&place);
+    found
+}
+
+fn held_against(
+    folder: &Path,
+    report: &BundleReport,
+    place: &Path,
+) -> Result<Vec<String>, Failure> {
+    let inside = folder.join(&report.session);
+    let reader = SessionReader::open(&inside).map_err(Failure::input)?;
+    let header = reader.header().map_err(Failure::input)?;
+    let stem = crate::paths::beside(&inside, "");
+    let stem = stem.file_name().unwrap_or_default().to_string_lossy();
+    let scratch = Folder::new(place, &stem, false).map_err(Failure::internal)?;
+    let made = export::derived(&inside, &reader, &header, &scratch)?;
+    let software = crate::version::SOFTWARE;
+    let mut known = BTreeSet::from([report.session.clone(), format!("{stem}{}", export::TAGS)]);
+    let mut problems = Vec::new();
+    for file in made {
+        let name = file
+            .file_name()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned();
+        let there = folder.join(&name);
+        if !report.names.contains(&name) {
+            problems.push(format!("{name}: expected this file, found none"));
+        } else if !same_bytes(&file, &there).map_err(Failure::internal)? {
+            problems.push(format!(
+                "{name}: expected what the sealed session gives, found something else; a bundle of another version than \
+                 {software} has to be exported again"
+            ));
+        }
+        known.insert(name);
+    }
+    let unknown = report.names.iter().filter(|name| !known.contains(*name));
+    problems.extend(
+        unknown
+            .map(|name| format!("{name}: expected no such file: nothing in the session gives it")),
+    );
+    Ok(problems)
+}
+
+/// A new folder for files that are taken away again.
+fn scratch() -> Result<PathBuf, Failure> {
+    let place = std::env::temp_dir();
+    for n in 0..1000 {
+        let folder = place.join(format!("skinrig-verify-{}-{n}", std::process::id()));
+        match std::fs::create_dir(&folder) {
+            Ok(()) => return Ok(folder),
+            Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists => {}
+            Err(e) => return Err(Failure::internal(format!("{}: {e}", folder.display()))),
+        }
+    }
+    Err(Failure::internal(format!(
+        "{}: expected room for a folder, found none",
+        place.display()
+    )))
 }
 
 fn session(path: &Path, json: bool) -> Outcome {

@@ -46,6 +46,8 @@ pub struct BundleReport {
     pub session: String,
     /// Files listed.
     pub files: usize,
+    /// Their names.
+    pub names: Vec<String>,
     /// Files that are not what the manifest says, are missing, or are not listed.
     pub problems: Vec<String>,
 }
@@ -185,6 +187,7 @@ pub fn verify_bundle(folder: &Path) -> Result<BundleReport, ExportError> {
         session_id: manifest.session_id,
         session: manifest.session,
         files: manifest.files.len(),
+        names: manifest.files.into_iter().map(|f| f.name).collect(),
         problems,
     })
 }

@@ -94,6 +94,11 @@ impl Drop for CsvFiles {
     }
 }
 
+/// True for a text that a spreadsheet would take for a formula (OWASP, CSV injection): it is written with a `'` before it.
+fn starts_formula(text: &str) -> bool {
+    text.starts_with(['=', '+', '-', '@', '\t', '\r', '\n', '＝', '＋', '－', '＠'])
+}
+
 fn write_cell(values: &Values, row: usize, cell: &mut String) {
     use std::fmt::Write as _;
     // Writing to a string cannot fail.
@@ -104,6 +109,9 @@ fn write_cell(values: &Values, row: usize, cell: &mut String) {
         Values::Count(v) => v[row].map_or(Ok(()), |n| write!(cell, "{n}")),
         Values::Real(v) if v[row].is_nan() => Ok(()),
         Values::Real(v) => write!(cell, "{}", v[row]),
-        Values::Text(v) => v[row].as_ref().map_or(Ok(()), |t| cell.write_str(t)),
+        Values::Text(v) => v[row].as_ref().map_or(Ok(()), |t| {
+            let guard = if starts_formula(t) { "'" } else { "" };
+            write!(cell, "{guard}{t}")
+        }),
     };
 }

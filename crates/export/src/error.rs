@@ -20,7 +20,7 @@ pub enum ExportError {
         found: String,
     },
     /// There is a file already.
-    #[error("{}: expected no file there, found one\n  next: move an older export away, choose another folder with --out, or --overwrite it", path.display())]
+    #[error("{}: expected no file there, or the very one that this export writes, found another\n  next: move an older export away, choose another folder with --out, or --overwrite it", path.display())]
     Exists {
         /// The file.
         path: PathBuf,

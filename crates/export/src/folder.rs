@@ -1,6 +1,7 @@
 //! The one folder that an export writes into.
 
 use std::fs::File;
+use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
 use crate::error::ExportError;
@@ -39,7 +40,8 @@ impl Folder {
         self.path.join(format!("{}{ending}", self.stem))
     }
 
-    /// Refuses when one of these files is there and may not be replaced: before anything is written.
+    /// Refuses when something else than a file is in the place of one of these: before anything is written. Whether a file that is
+    /// there is the very one that would be written, [`Folder::complete`] finds out.
     ///
     /// # Errors
     /// [`ExportError::Exists`].
@@ -47,7 +49,7 @@ impl Folder {
         let taken = endings
             .iter()
             .map(|ending| self.file(ending))
-            .find(|path| !self.overwrite && path.symlink_metadata().is_ok());
+            .find(|path| !self.overwrite && path.symlink_metadata().is_ok_and(|m| !m.is_file()));
         taken.map_or(Ok(()), |path| Err(ExportError::Exists { path }))
     }
 
@@ -81,9 +83,18 @@ impl Folder {
         }
     }
 
-    /// The file has all of it and gets its name.
+    /// The file has all of it and gets its name. One that is there already stays when it has the same bytes, as after the same export.
     pub(crate) fn complete(&self, ending: &str) -> Result<PathBuf, ExportError> {
         let (partial, path) = (self.file(&format!("{ending}.partial")), self.file(ending));
+        if !self.overwrite && path.symlink_metadata().is_ok() {
+            let same = same_bytes(&partial, &path).map_err(ExportError::file(&path));
+            let _ = std::fs::remove_file(&partial);
+            return if same? {
+                Ok(path)
+            } else {
+                Err(ExportError::Exists { path })
+            };
+        }
         File::open(&partial)
             .and_then(|file| file.sync_all())
             .and_then(|()| std::fs::rename(&partial, &path))
@@ -94,5 +105,28 @@ impl Folder {
     /// Takes away what is left of a file that was not completed.
     pub(crate) fn abandon(&self, ending: &str) {
         let _ = std::fs::remove_file(self.file(&format!("{ending}.partial")));
+    }
+}
+
+/// True when both files hold the same bytes.
+///
+/// # Errors
+/// When one cannot be read.
+pub fn same_bytes(a: &Path, b: &Path) -> std::io::Result<bool> {
+    let (mut a, mut b) = (File::open(a)?, File::open(b)?);
+    if a.metadata()?.len() != b.metadata()?.len() {
+        return Ok(false);
+    }
+    let (mut one, mut other) = (vec![0; 1 << 16], vec![0; 1 << 16]);
+    loop {
+        let n = a.read(&mut one)?;
+        if n == 0 {
+            return Ok(true);
+        }
+        let other = &mut other[..n];
+        b.read_exact(other)?;
+        if one[..n] != *other {
+            return Ok(false);
+        }
     }
 }

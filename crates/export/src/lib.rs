@@ -24,7 +24,7 @@ pub use bundle::{BundleReport, MANIFEST, seal_bundle, verify_bundle};
 pub use cameras::{write_hdf5, write_raw};
 pub use csv_files::CsvFiles;
 pub use error::ExportError;
-pub use folder::Folder;
+pub use folder::{Folder, same_bytes};
 pub use npz::NpzFile;
 pub use parquet_files::ParquetFiles;
 pub use source::{Source, TableName};

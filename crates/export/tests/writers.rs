@@ -65,7 +65,10 @@ fn files_get_their_names_when_they_are_whole() {
     let expected = "t_us,on,count,x_mm,note\n1,1,,0.1,\"a,\"\"ä\"\n-2,0,7,,\n";
     assert_eq!(text, expected);
 
-    // Not over the first one, unless asked.
+    // The same again is done; another one does not replace it, unless asked.
+    all(&mut CsvFiles::new(folder(false)), 2).unwrap();
+    assert_eq!(names(dir.path()), ["s.demo.csv"]);
+    std::fs::write(dir.path().join("s.demo.csv"), "mine").unwrap();
     assert!(matches!(
         all(&mut CsvFiles::new(folder(false)), 2),
         Err(ExportError::Exists { .. })

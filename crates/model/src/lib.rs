@@ -21,6 +21,7 @@ pub mod scene;
 pub mod settings;
 pub mod skin;
 pub mod stream;
+pub mod text;
 pub mod time;
 pub mod trigger_box;
 

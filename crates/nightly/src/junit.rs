@@ -5,6 +5,8 @@
 
 use std::fmt::Write as _;
 
+use skinrig_model::text::visible;
+
 use crate::night::{CheckResult, Night};
 use crate::rules::{Cause, GOLDEN_ON_A_BAD_RIG, RULES};
 use crate::verdict::Verdict;
@@ -202,17 +204,17 @@ fn push(out: &mut String, depth: usize, line: &str) {
     out.push('\n');
 }
 
-/// Text for an attribute or an element; characters that XML 1.0 forbids are replaced.
+/// Text for an attribute or an element: what acts instead of showing is written out, other characters that XML 1.0 forbids are replaced.
 fn escaped(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
-    for c in text.chars() {
+    for c in visible(text).chars() {
         match c {
             '&' => out.push_str("&amp;"),
             '<' => out.push_str("&lt;"),
             '>' => out.push_str("&gt;"),
             '"' => out.push_str("&quot;"),
             '\n' | '\t' => out.push(c),
-            c if c.is_control() || c == '\u{fffe}' || c == '\u{ffff}' => {
+            '\u{fffe}' | '\u{ffff}' => {
                 out.push(char::REPLACEMENT_CHARACTER);
             }
             c => out.push(c),

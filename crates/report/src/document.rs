@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json as object};
 use skinrig_analysis::result::{Estimate, PressCounts};
 
+use crate::provenance::Variant;
 use crate::{ReportInput, comparison};
 
 /// Value of the document's `format` field.
@@ -23,6 +24,12 @@ pub struct Summary {
     pub analysis_version: u32,
     /// Hash of its result.
     pub results_hash: String,
+    /// What it changed of the session's own settings; `None` for the official analysis.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub variant: Option<Variant>,
+    /// Values that were overridden when the session was recorded, as `key=value`.
+    #[serde(default)]
+    pub overrides: Vec<String>,
     /// False when the numbers are not to be used: the clocks are not known well enough.
     pub valid: bool,
     /// How the presses ended.
@@ -41,6 +48,8 @@ impl Summary {
         Self {
             session_id: input.provenance.session_id.clone(),
             analysis_version: analysis.version,
+            variant: input.provenance.variant.clone(),
+            overrides: input.provenance.overrides.clone(),
             results_hash: input.provenance.results_hash.clone(),
             valid: analysis.alignment.is_usable(),
             counts: analysis.counts,

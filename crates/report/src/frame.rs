@@ -4,6 +4,7 @@ use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use minijinja::{AutoEscape, Environment, Value, context};
 use sha2::{Digest, Sha256};
+use skinrig_model::text::visible;
 
 use crate::ReportError;
 
@@ -45,9 +46,8 @@ impl Frame<'_> {
         };
         let first = self.templates.first().map_or("frame.html", |t| t.0);
         let page = env.get_template(first)?.render(frame)?;
-        // HTML has no place for them, and names may hold any (html.spec.whatwg.org, 13.2.3.5).
-        let forbidden = |c: char| c.is_control() && !matches!(c, '\n' | '\r' | '\t');
-        Ok(page.replace(forbidden, "\u{fffd}"))
+        // HTML has no place for controls (html.spec.whatwg.org, 13.2.3.5), readers none for text that turns round; names may hold any.
+        Ok(visible(&page).into_owned())
     }
 }
 
@@ -85,6 +85,6 @@ mod tests {
         );
         assert_eq!(page.matches("<script").count(), 1);
         assert!(page.contains("<button type=\"button\" id=\"theme\""));
-        assert!(page.contains("&lt;i&gt;\u{fffd}[2J"));
+        assert!(page.contains("&lt;i&gt;\\u{1b}[2J"));
     }
 }

@@ -33,7 +33,7 @@ mod terminal;
 
 pub use document::{JSON_FORMAT, JSON_VERSION, Summary};
 pub use provenance::{
-    DeviceRow, InterruptionRow, LegRow, LossRow, NoteRow, Provenance, RetakenRow,
+    DeviceRow, InterruptionRow, LegRow, LossRow, NoteRow, Provenance, RetakenRow, Variant,
 };
 
 use skinrig_analysis::result::Analysis;

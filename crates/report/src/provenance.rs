@@ -1,5 +1,7 @@
 //! Owns the plain description of where a session comes from, as the report shows it.
 
+use std::fmt;
+
 use serde::{Deserialize, Serialize};
 use skinrig_model::{LostTime, PreflightCheck};
 
@@ -22,6 +24,9 @@ pub struct Provenance {
     pub overrides: Vec<String>,
     /// Lower-case hex SHA-256 of the plan.
     pub plan_sha256: String,
+    /// What this analysis changed of the session's own settings; `None` for the official one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub variant: Option<Variant>,
     /// The seed of the run.
     pub seed: u64,
     /// `simulated`, `replayed`, `imported`, `emulated` or `bench`.
@@ -65,6 +70,38 @@ pub struct Provenance {
     /// When they were lost, in the order of each stream, camera 1 first.
     #[serde(default)]
     pub losses: Vec<LossRow>,
+}
+
+/// An analysis of a session with other settings than its own.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Variant {
+    /// Its name; part of the names of its files.
+    pub name: String,
+    /// Settings that it overrides, as `key=value`.
+    pub changed: Vec<String>,
+    /// True when it makes the choices of the public code.
+    #[serde(default)]
+    pub reference_code: bool,
+}
+
+impl fmt::Display for Variant {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "analysis `{}`, not the session's own settings: ",
+            self.name
+        )?;
+        if self.reference_code {
+            f.write_str("the choices of the public code")?;
+            if !self.changed.is_empty() {
+                f.write_str(", ")?;
+            }
+        }
+        match &self.changed[..] {
+            [] if !self.reference_code => f.write_str("a name and nothing else"),
+            changed => f.write_str(&changed.join(", ")),
+        }
+    }
 }
 
 /// A loss of a camera.

@@ -8,6 +8,8 @@
 
 use std::fmt::{self, Display, Write};
 
+use skinrig_model::text::visible;
+
 /// Style of the figures: classes and theme variables, light by default.
 pub const FIGURE_CSS: &str = include_str!("../assets/frame/figure.css");
 
@@ -24,12 +26,12 @@ pub fn plain_css() -> String {
     css
 }
 
-/// Writes text with the five XML specials escaped and characters that XML forbids replaced.
+/// Writes text with the five XML specials escaped, what acts instead of showing written out, and non-characters replaced.
 struct Escaping<'a>(&'a mut String);
 
 impl Write for Escaping<'_> {
     fn write_str(&mut self, s: &str) -> fmt::Result {
-        for c in s.chars() {
+        for c in visible(s).chars() {
             match c {
                 '&' => self.0.push_str("&amp;"),
                 '<' => self.0.push_str("&lt;"),
@@ -37,7 +39,7 @@ impl Write for Escaping<'_> {
                 '"' => self.0.push_str("&quot;"),
                 '\'' => self.0.push_str("&#39;"),
                 '\n' | '\t' => self.0.push(c),
-                c if c.is_control() || c == '\u{fffe}' || c == '\u{ffff}' => {
+                '\u{fffe}' | '\u{ffff}' => {
                     self.0.push(char::REPLACEMENT_CHARACTER);
                 }
                 c => self.0.push(c),

@@ -13,9 +13,14 @@ pub struct AnalyzeArgs {
     /// The session file.
     pub session: PathBuf,
 
-    /// Override one analysis setting of the session's protocol, for example `analysis.min_samples=5`.
+    /// Override one analysis setting of the session's protocol, for example `analysis.min_samples=5`. The result is a variant beside
+    /// the official one.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub overrides: Vec<String>,
+
+    /// Name of the variant; by what it changes when absent.
+    #[arg(long, value_name = "NAME", value_parser = crate::analyses::parse)]
+    pub name: Option<String>,
 
     /// Make the choices of the public analysis code (docs/paper.md lists them) and report its numbers beside; `--set`
     /// still wins.
@@ -58,6 +63,10 @@ pub struct CompareArgs {
     /// Compare in spite of a blocking difference with this key. Can be given several times.
     #[arg(long, value_name = "KEY")]
     pub despite: Vec<String>,
+
+    /// Compare the variant of this name (`skinrig analyze --name`) of every session; the official analyses when absent.
+    #[arg(long, value_name = "NAME", value_parser = crate::analyses::parse)]
+    pub analysis: Option<String>,
 
     /// Where to write the page, and beside it the results as JSON; beside the first session when absent.
     #[arg(long, value_name = "FILE")]
@@ -119,6 +128,10 @@ pub struct TradeoffArgs {
 pub struct ReportArgs {
     /// The session file.
     pub session: PathBuf,
+
+    /// The variant of this name (`skinrig analyze --name`); the official analysis when absent.
+    #[arg(long, value_name = "NAME", value_parser = crate::analyses::parse)]
+    pub analysis: Option<String>,
 
     /// Where to write the page; beside the session when absent.
     #[arg(long, value_name = "FILE")]

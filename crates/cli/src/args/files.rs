@@ -30,12 +30,16 @@ pub struct PrototypesArgs {
     /// Only this prototype, with every session of it.
     #[arg(long)]
     pub prototype: Option<String>,
+
+    /// List the variant of this name (`skinrig analyze --name`) of each session; the official analyses when absent.
+    #[arg(long, value_name = "NAME", value_parser = crate::analyses::parse)]
+    pub analysis: Option<String>,
 }
 
 /// Arguments of `tag`.
 #[derive(Debug, Args)]
 pub struct TagArgs {
-    /// The session file; of a folder the session that is being written, else the newest.
+    /// The session file.
     pub session: PathBuf,
 
     /// Tags to give, and with a `-` before them tags to take away.

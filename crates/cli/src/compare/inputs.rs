@@ -1,5 +1,6 @@
 //! Owns what `compare` is given: session files, folders or prototypes, and the results of each session.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
@@ -8,10 +9,11 @@ use skinrig_compare::{Session, Subject};
 use skinrig_recorder::{RecorderError, SessionReader, list};
 
 use super::facts::facts;
+use crate::analyses;
 use crate::args::CompareArgs;
 use crate::exit::Failure;
-use crate::paths::beside;
 use crate::results::{Choices, analyze_session};
+use crate::sessions::{copies, originals};
 
 /// Most skins that are compared at once: letters A to H.
 const MOST: usize = 8;
@@ -33,11 +35,11 @@ pub(super) fn subjects(args: &CompareArgs) -> Result<Vec<Found>, Failure> {
     let letters = 'A'..;
     let found = args.skins.iter().zip(letters);
     found
-        .map(|(text, letter)| one(text, letter, &args.sessions))
+        .map(|(text, letter)| one(text, letter, &args.sessions, args.analysis.as_deref()))
         .collect()
 }
 
-fn one(text: &str, letter: char, folder: &Path) -> Result<Found, Failure> {
+fn one(text: &str, letter: char, folder: &Path, analysis: Option<&str>) -> Result<Found, Failure> {
     let place = Path::new(text);
     let (name, paths) = if place.is_dir() {
         (None, readable(place, None)?)
@@ -63,10 +65,14 @@ fn one(text: &str, letter: char, folder: &Path) -> Result<Found, Failure> {
              names another folder"
         )));
     }
-    let sessions: Result<Vec<Session>, Failure> = paths.iter().map(|p| session(p)).collect();
+    let sessions: Result<Vec<Session>, Failure> =
+        paths.iter().map(|p| session(p, analysis)).collect();
     let sessions = sessions?;
     let own = sessions.first().map(|s| s.facts.prototype.clone());
-    let name = name.map(str::to_owned).or(own).unwrap_or_default();
+    let mut name = name.map(str::to_owned).or(own).unwrap_or_default();
+    if let Some(analysis) = analysis {
+        name = format!("{name} ({})", changes(&paths, analysis)?);
+    }
     Ok(Found {
         subject: Subject {
             letter,
@@ -80,21 +86,45 @@ fn one(text: &str, letter: char, folder: &Path) -> Result<Found, Failure> {
 /// The sessions of a folder, of one prototype or all; a broken file there is an error, not skipped.
 fn readable(folder: &Path, prototype: Option<&str>) -> Result<Vec<PathBuf>, Failure> {
     let all = list(folder).map_err(Failure::input)?;
-    let wanted = all
+    let mut wanted = all;
+    wanted.retain(|s| prototype.is_none() || s.prototype() == prototype);
+    for copy in copies(&wanted) {
+        errln!("note: {copy}");
+    }
+    Ok(originals(&wanted)
         .into_iter()
-        .filter(|s| prototype.is_none() || s.prototype() == prototype);
-    Ok(wanted.map(|s| s.path).collect())
+        .map(|s| s.path.clone())
+        .collect())
 }
 
-fn session(path: &Path) -> Result<Session, Failure> {
+/// What the variant `name` changes in these sessions.
+fn changes(paths: &[PathBuf], name: &str) -> Result<String, Failure> {
+    let mut all = BTreeSet::new();
+    for path in paths {
+        let reader = SessionReader::open(path).map_err(Failure::input)?;
+        let id = reader.session_id().map_err(Failure::input)?;
+        all.insert(analyses::variant(path, &id, name)?.to_string());
+    }
+    Ok(all.into_iter().collect::<Vec<_>>().join("; "))
+}
+
+fn session(path: &Path, name: Option<&str>) -> Result<Session, Failure> {
     let unreadable = |e: RecorderError| Failure::input(e);
     let reader = SessionReader::open(path).map_err(unreadable)?;
     let header = reader.header().map_err(unreadable)?;
     let facts = facts(path, &reader, &header)?;
-    let analysis = match results_beside(path, &facts.session_id) {
+    let variant = name
+        .map(|name| analyses::variant(path, &facts.session_id, name))
+        .transpose()?;
+    let analysis = match results_beside(path, &facts.session_id, name) {
         Some(analysis) => analysis,
         None => {
-            analyze_session(path, Choices::default())
+            let choices = variant.as_ref().map_or_else(Choices::default, |v| Choices {
+                overrides: &v.changed,
+                reference_code: v.reference_code,
+                name: Some(&v.name),
+            });
+            analyze_session(path, choices)
                 .map_err(|f| Failure {
                     message: format!("{}\n  ({}: no results)", f.message, path.display()),
                     ..f
@@ -106,12 +136,14 @@ fn session(path: &Path) -> Result<Session, Failure> {
 }
 
 /// The results beside a session, when they are its own and of this version of the analysis.
-fn results_beside(path: &Path, session_id: &str) -> Option<Analysis> {
-    let text = std::fs::read(beside(path, ".results.json")).ok()?;
+fn results_beside(path: &Path, session_id: &str, name: Option<&str>) -> Option<Analysis> {
+    let text = std::fs::read(analyses::results_path(path, name)).ok()?;
     let mut document: Value = serde_json::from_slice(&text).ok()?;
     let own = document["provenance"]["session_id"].as_str() == Some(session_id);
     let current = document["analysis"]["version"].as_u64() == Some(u64::from(ANALYSIS_VERSION));
-    if !(own && current) {
+    // Settings of the session alone, or those of the variant that was asked for.
+    let named = document["provenance"]["variant"]["name"].as_str() == name;
+    if !(own && current && named) {
         return None;
     }
     let mut analysis = document["analysis"].take();

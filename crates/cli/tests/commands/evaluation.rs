@@ -3,7 +3,7 @@
 use skinrig_model::Point2;
 
 use crate::dataset::{Dataset, PRESSES, csv, positions};
-use crate::support::{Lab, only, read_json, skinrig, text};
+use crate::support::{Lab, files, only, read_json, skinrig, text};
 
 /// The findings of a recording that was imported with `spoil` done to its files.
 fn faults(spoil: impl FnOnce(&mut Dataset)) -> (Vec<String>, String) {
@@ -67,8 +67,12 @@ fn the_public_codes_choices_stand_beside_the_sessions_own_results() {
     ];
     skinrig(&arguments).code(0);
     assert_eq!(text(&own), before);
-    let beside = session.replace(".session.sqlite", ".reference-code.results.json");
-    let analysis = &read_json(std::path::Path::new(&beside))["analysis"];
+    let folder = std::path::Path::new(&session).parent().unwrap();
+    let variant = files(folder, ".results.json");
+    let variant = variant
+        .iter()
+        .find(|p| text(p).contains(".analysis-reference-code_"));
+    let analysis = &read_json(variant.unwrap())["analysis"];
     let settings = &analysis["settings"];
     assert_eq!(settings["window_anchor"], "middle");
     assert_eq!(settings["centroid"], "all_clusters");

@@ -29,4 +29,5 @@ mod streams;
 mod support;
 mod tradeoff;
 mod trend;
+mod variants;
 mod watch;

@@ -189,14 +189,17 @@ fn doubles(subjects: &[Subject]) -> Option<Difference> {
     let different: BTreeSet<&str> = ids.iter().copied().collect();
     (different.len() < ids.len()).then(|| {
         let values = each(subjects, |s| s.facts.session_id.chars().take(8).collect());
+        let sides = |id: &str| {
+            let has = |s: &&Subject| s.sessions.iter().any(|s| s.facts.session_id == id);
+            subjects.iter().filter(has).count()
+        };
+        let reason = if different.iter().any(|id| sides(id) > 1) {
+            "one session stands on both sides, perhaps as a copy: its noise is not new"
+        } else {
+            "one session stands twice on one side, perhaps as a copy: its noise is not new"
+        };
         blocked(
-            difference(
-                "same-session",
-                "session",
-                Weight::Blocking,
-                values,
-                "one session stands on both sides: its noise is not new",
-            ),
+            difference("same-session", "session", Weight::Blocking, values, reason),
             "name different sessions",
         )
     })

@@ -9,7 +9,10 @@
     a.click();
     setTimeout(() => URL.revokeObjectURL(url), 1000);
   };
-  const cell = v => v === null || v === undefined ? '' : /[",\r\n]/.test(v) ? '"' + String(v).replaceAll('"', '""') + '"' : String(v);
+  // A text that a spreadsheet would take for a formula gets a ' before it; numbers stay numbers.
+  const text = v => typeof v === 'string' && /^[=+\-@\t\r\n\uff1d\uff0b\uff0d\uff20]/.test(v) ? "'" + v : v;
+  const cell = w => plain(text(w));
+  const plain = v => v === null || v === undefined ? '' : /[",\r\n]/.test(v) ? '"' + String(v).replaceAll('"', '""') + '"' : String(v);
   const csv = t => {
     const press = filter.active() ? t.data[t.columns.indexOf('press')] : undefined;
     const rows = t.data.length ? [...t.data[0].keys()] : [];

@@ -123,7 +123,14 @@ fn foot(input: &ReportInput<'_>) -> String {
         .map_or_else(String::new, |word| format!(" · {word} rig"));
     let usable = input.analysis.alignment.is_usable();
     let invalid = if usable { "" } else { "INVALID · " };
-    format!("{invalid}session {}{stand_in}", or_missing(&p.session_id))
+    let variant = p
+        .variant
+        .as_ref()
+        .map_or_else(String::new, |v| format!(" · variant {}", v.name));
+    format!(
+        "{invalid}session {}{stand_in}{variant}",
+        or_missing(&p.session_id)
+    )
 }
 
 /// A figure being drawn.

@@ -39,7 +39,9 @@ use crate::{ReportError, ReportInput};
 /// # Errors
 /// When `value` has no JSON form (a map with keys that are not strings).
 pub fn script_json<T: Serialize>(value: &T) -> Result<String, serde_json::Error> {
-    let text = serde_json::to_string(value)?;
+    let mut value = serde_json::to_value(value)?;
+    show_all(&mut value);
+    let text = serde_json::to_string(&value)?;
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
         match c {
@@ -52,6 +54,21 @@ pub fn script_json<T: Serialize>(value: &T) -> Result<String, serde_json::Error>
         }
     }
     Ok(out)
+}
+
+/// Writes out, in every text of `value`, what acts instead of showing.
+fn show_all(value: &mut serde_json::Value) {
+    use serde_json::Value as Json;
+    match value {
+        Json::String(text) => {
+            if let std::borrow::Cow::Owned(shown) = skinrig_model::text::visible(text) {
+                *text = shown;
+            }
+        }
+        Json::Array(items) => items.iter_mut().for_each(show_all),
+        Json::Object(map) => map.values_mut().for_each(show_all),
+        Json::Null | Json::Bool(_) | Json::Number(_) => {}
+    }
 }
 
 /// See [`crate::html`].
@@ -77,6 +94,8 @@ pub(crate) fn render(input: &ReportInput<'_>) -> Result<String, ReportError> {
         extent => extent(input),
         stand_in => p.stand_in(),
         rig_name => or_missing(&p.rig_name),
+        variant => p.variant.as_ref().map(ToString::to_string),
+        overrides => p.overrides.clone(),
         rig_kind => p.rig_kind.clone(),
         violations => if usable { Vec::new() } else { a.alignment.violations.clone() },
         usable,

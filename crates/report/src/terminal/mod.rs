@@ -8,6 +8,8 @@ use skinrig_analysis::result::{
     Alignment, AlignmentStatus, Analysis, ClockFit, ClockMethod, Estimate, MapName, Metrics,
 };
 
+use skinrig_model::text::visible;
+
 use crate::ReportInput;
 use crate::format::{digits_of_error, grouped, interval, number, or_missing};
 
@@ -97,17 +99,9 @@ pub(crate) fn clock_method(method: ClockMethod) -> &'static str {
     }
 }
 
-/// User text without control characters: a terminal would obey them.
+/// User text on one line, with what a terminal would obey written out.
 pub(crate) fn plain(text: &str) -> String {
-    text.chars()
-        .map(|c| {
-            if c.is_control() {
-                char::REPLACEMENT_CHARACTER
-            } else {
-                c
-            }
-        })
-        .collect()
+    visible(&text.replace(['\n', '\t'], " ")).into_owned()
 }
 
 pub(crate) struct Paint(pub(crate) bool);
@@ -166,6 +160,15 @@ pub(crate) fn table(input: &ReportInput<'_>, color: bool) -> String {
     let (a, p) = (input.analysis, &input.provenance);
     let mut out = String::new();
     out += &wrap("session   ", &plain(or_missing(&p.session_id)));
+    if let Some(variant) = &p.variant {
+        out += &paint.warn(&wrap("VARIANT   ", &plain(&variant.to_string())));
+    }
+    if !p.overrides.is_empty() {
+        out += &wrap(
+            "recorded  ",
+            &plain(&format!("with --set {}", p.overrides.join(" --set "))),
+        );
+    }
     let rig = plain(or_missing(&p.rig_name));
     if let Some(word) = p.stand_in() {
         let word = word.to_uppercase();

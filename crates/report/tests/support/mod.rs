@@ -464,6 +464,7 @@ pub fn provenance() -> Provenance {
         protocol_name: "protocols/meander.yaml".into(),
         protocol_sha256: "3f5b".repeat(16),
         overrides: vec!["path.repetitions=10".into()],
+        variant: None,
         plan_sha256: "a90c".repeat(16),
         seed: 20_260_302,
         rig_kind: "simulated".into(),

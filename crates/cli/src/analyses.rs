@@ -1,0 +1,278 @@
+//! Names of analyses. A session's own settings give the official one; everything else is a variant with files of its own beside it.
+
+use std::fmt::Write as _;
+use std::io::{Read, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+use sha2::{Digest, Sha256};
+use skinrig_report::{Summary, Variant};
+
+use crate::exit::Failure;
+use crate::paths::{beside, folder_of};
+
+/// Stands before the name of a variant in the names of its files.
+const MARK: &str = ".analysis-";
+/// The end of every file of results.
+const RESULTS: &str = ".results.json";
+/// Longest name.
+const MOST_CHARS: usize = 60;
+/// The summary stands so near to the end of a file of results.
+const TAIL_BYTES: u64 = 1 << 16;
+
+/// The results of a session's analysis with this name; `None`: the official one.
+pub fn results_path(session: &Path, name: Option<&str>) -> PathBuf {
+    path(session, name, RESULTS)
+}
+
+/// Its report.
+pub fn report_path(session: &Path, name: Option<&str>) -> PathBuf {
+    path(session, name, ".report.html")
+}
+
+fn path(session: &Path, name: Option<&str>, ending: &str) -> PathBuf {
+    match name {
+        None => beside(session, ending),
+        Some(name) => beside(session, &format!("{MARK}{name}{ending}")),
+    }
+}
+
+/// A name of an analysis, as `--name` and `--analysis` take it.
+///
+/// # Errors
+/// In words, for what is none.
+pub fn parse(text: &str) -> Result<String, String> {
+    let plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || "._=-".contains(c);
+    let first = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit();
+    let fits = text.len() <= MOST_CHARS && text.starts_with(first) && text.chars().all(plain);
+    match (fits, text) {
+        (true, "official") => Err(
+            "expected another name: `official` is the analysis with the session's own settings"
+                .to_owned(),
+        ),
+        (true, _) => Ok(text.to_owned()),
+        (false, _) => Err(format!(
+            "expected 1 to {MOST_CHARS} of a-z, 0-9, `.`, `_`, `=`, `-`, a letter or digit first, found `{}`",
+            text.escape_debug()
+        )),
+    }
+}
+
+/// The name of a variant that nobody named: by what it changes.
+pub fn own_name(changed: &[String], reference_code: bool) -> String {
+    let reference = reference_code.then(|| "reference-code".to_owned());
+    let words = changed
+        .iter()
+        .map(|o| o.trim().replacen("analysis.", "", 1));
+    let exact = reference
+        .into_iter()
+        .chain(words)
+        .collect::<Vec<_>>()
+        .join("_");
+    if parse(&exact).is_ok() {
+        return exact;
+    }
+    // Not every change can stand in a file's name: a digest keeps those apart that look alike.
+    let mut name = String::new();
+    for c in exact.to_lowercase().chars() {
+        let plain = c.is_ascii_alphanumeric() || "._=".contains(c);
+        match c {
+            c if plain => name.push(c),
+            _ if name.ends_with('-') => {}
+            _ => name.push('-'),
+        }
+    }
+    let mut name: String = name
+        .trim_start_matches(['.', '_', '=', '-'])
+        .chars()
+        .take(MOST_CHARS - 9)
+        .collect();
+    if name.is_empty() {
+        name.push('x');
+    }
+    name.push('-');
+    for byte in &Sha256::digest(&exact)[..4] {
+        // Writing to a string cannot fail.
+        let _ = write!(name, "{byte:02x}");
+    }
+    name
+}
+
+/// What the results of an analysis beside a session say in short, from their last bytes. Those of another session or another analysis
+/// in that place are refused.
+///
+/// # Errors
+/// In words, when there are none or they are not its own.
+pub fn summary(session: &Path, session_id: &str, name: Option<&str>) -> Result<Summary, String> {
+    let found = read_summary(&results_path(session, name)).map_err(|e| match name {
+        Some(name) if e == NOT_THERE => format!("no analysis `{name}`"),
+        _ => e,
+    })?;
+    if found.session_id != session_id {
+        return Err("results of another session lie beside it".to_owned());
+    }
+    match (&found.variant, name) {
+        (None, None) => Ok(found),
+        (Some(variant), Some(name)) if variant.name == name => Ok(found),
+        (Some(variant), _) => Err(format!(
+            "results of the analysis `{}` lie in their place: analyze it again",
+            variant.name
+        )),
+        (None, Some(_)) => Err(
+            "results with the session's own settings lie in their place: analyze it again"
+                .to_owned(),
+        ),
+    }
+}
+
+const NOT_THERE: &str = "not analysed";
+
+fn read_summary(path: &Path) -> Result<Summary, String> {
+    let mut file = std::fs::File::open(path).map_err(|e| match e.kind() {
+        std::io::ErrorKind::NotFound => NOT_THERE.to_owned(),
+        _ => e.to_string(),
+    })?;
+    let older = || "results of an older skinrig: analyze it again".to_owned();
+    let length = file.metadata().map_err(|e| e.to_string())?.len();
+    let from = SeekFrom::Start(length.saturating_sub(TAIL_BYTES));
+    let mut tail = Vec::new();
+    file.seek(from)
+        .and_then(|_| file.take(TAIL_BYTES).read_to_end(&mut tail))
+        .map_err(|e| e.to_string())?;
+    // A key of the outermost object; within a text of JSON no line ends.
+    let key = b"\n  \"summary\": ";
+    let at = tail.windows(key.len()).position(|w| w == key);
+    let text = &tail[at.ok_or_else(older)? + key.len()..];
+    let mut reader = serde_json::Deserializer::from_slice(text);
+    Summary::deserialize(&mut reader).map_err(|_| older())
+}
+
+/// An analysis that lies beside a session.
+pub struct Listed {
+    /// Its name; `None`: the official one.
+    pub name: Option<String>,
+    /// Its file of results.
+    pub results: PathBuf,
+    /// What it says in short, or why that cannot be told.
+    pub summary: Result<Summary, String>,
+}
+
+/// The analyses beside a session, the official one first, then by name.
+pub fn all(session: &Path, session_id: &str) -> Vec<Listed> {
+    let listed = |name: Option<String>| Listed {
+        results: results_path(session, name.as_deref()),
+        summary: summary(session, session_id, name.as_deref()),
+        name,
+    };
+    let official = results_path(session, None).is_file().then(|| listed(None));
+    let stem = beside(session, MARK);
+    let stem = stem
+        .file_name()
+        .unwrap_or_default()
+        .to_string_lossy()
+        .into_owned();
+    let entries = std::fs::read_dir(folder_of(session))
+        .into_iter()
+        .flatten()
+        .flatten();
+    let mut names: Vec<String> = entries
+        .filter_map(|entry| {
+            let file = entry.file_name().to_string_lossy().into_owned();
+            let name = file.strip_prefix(&stem)?.strip_suffix(RESULTS)?;
+            parse(name).ok()
+        })
+        .collect();
+    names.sort();
+    official
+        .into_iter()
+        .chain(names.into_iter().map(|name| listed(Some(name))))
+        .collect()
+}
+
+/// What a variant that lies beside a session changed.
+///
+/// # Errors
+/// [`Failure::input`] when there is none of that name.
+pub fn variant(session: &Path, session_id: &str, name: &str) -> Result<Variant, Failure> {
+    let found = summary(session, session_id, Some(name)).map(|s| s.variant);
+    found.ok().flatten().ok_or_else(|| {
+        let others: Vec<String> = all(session, session_id).into_iter().filter_map(|a| a.name).collect();
+        let there = if others.is_empty() { "none".to_owned() } else { others.join(", ") };
+        Failure::input(format!(
+            "{0}: expected an analysis with the name `{name}`, found {there}\n  next: `skinrig analyze {0} --set KEY=VALUE --name {name}` \
+             makes one, `skinrig show {0}` lists them",
+            session.display()
+        ))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_variant_is_named_by_what_it_changes() {
+        let name = |changed: &[&str], reference| {
+            let changed: Vec<String> = changed.iter().map(|c| (*c).to_owned()).collect();
+            own_name(&changed, reference)
+        };
+        assert_eq!(name(&["analysis.min_samples=5"], false), "min_samples=5");
+        assert_eq!(name(&[], true), "reference-code");
+        assert_eq!(
+            name(&["analysis.bin=2px", "analysis.seed=3"], true),
+            "reference-code_bin=2px_seed=3"
+        );
+        // What cannot stand in a name is told apart all the same.
+        let (a, b) = (
+            name(&["analysis.eps=5 px"], false),
+            name(&["analysis.eps=5/px"], false),
+        );
+        assert!(
+            a.starts_with("eps=5-px-") && b.starts_with("eps=5-px-") && a != b,
+            "{a} {b}"
+        );
+        let long = name(
+            &[&format!(
+                "analysis.exclude_press_numbers=[{}]",
+                "7, ".repeat(50)
+            )],
+            false,
+        );
+        for name in [
+            a,
+            b,
+            long,
+            name(&["analysis.x=../../etc/passwd"], false),
+            name(&["\u{202e}"], false),
+        ] {
+            assert_eq!(parse(&name).as_ref(), Ok(&name));
+        }
+    }
+
+    #[test]
+    fn names_make_plain_files_beside_the_session() {
+        for wrong in [
+            "",
+            "Official",
+            "official",
+            ".x",
+            "-x",
+            "a/b",
+            "a b",
+            "\u{202e}",
+            &"x".repeat(61),
+        ] {
+            assert!(parse(wrong).is_err(), "{wrong:?}");
+        }
+        let session = Path::new("s/x.session.sqlite");
+        assert_eq!(results_path(session, None), Path::new("s/x.results.json"));
+        assert_eq!(
+            results_path(session, Some("a")),
+            Path::new("s/x.analysis-a.results.json")
+        );
+        assert_eq!(
+            report_path(session, Some("a")),
+            Path::new("s/x.analysis-a.report.html")
+        );
+    }
+}
