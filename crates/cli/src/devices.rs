@@ -6,7 +6,7 @@ use std::time::Duration;
 use serde::Serialize;
 use skinrig_evk1::FoundState;
 use skinrig_hil::lease::{self, Standing};
-use skinrig_omega3::enumerate::Availability;
+use skinrig_omega3::enumerate::{Availability, SERIAL_UNKNOWN};
 use skinrig_omega3::load::LoadError;
 use skinrig_protocol::rig::{RigFile, RigKind};
 use skinrig_trigger_box::PortState;
@@ -153,7 +153,9 @@ fn robots(rig: Option<&RigFile>) -> Vec<Line> {
             };
             Line {
                 serial: f.serial.map(|s| s.to_string()),
-                role: (f.serial.is_some() && f.serial == wanted).then(|| "robot".to_owned()),
+                // One that does not tell its number is 65535 to the library.
+                role: (wanted == Some(f.serial.unwrap_or(SERIAL_UNKNOWN)))
+                    .then(|| "robot".to_owned()),
                 firmware: f.firmware.clone(),
                 ..line(
                     f.model.as_deref().unwrap_or("Force Dimension device"),
@@ -201,7 +203,7 @@ fn cameras(rig: Option<&RigFile>) -> Vec<Line> {
                     let found = match &f.state {
                         FoundState::Ready(identity) => Line {
                             serial: Some(identity.serial.clone()),
-                            role: wanted(&identity.serial),
+                            role: wanted(&identity.serial).or_else(|| wanted(f.port.as_deref()?)),
                             firmware: Some(identity.firmware()),
                             ..line(&place("EVK1 Gen3.1"), "ready", identity.firmware())
                         },

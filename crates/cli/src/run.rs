@@ -351,7 +351,10 @@ fn on_bench(
     json: bool,
     operator: &Operator,
 ) -> Result<(PathBuf, RunReport), Failure> {
-    let file = bench::load(file)?;
+    let mut file = bench::load(file)?;
+    if args.tolerant {
+        bench::tolerate(&mut file);
+    }
     let faults = [&protocol.faults[..], &args.faults].concat();
     planted::refuse(&faults, &bench::display_name(&file))?;
     bench::tighten(&mut protocol, &file);

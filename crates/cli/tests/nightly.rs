@@ -23,8 +23,6 @@ use skinrig_model::CameraId;
 
 const SKINRIG: &str = env!("CARGO_BIN_EXE_skinrig");
 const RIG: &str = include_str!("../../../hil/rigs/emulated.yaml");
-/// Where the skin's surface lies on this bench, m, robot frame.
-const SURFACE_M: f64 = -0.020;
 
 /// What the checks are made with here: short, never repeated.
 const SUITE: &str = "\

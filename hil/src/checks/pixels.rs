@@ -101,12 +101,13 @@ impl Reader {
 /// Lets the streams settle, counts for the second of the two spans, and stops the cameras. What each camera gave that streamed
 /// to the end.
 pub(super) fn watch(
-    mut streams: Streams<'_>,
+    streams: Streams<'_>,
     [settle, duration]: [HostDuration; 2],
     mut readers: [Option<Reader>; 2],
     found: &mut Findings,
     metrics: &[&'static str],
 ) -> Vec<(CameraId, Seen, Reader)> {
+    let mut streams = streams.without_box();
     let see = |readers: &mut [Option<Reader>; 2], chunk: &RawChunk| {
         if let Some(reader) = &mut readers[chunk.camera.index()] {
             reader.see(chunk);

@@ -29,6 +29,8 @@ pub struct Streams<'a> {
     cameras: [Live; 2],
     box_trouble: Option<Trouble>,
     box_noise: Option<Trouble>,
+    /// Whether the check needs the box.
+    box_matters: bool,
     reports: Vec<BoxReport>,
     chunks: Vec<RawChunk>,
     flushed_at: HostTime,
@@ -57,6 +59,7 @@ impl<'a> Streams<'a> {
             },
             devices,
             box_noise: None,
+            box_matters: true,
             reports: Vec::new(),
             chunks: Vec::new(),
             flushed_at: now,
@@ -127,6 +130,12 @@ impl<'a> Streams<'a> {
         &self.reports
     }
 
+    /// What becomes of the trigger box is no matter of this check: told here, it would excuse what is wrong with a camera.
+    pub fn without_box(mut self) -> Self {
+        self.box_matters = false;
+        self
+    }
+
     /// From now on what comes counts.
     pub fn begin(&mut self, see: &mut dyn FnMut(&RawChunk)) {
         self.look(true, see);
@@ -195,14 +204,10 @@ impl<'a> Streams<'a> {
         if let (Some(trouble), Some(slot)) = (&self.box_trouble, &mut self.devices.trigger_box) {
             *slot = Err(trouble.clone());
         }
-        let others = [
-            self.box_trouble.take(),
-            self.box_noise.take(),
-            self.held_up.take(),
-        ];
-        found
-            .evidence
-            .extend(others.into_iter().flatten().map(|t| *t));
+        let of_box = [self.box_trouble.take(), self.box_noise.take()];
+        let of_box = of_box.into_iter().filter(|_| self.box_matters);
+        let others = of_box.chain([self.held_up.take()]);
+        found.evidence.extend(others.flatten().map(|t| *t));
         CameraId::ALL.map(|camera| {
             let live = std::mem::take(&mut self.cameras[camera.index()]);
             match live.trouble {

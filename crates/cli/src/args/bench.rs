@@ -75,6 +75,11 @@ pub struct RunArgs {
     #[arg(long, value_name = "FILE", conflicts_with_all = ["replay", "level", "real_time"])]
     pub rig: Option<PathBuf>,
 
+    /// Let mismatches of the cameras of `--rig` pass (status bytes, resets, transfers, registers that read back differently), and tell the
+    /// keys of the rig file that accept them. The session says that it was recorded so.
+    #[arg(long, requires = "rig")]
+    pub tolerant: bool,
+
     /// Seed of the run and of the simulated rig; the protocol's seed when absent.
     #[arg(long, conflicts_with = "replay")]
     pub seed: Option<u64>,

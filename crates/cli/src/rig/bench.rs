@@ -9,10 +9,11 @@ use skinrig_device::{
     TriggerBox,
 };
 use skinrig_evk1::biases::parse_bias_file;
-use skinrig_evk1::{Evk1, Evk1Config, Evk1Error};
+use skinrig_evk1::{Evk1, Evk1Config, Evk1Error, Tolerance};
 use skinrig_model::{CameraId, HostDuration, RigGeometry, SkinOutline, StereoGeometry};
 use skinrig_omega3::axes::{Axes, Axis};
 use skinrig_omega3::config::{Initialise, RedundantEncoders, SupervisorCommand, Watchdog};
+use skinrig_omega3::enumerate::SERIAL_UNKNOWN;
 use skinrig_omega3::{Omega, OmegaConfig, OmegaError};
 use skinrig_protocol::Protocol;
 use skinrig_protocol::rig::{BoxSetup, CameraSetup, RigFile, RigKind, SyncRole};
@@ -31,6 +32,13 @@ pub fn load(path: &Path) -> Result<RigFile, Failure> {
     let environment = |name: &str| std::env::var(name).ok();
     RigFile::parse(&path.display().to_string(), &bytes, &environment)
         .map_err(|found| Failure::findings(&found))
+}
+
+/// Lets mismatches of the cameras pass, each told with the key of the rig file that accepts it.
+pub fn tolerate(rig: &mut RigFile) {
+    for camera in &mut rig.cameras {
+        camera.tolerant = true;
+    }
 }
 
 /// Holds the plan of `protocol` within what the bench bears: the tighter limit holds, and a protocol that does not say
@@ -147,11 +155,15 @@ pub fn settings(kind: &str) -> ControllerSettings {
 #[must_use]
 pub fn display_name(rig: &RigFile) -> String {
     let kind = rig.kind.name();
-    if rig.name.contains(kind) {
-        rig.name.clone()
-    } else {
-        format!("{} ({kind})", rig.name)
+    let mut name = rig.name.clone();
+    if !name.contains(kind) {
+        name = format!("{name} ({kind})");
     }
+    // In the name, so that no report of such a session can be read without it.
+    if rig.cameras.iter().any(|c| c.tolerant) {
+        name.push_str(", mismatches tolerated");
+    }
+    name
 }
 
 /// What analyses need to know of the bench.
@@ -191,7 +203,7 @@ pub(crate) fn omega_config(rig: &RigFile) -> Result<OmegaConfig, Failure> {
     let (robot, limits) = (&rig.robot, &rig.limits);
     let mut config = OmegaConfig {
         library: robot.library.clone(),
-        serial: Some(robot.serial),
+        serial: Some(robot.serial).filter(|s| *s != SERIAL_UNKNOWN),
         ..OmegaConfig::default()
     };
     config.mount.device_angle_deg = robot.device_angle_deg;
@@ -274,9 +286,19 @@ pub(crate) fn evk1(
         read_back_exceptions: setup.read_back_exceptions.clone(),
         max_time_step_us: setup.max_time_high_gap_us,
         overflow_is_loss: setup.overflow_is_loss,
+        tolerance: Tolerance {
+            read_status: setup.read_status.clone(),
+            failed_reset: setup.failed_reset_is_accepted,
+            failed_transfers: setup.failed_transfer_is_loss,
+            everything: setup.tolerant,
+        },
         ..Evk1Config::default()
     };
-    Evk1::open_serial(&setup.serial, camera, config, clock)
+    let opened = Evk1::open_serial(&setup.serial, camera, config, clock)?;
+    for mismatch in opened.mismatches() {
+        errln!("warning: {camera}: {mismatch}");
+    }
+    Ok(opened)
 }
 
 /// The settings that a run with this `request` writes to a camera.

@@ -32,6 +32,13 @@ pub fn of_bench(file: &RigFile, rig: &Rig, folder: &Path, expected_s: f64) -> Pr
             "the stand-in's skin lies where the file says",
         )],
     });
+    if file.cameras.iter().any(|c| c.tolerant) {
+        made.push(PreflightCheck::skipped(
+            "mismatches",
+            "every mismatch of a camera refused",
+            "--tolerant: they are let pass; the devices' settings name each with the key that accepts it",
+        ));
+    }
     Preflight {
         made,
         expected: ExpectedDevice::of_rig(file),

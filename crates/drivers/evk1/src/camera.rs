@@ -17,11 +17,12 @@ use crate::biases::{BIASES, DIFF};
 use crate::chunks::Chunker;
 use crate::config::Evk1Config;
 use crate::error::{Evk1Error, FirstError, UsbError};
-use crate::identify::{Identity, identify, open_serial};
+use crate::identify::{Identity, identify_tolerating, open_serial};
 use crate::inbox::{Inbox, Taken};
 use crate::registers::{CHIP_ID, OVERFLOW_HITCOUNT, TEMPERATURE};
 use crate::report::StreamReport;
 use crate::settings::Checked;
+use crate::tolerance::{Mismatch, Mismatches, Tolerance};
 use crate::triggers::{self, CHANNELS, TriggerOut};
 use crate::usb::Transport;
 use crate::{noise_filter, pattern, sequences, sync};
@@ -31,6 +32,8 @@ pub struct Evk1 {
     camera: CameraId,
     identity: Identity,
     config: Evk1Config,
+    /// What was tolerated.
+    seen: Mismatches,
     transport: Box<dyn Transport>,
     clock: Box<dyn Clock>,
     settings: Option<Checked>,
@@ -44,6 +47,38 @@ pub struct Evk1 {
     used: bool,
     gone: bool,
     closed: bool,
+}
+
+/// Begins the name of a port, which stands for a serial number that cannot be read.
+const BY_PORT: &str = "usb-";
+
+/// The registers of a camera that is driven by `config`.
+fn registers_of<'a>(
+    transport: &'a mut dyn Transport,
+    config: &'a Evk1Config,
+    seen: &Mismatches,
+) -> Registers<'a> {
+    Registers::new(transport, &config.read_back_exceptions).tolerating(&config.tolerance, seen)
+}
+
+/// Resets the camera on the bus.
+fn reset(
+    transport: &mut dyn Transport,
+    tolerance: &Tolerance,
+    seen: &Mismatches,
+) -> Result<(), Evk1Error> {
+    match transport.reset() {
+        Ok(()) => Ok(()),
+        Err(e) if tolerance.failed_reset && e != UsbError::Gone => Ok(()),
+        Err(e) if tolerance.everything && e != UsbError::Gone => {
+            seen.add(
+                "failed_reset: accepted",
+                format!("expected a reset on the bus, found {e}"),
+            );
+            Ok(())
+        }
+        Err(e) => Err(e.during("resetting the camera on the bus")),
+    }
 }
 
 /// What exists only while streaming.
@@ -75,8 +110,8 @@ impl Overflow {
 const OVERFLOW_PERIOD: HostDuration = HostDuration::from_millis(1_000);
 
 impl Evk1 {
-    /// Opens the camera with this serial number (8 hexadecimal digits) through libusb. What it sends is stamped on
-    /// `clock`.
+    /// Opens the camera with this serial number (8 hexadecimal digits), or at this port (`usb-BUS-PORT.PORT`), through libusb. What it
+    /// sends is stamped on `clock`.
     ///
     /// # Errors
     /// [`Evk1Error::NotFound`] says what is there instead; otherwise as [`Self::open`].
@@ -87,8 +122,13 @@ impl Evk1 {
         clock: RealClock,
     ) -> Result<Self, Evk1Error> {
         config.check()?;
-        let usb = open_serial(serial, clock)?;
-        Self::open(Box::new(usb), camera, config, Box::new(clock))
+        let usb = open_serial(serial, clock, &config.tolerance)?;
+        let mut opened = Self::open(Box::new(usb), camera, config, Box::new(clock))?;
+        if serial.starts_with(BY_PORT) {
+            // What it tells of itself, if anything, was not asked for.
+            opened.identity.serial = serial.to_owned();
+        }
+        Ok(opened)
     }
 
     /// Identifies and initialises the camera behind `transport`. Waits, such as the half second of a start, are taken
@@ -104,12 +144,14 @@ impl Evk1 {
         mut clock: Box<dyn Clock>,
     ) -> Result<Self, Evk1Error> {
         config.check()?;
-        let identity = identify(transport.as_mut(), clock.as_mut())?;
+        let seen = Mismatches::default();
+        let identity =
+            identify_tolerating(transport.as_mut(), clock.as_mut(), &config.tolerance, &seen)?;
         // What an earlier program left in the buffers would come first, with times of its own.
-        let reset = transport.reset();
-        reset.map_err(|e| e.during("resetting the camera on the bus"))?;
-        let mut registers = Registers::new(transport.as_mut(), &config.read_back_exceptions);
-        registers.read(CHIP_ID)?;
+        reset(transport.as_mut(), &config.tolerance, &seen)?;
+        let mut registers = registers_of(transport.as_mut(), &config, &seen);
+        // Its value says nothing, and the sensor may be without power.
+        registers.read_unpowered(CHIP_ID)?;
         sequences::initialise(&mut registers, identity.fpga_version)?;
         pattern::clear(&mut registers)?;
         let chunker = Chunker::new(camera, config.max_time_step_us);
@@ -117,6 +159,7 @@ impl Evk1 {
             camera,
             identity,
             config,
+            seen,
             transport,
             clock,
             settings: None,
@@ -129,6 +172,12 @@ impl Evk1 {
             gone: false,
             closed: false,
         })
+    }
+
+    /// What was tolerated so far, each with the key that accepts it.
+    #[must_use]
+    pub fn mismatches(&self) -> Vec<Mismatch> {
+        self.seen.all()
     }
 
     /// What happened to the stream that runs, or to the last one.
@@ -188,8 +237,7 @@ impl Evk1 {
         // Whatever failed, the sensor must not stay under power.
         let mut done = FirstError::default();
         done.after(back.map_err(|e| e.during("stopping the stream")));
-        let mut registers =
-            Registers::new(self.transport.as_mut(), &self.config.read_back_exceptions);
+        let mut registers = registers_of(self.transport.as_mut(), &self.config, &self.seen);
         if streaming {
             done.after(sequences::stop(&mut registers));
         }
@@ -201,7 +249,7 @@ impl Evk1 {
     }
 
     fn registers(&mut self) -> Registers<'_> {
-        Registers::new(self.transport.as_mut(), &self.config.read_back_exceptions)
+        registers_of(self.transport.as_mut(), &self.config, &self.seen)
     }
 
     /// The error as the rig sees it; remembers a camera that is gone.
@@ -273,8 +321,13 @@ impl Evk1 {
         self.give_pixels_back()?;
         let mut registers = self.registers();
         checked.write(&mut registers)?;
-        let read = checked.read_back(&mut registers)?;
+        let mut read = checked.read_back(&mut registers)?;
         self.settings = Some(checked);
+        read.extend(self.seen.all().into_iter().map(|mismatch| Setting {
+            name: format!("tolerated: {}", mismatch.key),
+            requested: "nothing".to_owned(),
+            read_back: mismatch.what,
+        }));
         Ok(read)
     }
 
@@ -305,8 +358,7 @@ impl Evk1 {
             None => (Vec::new(), SyncMode::default()),
         };
         let mut report = StreamReport::default();
-        let mut registers =
-            Registers::new(self.transport.as_mut(), &self.config.read_back_exceptions);
+        let mut registers = registers_of(self.transport.as_mut(), &self.config, &self.seen);
         if std::mem::replace(&mut self.used, true) {
             report.left_over_bytes =
                 sequences::clear_left_over(&mut registers, self.clock.as_ref())?;
@@ -331,8 +383,7 @@ impl Evk1 {
             let end = clock.now() + HostDuration(span);
             clock.wait_until(end);
         };
-        let exceptions = &self.config.read_back_exceptions;
-        let mut registers = Registers::new(self.transport.as_mut(), exceptions);
+        let mut registers = registers_of(self.transport.as_mut(), &self.config, &self.seen);
         if let Err(error) = sequences::start(&mut registers, &mut wait) {
             self.undo_start();
             return Err(error);
@@ -446,6 +497,8 @@ impl Evk1 {
             self.follow_overflow(&mut stream.overflow, hits, now, chunks);
         }
         self.notes.extend(self.report.notes());
+        let tolerated = self.seen.all().into_iter();
+        self.notes.extend(tolerated.map(|m| m.to_string()));
         received?;
         back.map_err(|e| e.during("stopping the stream"))?;
         answered

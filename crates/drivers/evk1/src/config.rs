@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use crate::error::Evk1Error;
+use crate::tolerance::Tolerance;
 
 /// How a camera is driven.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -27,6 +28,8 @@ pub struct Evk1Config {
     /// Whether a step of the camera's overflow counter is a loss of at least one word. False: it is noted at the end and nothing
     /// more, because what the counter of a real EVK1 counts is not public.
     pub overflow_is_loss: bool,
+    /// What is accepted although a camera is not expected to do it.
+    pub tolerance: Tolerance,
 }
 
 impl Default for Evk1Config {
@@ -40,6 +43,7 @@ impl Default for Evk1Config {
             read_back_exceptions: Vec::new(),
             max_time_step_us: None,
             overflow_is_loss: true,
+            tolerance: Tolerance::default(),
         }
     }
 }

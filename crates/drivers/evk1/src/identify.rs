@@ -11,6 +11,7 @@ use crate::access::Registers;
 use crate::error::{Evk1Error, UsbError};
 use crate::registers::{ATIS_CONTROL, FPGA_VERSION, SERIAL_MSB};
 use crate::requests;
+use crate::tolerance::{Mismatches, Tolerance};
 use crate::usb::{Access, LibUsb, Slot, Transport, bus};
 
 /// What to do when a user may not open the camera.
@@ -57,6 +58,8 @@ pub struct Found {
     pub place: String,
     /// Its bus, and its address on it.
     pub address: (u8, u8),
+    /// Its port, `usb-BUS-PORT.PORT`, which may stand for a serial number that cannot be read.
+    pub port: Option<String>,
     /// What came of asking it.
     pub state: FoundState,
 }
@@ -87,9 +90,12 @@ impl Found {
                     .to_owned(),
             ),
             FoundState::NoPermission => Some(UDEV_STEP.to_owned()),
-            FoundState::Faulty(_) => {
-                Some("unplug the camera, wait 5 s, plug it in again".to_owned())
-            }
+            FoundState::Faulty(_) => Some(format!(
+                "unplug the camera, wait 5 s, plug it in again; one that always answers so may be opened by `skinrig run --tolerant`{}",
+                self.port.as_ref().map_or_else(String::new, |port| format!(
+                    ", with `serial: {port}` in the rig file when it does not tell its number"
+                ))
+            )),
         }
     }
 }
@@ -100,22 +106,29 @@ impl Found {
 /// [`UsbError::NoUsb`] on a machine without USB.
 pub fn enumerate() -> Result<Vec<Found>, UsbError> {
     let clock = RealClock::start();
-    Ok(bus()?.iter().map(|slot| ask_slot(slot, clock).0).collect())
+    let strict = Tolerance::default();
+    let ask = |slot: &Slot| ask_slot(slot, clock, &strict).0;
+    Ok(bus()?.iter().map(ask).collect())
 }
 
 /// Asks one device, and hands over the camera that it may be.
-fn ask_slot(slot: &Slot, clock: RealClock) -> (Found, Option<LibUsb>) {
+fn ask_slot(slot: &Slot, clock: RealClock, tolerance: &Tolerance) -> (Found, Option<LibUsb>) {
     let (state, camera) = match slot.open(clock) {
-        Ok(Access::Open(mut usb)) => match identify(&mut usb, &mut clock.clone()) {
-            Ok(identity) => (FoundState::Ready(identity), Some(usb)),
-            Err(e) => (FoundState::of(e), None),
-        },
+        Ok(Access::Open(mut usb)) => {
+            // What is tolerated here is told when the camera is opened.
+            let seen = Mismatches::default();
+            match identify_tolerating(&mut usb, &mut clock.clone(), tolerance, &seen) {
+                Ok(identity) => (FoundState::Ready(identity), Some(usb)),
+                Err(e) => (FoundState::of(e), None),
+            }
+        }
         Ok(Access::Treuzell) => (FoundState::NotEvk1(TREUZELL.to_owned()), None),
         Err(e) => (FoundState::of(e.during("opening")), None),
     };
     let found = Found {
         place: slot.place(),
         address: slot.address(),
+        port: slot.port(),
         state,
     };
     (found, camera)
@@ -166,17 +179,23 @@ impl fmt::Display for Found {
 ///
 /// # Errors
 /// [`Evk1Error::NotFound`] says what is there instead; [`Evk1Error::Usb`] without USB.
-pub(crate) fn open_serial(serial: &str, clock: RealClock) -> Result<LibUsb, Evk1Error> {
+pub(crate) fn open_serial(
+    serial: &str,
+    clock: RealClock,
+    tolerance: &Tolerance,
+) -> Result<LibUsb, Evk1Error> {
     let mut others = Vec::new();
     for slot in bus().map_err(|e| e.during("listing USB devices"))? {
-        match ask_slot(&slot, clock) {
+        match ask_slot(&slot, clock, tolerance) {
             (
                 Found {
                     state: FoundState::Ready(identity),
                     ..
                 },
                 Some(camera),
-            ) if identity.serial == serial => return Ok(camera),
+            ) if identity.serial == serial || slot.port().as_deref() == Some(serial) => {
+                return Ok(camera);
+            }
             (other, _) => others.push(other.to_string()),
         }
     }
@@ -198,6 +217,17 @@ pub(crate) fn open_serial(serial: &str, clock: RealClock) -> Result<LibUsb, Evk1
 pub fn identify(
     transport: &mut dyn Transport,
     clock: &mut dyn Clock,
+) -> Result<Identity, Evk1Error> {
+    let seen = Mismatches::default();
+    identify_tolerating(transport, clock, &Tolerance::default(), &seen)
+}
+
+/// As [`identify`], letting pass what `tolerance` accepts.
+pub(crate) fn identify_tolerating(
+    transport: &mut dyn Transport,
+    clock: &mut dyn Clock,
+    tolerance: &Tolerance,
+    seen: &Mismatches,
 ) -> Result<Identity, Evk1Error> {
     let place = transport.place();
     let not_evk1 = |expected: &str, found: String| Evk1Error::NotEvk1 {
@@ -229,8 +259,8 @@ pub fn identify(
         Err(e) => return Err(e),
     }
     await_fpga(transport, clock)?;
-    let mut registers = Registers::new(transport, &[]);
-    registers.read(ATIS_CONTROL)?; // The first read after power-up is not to be relied on.
+    let mut registers = Registers::new(transport, &[]).tolerating(tolerance, seen);
+    registers.read_unpowered(ATIS_CONTROL)?; // The first read after power-up is not to be relied on.
     let serial = registers.read(SERIAL_MSB)?;
     let system = ask16(transport, requests::SYSTEM_ID, "asking for the system ID")?;
     if system != requests::SYSTEM_GEN31 {
@@ -255,7 +285,8 @@ pub fn identify(
     )?;
     let [a, b, c, d, ..] = answer;
     let fx3_version = u32::from_le_bytes([a, b, c, d]);
-    let fpga_version = Registers::new(transport, &[]).read(FPGA_VERSION)?;
+    let mut registers = Registers::new(transport, &[]).tolerating(tolerance, seen);
+    let fpga_version = registers.read(FPGA_VERSION)?;
     let identity = Identity {
         serial: format!("{serial:08x}"),
         fpga_version,

@@ -101,6 +101,14 @@ impl Inbox {
         }
     }
 
+    /// Something was lost at `at`, nobody knows how much: it counts as one word, and what comes next begins a word.
+    pub fn lose_some(&self, at: HostTime) {
+        let mut state = self.state();
+        state.close();
+        state.lose(WORD, at);
+        state.phase = 0;
+    }
+
     /// Notes what ended the stream; the first one counts.
     pub fn fail(&self, error: UsbError) {
         self.state().error.get_or_insert(error);

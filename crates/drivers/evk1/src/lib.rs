@@ -27,6 +27,7 @@ pub mod sequences;
 pub mod settings;
 pub mod sync;
 pub mod time_base;
+pub mod tolerance;
 pub mod triggers;
 pub mod usb;
 
@@ -35,4 +36,5 @@ pub use config::Evk1Config;
 pub use error::{Evk1Error, UsbError};
 pub use identify::{Found, FoundState, Identity, UDEV_STEP, enumerate};
 pub use report::StreamReport;
+pub use tolerance::{Mismatch, Mismatches, Tolerance};
 pub use triggers::TriggerOut;

@@ -2,7 +2,8 @@
 
 use std::fmt;
 
-use skinrig_drd_abi::{DEVICE_OMEGA3, DeviceId, ErrorCode, SERIAL_UNKNOWN};
+pub use skinrig_drd_abi::SERIAL_UNKNOWN;
+use skinrig_drd_abi::{DEVICE_OMEGA3, DeviceId, ErrorCode};
 
 use crate::error::next_step;
 use crate::sdk::{Answer, CallError, Sdk};

@@ -18,7 +18,7 @@ use crate::sdk::{Answer, CallError, Quantity, Sdk};
 pub struct Opened {
     /// Its id in calls.
     pub id: DeviceId,
-    /// Its serial number as text; `unknown` for one that has none to tell.
+    /// Its serial number as text; 65535, as the library has it, for one that does not tell it.
     pub serial: String,
     /// Its model.
     pub model: String,
@@ -45,7 +45,8 @@ pub fn open(
     let (id, found) = find(sdk, config)?;
     let serial = found
         .serial
-        .map_or_else(|| "unknown".to_owned(), |serial| serial.to_string());
+        .unwrap_or(enumerate::SERIAL_UNKNOWN)
+        .to_string();
     let procedure = Procedure {
         sdk,
         id,

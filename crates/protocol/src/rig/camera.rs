@@ -77,6 +77,7 @@ fn camera(f: &Field, places: &Places<'_>, out: &mut Collector) -> Option<CameraS
     let read_back_exceptions = f
         .get("read_back_exceptions")
         .and_then(|list| addresses(list, out));
+    let read_status = f.get("read_status").and_then(|list| bytes(list, out));
     let roi = f.get("roi").map(|r| roi(r, out));
     let sync = match f.word("sync")? {
         "master" => SyncRole::Master,
@@ -159,6 +160,10 @@ fn camera(f: &Field, places: &Places<'_>, out: &mut Collector) -> Option<CameraS
         roi: roi.map_or(Some(None), |r| r.map(Some))?,
         noise_filter_ev_s: f.quantity("noise_filter").map(|r| r.round() as u32),
         read_back_exceptions: read_back_exceptions?,
+        read_status: read_status?,
+        failed_reset_is_accepted: f.word("failed_reset")? == "accepted",
+        failed_transfer_is_loss: f.word("failed_transfers")? == "loss",
+        tolerant: false,
         max_time_high_gap_us: f
             .quantity("max_time_high_gap")
             .map(|s| (s * 1e6).round() as u64),
@@ -168,6 +173,22 @@ fn camera(f: &Field, places: &Places<'_>, out: &mut Collector) -> Option<CameraS
         trigger_delay_us: delay_us.round() as u16,
         geometry,
     })
+}
+
+/// Bytes, hexadecimal.
+fn bytes(list: &Field, out: &mut Collector) -> Option<Vec<u8>> {
+    let words = addresses(list, out)?;
+    let mut bytes = Vec::new();
+    for (word, item) in words.into_iter().zip(list.items()) {
+        let Ok(byte) = u8::try_from(word) else {
+            out.error(item.span, item.path.as_str(), "not a byte")
+                .expected("`0x00` to `0xff`")
+                .found(format!("`{word:#x}`"));
+            return None;
+        };
+        bytes.push(byte);
+    }
+    Some(bytes)
 }
 
 /// Register addresses, hexadecimal.

@@ -217,6 +217,14 @@ pub struct CameraSetup {
     pub max_time_high_gap_us: Option<u64>,
     /// Whether a step of the camera's overflow counter is a loss; otherwise it is only noted.
     pub overflow_is_loss: bool,
+    /// Status bytes of register reads with which the value counts, besides 0x40.
+    pub read_status: Vec<u8>,
+    /// Whether a reset on the bus may fail.
+    pub failed_reset_is_accepted: bool,
+    /// Whether a transfer that fails is a loss; otherwise it ends the run.
+    pub failed_transfer_is_loss: bool,
+    /// Everything of the kind is let pass and told. No key of a rig file: the command line's `--tolerant`.
+    pub tolerant: bool,
     /// Threshold of the sensor's activity gate, events per second.
     pub noise_filter_ev_s: Option<u32>,
     /// Whose time base it follows.

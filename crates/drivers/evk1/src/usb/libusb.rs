@@ -92,6 +92,19 @@ impl Slot {
         )
     }
 
+    /// The port that it is plugged into, as `usb-BUS-PORT.PORT`, which stays the same when it is plugged in again; `None` where the system does
+    /// not tell it.
+    #[must_use]
+    pub fn port(&self) -> Option<String> {
+        let ports = self.device.port_numbers().ok().filter(|p| !p.is_empty())?;
+        let ports: Vec<String> = ports.iter().map(u8::to_string).collect();
+        Some(format!(
+            "usb-{}-{}",
+            self.device.bus_number(),
+            ports.join(".")
+        ))
+    }
+
     /// Its bus, and its address on it.
     #[must_use]
     pub fn address(&self) -> (u8, u8) {

@@ -34,6 +34,8 @@ use crate::requests::EVENT_ENDPOINT;
 
 /// Longest wait for cancelled transfers, and for the event thread.
 const STOP_LIMIT: Duration = Duration::from_secs(1);
+/// So many transfers may fail in a row before that ends the stream, where a failure is a loss.
+const FAILURES: u32 = 100;
 /// The event loop looks up at least this often.
 const LOOK_UP: Duration = Duration::from_millis(100);
 
@@ -41,6 +43,8 @@ const LOOK_UP: Duration = Duration::from_millis(100);
 struct Shared {
     inbox: Arc<Inbox>,
     clock: RealClock,
+    /// A transfer that fails is a loss, and goes on.
+    failures_are_losses: bool,
     flight: Mutex<Flight>,
     /// Told when a transfer is not submitted again, and when the event thread ends.
     landed: Condvar,
@@ -54,6 +58,8 @@ struct Flight {
     count: usize,
     /// Nothing is submitted any more.
     ending: bool,
+    /// Transfers that failed in a row and were submitted again.
+    failed: u32,
     stalled: bool,
     thread_ended: bool,
 }
@@ -162,6 +168,18 @@ extern "system" fn completed(transfer: *mut libusb_transfer) {
         ))),
     };
     let mut flight = shared.flight();
+    let outcome = match outcome {
+        Err(UsbError::Other(_)) if shared.failures_are_losses && flight.failed < FAILURES => {
+            flight.failed += 1;
+            shared.inbox.lose_some(arrived);
+            Ok(true)
+        }
+        Ok(again) => {
+            flight.failed = 0;
+            Ok(again)
+        }
+        ended => ended,
+    };
     let outcome = outcome.and_then(|again| match again && !flight.ending {
         true => submit(transfer),
         false => Ok(false),
@@ -219,6 +237,7 @@ impl Transfers {
         let shared = Arc::new(Shared {
             inbox,
             clock,
+            failures_are_losses: config.tolerance.failed_transfers || config.tolerance.everything,
             flight: Mutex::default(),
             landed: Condvar::new(),
             abandoned: AtomicBool::new(false),

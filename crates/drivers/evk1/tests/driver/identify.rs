@@ -36,7 +36,7 @@ expected the FPGA to be configured within 10 s, found it still booting: power th
 model: not an EVK1 Gen3.1: expected system ID 0x1c, found 0x11, the rescue image of the FPGA: the camera's flash needs the maker's update
 model: not an EVK1 Gen3.1: expected system ID 0x1c, found 0x1a, an EVK1 Gen4
 model: not an EVK1 Gen3.1: expected system ID 0x1c, found 0x31, a system that is not known
-reading ATIS_CONTROL (0x0000): expected status 0x40, found 0x12
+reading SERIAL_MSB (0x0020): expected status 0x40, found 0x12
 asking for the board version: the device is gone from the bus: check cable and power
 ");
 }

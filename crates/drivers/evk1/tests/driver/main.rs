@@ -7,3 +7,4 @@ mod identify;
 mod model;
 mod sequences;
 mod stream;
+mod tolerance;

@@ -37,6 +37,10 @@ pub struct Faults {
     pub stop_fails: bool,
     /// Status byte of register reads.
     pub read_status: Option<u8>,
+    /// Registers of the sensor are read with status 0 and as 0 while it is without power.
+    pub mute_without_power: bool,
+    /// Resets on the bus fail.
+    pub reset_fails: bool,
     /// Ends the stream, and every request from then on when the device is gone.
     pub error: Option<UsbError>,
 }
@@ -272,7 +276,14 @@ impl Transport for Bench {
                 .get(&address)
                 .expect("a register of the map");
             model.steps.push(Step::Read(address, word));
-            let status = model.faults.read_status.unwrap_or(requests::READ_OK);
+            let sensor = (0x0200..0x0740).contains(&address);
+            let mute = model.faults.mute_without_power && sensor && model.get(r::EN_VDDD) == 0;
+            let status = match model.faults.read_status {
+                Some(status) => status,
+                None if mute => 0,
+                None => requests::READ_OK,
+            };
+            let word = if mute { 0 } else { word };
             answer[..4].copy_from_slice(&[status, 0, 0, 0]);
             answer[4..].copy_from_slice(&word.to_be_bytes());
             return Ok(8);
@@ -327,6 +338,9 @@ impl Transport for Bench {
 
     fn reset(&mut self) -> Result<(), UsbError> {
         self.model().other("reset on the bus");
+        if self.model().faults.reset_fails {
+            return Err(UsbError::Other("no reset".to_owned()));
+        }
         self.model().check()
     }
 

@@ -497,3 +497,17 @@ fn a_loss_that_goes_on_after_it_was_told_counts_its_time_once() {
         .collect();
     assert_eq!(told, [(401, 10, 20), (3, 20, 30)]);
 }
+
+/// A transfer that failed: what came before is whole, something is told as lost, and what comes next begins a word.
+#[test]
+fn a_failed_transfer_is_a_loss_between_whole_words() {
+    let inbox = Inbox::new(400, 4000);
+    inbox.push(&[1, 0, 0, 0, 2, 0], HostTime(1));
+    inbox.lose_some(HostTime(2));
+    inbox.push(&[3, 0, 0, 0], HostTime(3));
+    let blocks = inbox.finish().blocks;
+    let bytes: Vec<&[u8]> = blocks.iter().map(|b| b.bytes.as_slice()).collect();
+    assert_eq!(bytes, [&[1, 0, 0, 0], &[3, 0, 0, 0]]);
+    // The torn word, and one for what nobody has counted.
+    assert_eq!(blocks[1].lost_before.map(|l| l.bytes), Some(6));
+}

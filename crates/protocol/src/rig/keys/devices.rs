@@ -13,8 +13,8 @@ pub(super) static ROBOT: Table = Table {
         default("model", Shape::Choice(ROBOTS), "omega3", "Which robot."),
         required(
             "serial",
-            count(0, 65_534),
-            "Its serial number, as `skinrig devices` shows it.",
+            count(0, 65_535),
+            "Its serial number, as `skinrig devices` shows it; 65535, which the library reports of a robot that does not tell it, takes the only robot that is connected.",
         ),
         optional(
             "firmware",
@@ -195,7 +195,7 @@ static CAMERA: Table = Table {
         required(
             "serial",
             Shape::Text,
-            "Its serial number, as `skinrig devices` shows it.",
+            "Its serial number, as `skinrig devices` shows it; for an EVK1 that does not tell it the port, as `usb-BUS-PORT.PORT`.",
         ),
         optional(
             "fpga",
@@ -247,6 +247,28 @@ static CAMERA: Table = Table {
             "Addresses of registers, such as `\"0x0204\"`, that a real camera was seen to read back differently: which do is not published.",
         ),
         default(
+            "read_status",
+            Shape::List {
+                of: &Shape::Text,
+                min: 0,
+                max: 100,
+            },
+            "[]",
+            "EVK1: status bytes of register reads, such as `\"0x00\"`, with which the value counts as well as with 0x40. `--tolerant` tells which your camera sends.",
+        ),
+        default(
+            "failed_reset",
+            Shape::Choice(ACCEPTANCE),
+            "refused",
+            "EVK1: what a reset on the bus that fails before a run is.",
+        ),
+        default(
+            "failed_transfers",
+            Shape::Choice(TRANSFERS),
+            "end",
+            "EVK1: what a transfer of the event stream that fails is. A stall and a device that is gone end the stream in any case.",
+        ),
+        default(
             "sync",
             Shape::Choice(SYNC_MODES),
             "standalone",
@@ -286,6 +308,19 @@ const MODELS: &[Word] = &[
     (
         "silky_vga",
         "CenturyArks SilkyEvCam VGA, as `evk3_hd`; no biases either",
+    ),
+];
+
+const ACCEPTANCE: &[Word] = &[
+    ("refused", "a camera that is not opened"),
+    ("accepted", "nothing to speak of"),
+];
+
+const TRANSFERS: &[Word] = &[
+    ("end", "the end of the run"),
+    (
+        "loss",
+        "lost data: a gap of the session, and the press is spoilt",
     ),
 ];
 
