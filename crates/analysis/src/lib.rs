@@ -22,6 +22,7 @@ pub mod cmre;
 mod counters;
 pub mod coverage;
 pub mod dbscan;
+pub mod distributions;
 mod error;
 pub mod estimators;
 mod exact;

@@ -169,23 +169,36 @@ fn evaluate(places: &[&Place]) -> Values {
     ]
 }
 
-/// The RMSE of all attempted presses of `set` where every press without an estimate that counts errs by
-/// `penalty_mm`; without one by the RMS distance of the attempted presses' true (or planned) positions from their
-/// mean, the error of an answer that knows nothing.
+/// The RMSE of all attempted presses of `set` with failures counted. A failed press - one without an estimate that counts
+/// - counts the penalty, or its own error where it has an estimate that errs by more.
+///
+/// The penalty is `stated_mm`; without one the RMS distance of the attempted presses' true (or planned) positions from
+/// their mean, the error of an answer that knows nothing. It is never below the RMSE of the presses that count, nor below
+/// that of all presses with an estimate: a press without an estimate is no better than those with one. So counting
+/// failures never lowers the RMSE, whatever is excluded.
 #[must_use]
-pub fn penalised(set: &ScoreSet, penalty_mm: Option<f64>, resamples: u32, seed: u64) -> Penalised {
+pub fn penalised(set: &ScoreSet, stated_mm: Option<f64>, resamples: u32, seed: u64) -> Penalised {
     let presses = set.presses();
-    let penalty = penalty_mm.unwrap_or_else(|| spread_mm(presses.iter().map(|p| p.at)));
-    let error = |p: &Scored| match p.found {
-        Some((_, [dx, dy])) if p.valid => libm::hypot(dx, dy),
-        _ => penalty,
+    let stated = stated_mm.unwrap_or_else(|| spread_mm(presses.iter().map(|p| p.at)));
+    let length = |p: &Scored| p.found.map(|(_, [dx, dy])| libm::hypot(dx, dy));
+    let rms = |of: &dyn Fn(&&Scored) -> bool| {
+        sums::root_mean_square(presses.iter().filter(of).filter_map(length)).unwrap_or(0.0)
+    };
+    let penalty = stated.max(rms(&|_| true)).max(rms(&|p| p.valid));
+    let error = |p: &Scored| match length(p) {
+        Some(own) if p.valid => own,
+        Some(own) => own.max(penalty),
+        None => penalty,
     };
     let errors: Vec<(u32, f64)> = presses.iter().map(|p| (p.location, error(p))).collect();
-    let failures = presses.iter().filter(|p| !p.valid || p.found.is_none());
+    let failures = || presses.iter().filter(|p| !p.valid || p.found.is_none());
+    let beyond = failures().filter(|p| length(p).is_some_and(|own| own > penalty));
     Penalised {
         penalty_mm: penalty,
-        derived: penalty_mm.is_none(),
-        failures: failures.count() as u32,
+        derived: stated_mm.is_none(),
+        raised: penalty > stated,
+        failures: failures().count() as u32,
+        beyond_penalty: beyond.count() as u32,
         rmse_mm: bootstrap_over_locations(&errors, resamples, seed, root_mean_square),
     }
 }

@@ -1,7 +1,7 @@
 //! Metrics against numbers worked out by hand, and the laws of their intervals.
 
 use proptest::prelude::*;
-use skinrig_analysis::metrics::{Exclusions, metrics};
+use skinrig_analysis::metrics::{Exclusions, metrics, penalised};
 use skinrig_analysis::result::{LocationOutcome, Metrics, PressResult};
 use skinrig_analysis::sets::ScoreSet;
 use skinrig_model::{LocationId, Point2, PressId, PressRole, RepetitionId, SkinOutline};
@@ -80,6 +80,32 @@ fn values_are_those_of_the_definitions() {
 }
 
 #[test]
+fn a_failure_counts_the_penalty_or_its_own_larger_error() {
+    let of =
+        |rows: &[PressResult], stated| penalised(&ScoreSet::from_presses(rows, &[]), stated, 0, 1);
+    let rows = [
+        row(0, Some((3.0, 4.0)), "valid"),
+        row(1, Some((0.0, 12.0)), "excluded"),
+        row(2, Some((0.0, 40.0)), "excluded"),
+        row(3, None, "invalid"),
+    ];
+    let p = of(&rows, Some(30.0));
+    assert_eq!((p.penalty_mm, p.raised, p.derived), (30.0, false, false));
+    assert_eq!((p.failures, p.beyond_penalty), (3, 1));
+    assert!(near(
+        p.rmse_mm.value,
+        ((25.0 + 900.0 + 1600.0 + 900.0) / 4.0f64).sqrt()
+    ));
+    // A penalty below what failures really are is raised to the RMSE of all estimates.
+    let p = of(&rows, Some(1.0));
+    let all = ((25.0 + 144.0 + 1600.0) / 3.0f64).sqrt();
+    assert!((p.penalty_mm - all).abs() < 1e-12 && p.raised);
+    // Locations 1 mm apart: an answer that knows nothing would be better than these.
+    assert!(of(&rows, None).raised && of(&rows, None).derived);
+    assert!(!of(&rows[..1], None).rmse_mm.value.is_none() && of(&[], None).rmse_mm.value.is_none());
+}
+
+#[test]
 fn too_few_presses_give_no_number_instead_of_a_false_one() {
     let m = measure(&[], Exclusions::Applied);
     assert_eq!(
@@ -147,6 +173,31 @@ fn the_interval_covers_as_often_as_it_says() {
 }
 
 proptest! {
+    /// Whatever becomes of the presses and whatever the settings say of failures.
+    #[test]
+    fn counting_failures_never_lowers_the_rmse(
+        presses in prop::collection::vec(
+            (0u32..12, prop::option::of((-150.0f64..150.0, -150.0f64..150.0)), 0usize..4, -6.0f64..4.0), 1..40),
+        stated in prop::option::of(1e-3f64..200.0),
+    ) {
+        let verdicts = ["valid", "excluded", "invalid", "missed"];
+        let rows: Vec<PressResult> = presses.iter()
+            .map(|(location, error, verdict, log)| {
+                let scale = 10f64.powf(*log);
+                row(*location, error.map(|(x, y)| (x * scale, y * scale)), verdicts[*verdict])
+            })
+            .collect();
+        let set = ScoreSet::from_presses(&rows, &[]);
+        let counted = penalised(&set, stated, 0, 1);
+        for exclusions in [Exclusions::Applied, Exclusions::Ignored] {
+            if let Some(rmse) = measure(&rows, exclusions).rmse_mm.value {
+                prop_assert!(counted.rmse_mm.value.unwrap() >= rmse * (1.0 - 1e-12), "{counted:?} {rmse}");
+                prop_assert!(counted.penalty_mm >= rmse * (1.0 - 1e-12));
+            }
+        }
+        prop_assert!(counted.failures >= counted.beyond_penalty);
+    }
+
     #[test]
     fn intervals_hold_their_value_and_repetitions_do_not_narrow_them(
         errors in prop::collection::vec((-20.0f64..20.0, -20.0f64..20.0), 4..30), copies in 2usize..5,

@@ -57,7 +57,8 @@ pub enum CalibrationModel {
     Full,
     /// The eight and a scale of the field of view per camera (10).
     FullScale,
-    /// The smallest of the models above whose cross-validated error is within one standard error of the best.
+    /// The smallest of the models above that no larger one beats at places left out of the fit, by more than noise
+    /// explains.
     #[default]
     Auto,
 }
@@ -319,7 +320,7 @@ pub struct AnalysisSettings {
     pub calibration: CalibrationModel,
     /// The lens that is calibrated.
     pub lens: LensKind,
-    /// The error that a failed press counts in the penalised RMSE, mm; `None`: the RMS distance of the scored
+    /// The least that a failed press counts in the RMSE with failures counted, mm; `None`: the RMS distance of the scored
     /// presses from their mean, the error of an answer that knows nothing.
     pub failure_penalty_mm: Option<f64>,
     /// A press is "within" when its error is at most this, mm.

@@ -170,6 +170,32 @@ pub fn disagreement(analysis: &Analysis) -> Option<String> {
     })
 }
 
+/// Says so when the presses were located with another camera geometry than the settings ask for: the nominal one, or that of
+/// a smaller model. `None` without presses.
+#[must_use]
+pub fn geometry_note(analysis: &Analysis) -> Option<String> {
+    use skinrig_model::CalibrationModel::{Auto, None as Nominal};
+    let asked = analysis.settings.calibration;
+    if analysis.presses.is_empty() {
+        return None;
+    }
+    match analysis.calibration.as_ref().map(|c| c.model) {
+        None if asked == Nominal => Some(
+            "Located with the nominal camera geometry, not calibrated, as the settings say"
+                .to_owned(),
+        ),
+        None => {
+            Some("Located with the nominal camera geometry: no calibration was possible".to_owned())
+        }
+        Some(used) if asked != Auto && used != asked => Some(format!(
+            "Calibrated with a smaller model ({}) than the settings say ({}): that one could not be fitted",
+            crate::figures::model_name(used),
+            crate::figures::model_name(asked)
+        )),
+        Some(_) => None,
+    }
+}
+
 /// The onsets that count: within the settings' window of the median onset, ascending, ms (the paper's true
 /// positives).
 #[must_use]

@@ -1,6 +1,8 @@
-//! Owns what a reader must know about the choice of the latency detector's threshold.
+//! Owns what a reader must know about the latency detector: the choice of its threshold, its false detections.
 
 use skinrig_analysis::result::Latency;
+
+use crate::format::number;
 
 /// One choice of a threshold h.
 struct Choice {
@@ -48,6 +50,21 @@ impl Choice {
         }));
         out
     }
+}
+
+/// Most false detections that are named.
+const NAMED: usize = 8;
+
+/// The presses whose detector tripped before the contact, and when; `None` when there are none.
+pub(crate) fn false_detections(l: &Latency) -> Option<String> {
+    let all = &l.false_detections;
+    let named = all.iter().take(NAMED);
+    let named = named.map(|(press, ms)| format!("{press} at {} ms", number(Some(*ms), 0)));
+    let mut list = named.collect::<Vec<_>>().join(", ");
+    if all.len() > NAMED {
+        list += &format!(" and {} more", all.len() - NAMED);
+    }
+    (!all.is_empty()).then_some(list)
 }
 
 /// Remarks on the thresholds chosen for all events and for thinned ones; none when both lie within what was tried and

@@ -6,19 +6,17 @@ use skinrig_model::{
     ThresholdRule,
 };
 
-use super::crossval::{Folds, mean_difference};
+use super::crossval::Folds;
+use super::paired::{Difference, Losses, Step, climb};
 use super::parameters::{MODELS, model_name, parameter_count};
-use super::{Fit, affordable, different_places, error_lengths, root_mean_square, threshold};
+use super::{Fit, affordable, different_places, error_lengths, threshold};
 use crate::input::SessionInput;
 use crate::metrics::{bootstrap_over_locations, root_mean_square as rms, spread_mm};
-use crate::result::{CalibrationResult, Estimate, ModelComparison, PressResult, ThresholdChoice};
+use crate::result::{
+    CalibrationResult, Estimate, ModelComparison, ModelTest, PressResult, ThresholdChoice,
+};
 use crate::sets::{CalibrationSet, Sight};
 use crate::verdict;
-
-/// Models whose cross-validated RMSE differs by less than this do equally well, mm: rounding, on noiseless data.
-const NO_DIFFERENCE_MM: f64 = 1e-6;
-/// A model that the protocol names is clearly worse when it loses by more than this many standard errors.
-const CLEARLY_WORSE: f64 = 2.0;
 
 /// What locates the presses of a session.
 pub struct Calibrated {
@@ -43,9 +41,12 @@ pub fn calibrated(
     let set = CalibrationSet::from_presses(presses);
     let mut chosen = choose(&set, nominal, settings);
     let threshold = match (settings.cluster_threshold, &chosen.errors_mm) {
-        (ThresholdRule::Calibrated, Some(errors)) => {
-            threshold::choose(set.sights(), errors, settings.min_cluster_events)
-        }
+        (ThresholdRule::Calibrated, Some(errors)) => threshold::choose(
+            set.sights(),
+            errors,
+            settings.min_cluster_events,
+            settings.seed,
+        ),
         _ => None,
     };
     if let Some(choice) = &threshold {
@@ -93,7 +94,9 @@ pub struct Chosen {
 }
 
 /// Fits the nested models to the set, compares them by leave-locations-out cross-validation and takes the one that
-/// `settings.calibration` names; of `Auto` the smallest within one standard error of the best.
+/// `settings.calibration` names; of `Auto` the smallest that no larger one beats by more than noise explains. When the fit
+/// of a model fails the next smaller one that was fitted takes its place, and a warning says so; the nominal geometry
+/// is used only when all fail.
 #[must_use]
 pub fn choose(
     set: &CalibrationSet,
@@ -146,9 +149,10 @@ impl Chosen {
             ));
         }
         let contenders = contenders(sights, &start, places, settings);
-        let choice = choice(sights, &contenders);
+        let locations = locations(sights);
+        let comparison = Comparison::of(&locations, &contenders);
         let index = match wanted {
-            CalibrationModel::Auto => choice.or_else(|| {
+            CalibrationModel::Auto => comparison.as_ref().map(|c| c.best).or_else(|| {
                 let best = contenders.iter().rposition(Contender::is_determined)?;
                 warnings.push(format!(
                     "too few calibrating places ({places}) to compare calibrations by cross-validation: `{}`, the \
@@ -157,7 +161,20 @@ impl Chosen {
                 ));
                 Some(best)
             }),
-            _ => contenders.iter().position(|c| c.model == largest),
+            _ => {
+                let named = contenders.iter().position(|c| c.model == largest);
+                let fitted = |i: &usize| contenders[*i].fit.is_some();
+                let used = named.and_then(|named| (0..=named).rev().find(fitted));
+                if let Some(used) = used.filter(|i| Some(*i) != named) {
+                    warnings.push(format!(
+                        "the fit of the calibration `{}` found no plausible geometry: `{}`, the largest smaller one that \
+                         fits, is used",
+                        model_name(largest),
+                        model_name(contenders[used].model)
+                    ));
+                }
+                used
+            }
         };
         let used = index.map(|i| &contenders[i]);
         let Some((used, fit)) = used.and_then(|c| Some((c, c.fit.as_ref()?))) else {
@@ -165,19 +182,27 @@ impl Chosen {
                 format!(
                     "{places} calibrating places are too few for any calibration: the nominal camera geometry is used"
                 )
+            } else if contenders.iter().any(|c| c.fit.is_some()) {
+                "the calibrating presses determine no calibration: the nominal camera geometry is used"
+                    .to_owned()
             } else {
-                "the calibration found no plausible geometry: the nominal one is used".to_owned()
+                "no calibration found a plausible geometry: the nominal camera geometry is used"
+                    .to_owned()
             });
             return Self::nominal(*nominal, warnings);
         };
-        if let Some(better) = choice.map(|i| &contenders[i]) {
-            warnings.extend(clearly_worse(sights, used, better));
+        if let Some(comparison) = comparison.as_ref().filter(|_| named) {
+            warnings.extend(comparison.clearly_worse(used, &contenders[comparison.best]));
         }
         let mut result = fit.result.clone();
         warnings.extend(concerns(&result, sights));
-        if choice.is_some() {
-            let row = |c: &Contender| c.row(sights, settings, c.model == used.model);
-            result.compared = contenders.iter().map(row).collect();
+        if let Some(comparison) = &comparison {
+            let rows = contenders.iter().enumerate().map(|(i, contender)| {
+                let test = comparison.test(i, &contenders);
+                contender.row(sights, settings, contender.model == used.model, test)
+            });
+            result.compared = rows.collect();
+            result.bound_mm = Some(comparison.losses.bound_mm());
         }
         Self {
             geometry: fit.geometry,
@@ -204,17 +229,13 @@ impl Contender {
             .is_some_and(|f| f.result.rank as usize == parameter_count(self.model))
     }
 
-    /// Standard error of the cross-validated RMSE over locations, mm.
-    fn standard_error_mm(&self, sights: &[Sight]) -> Option<f64> {
-        let errors = self.errors_mm.as_deref()?;
-        let rmse = root_mean_square(errors);
-        let none = vec![0.0; errors.len()];
-        let (_, error) = mean_difference(&locations(sights), &squares(errors), &none);
-        // The error of a root is that of the square over twice the root.
-        error.map(|e| if rmse > 0.0 { e / (2.0 * rmse) } else { 0.0 })
-    }
-
-    fn row(&self, sights: &[Sight], settings: &AnalysisSettings, chosen: bool) -> ModelComparison {
+    fn row(
+        &self,
+        sights: &[Sight],
+        settings: &AnalysisSettings,
+        chosen: bool,
+        test: (Option<f64>, Option<ModelTest>),
+    ) -> ModelComparison {
         let errors = self.errors_mm.as_deref();
         let values: Vec<(u32, f64)> = errors.map_or_else(Vec::new, |errors| {
             let pairs = sights.iter().zip(errors);
@@ -226,7 +247,8 @@ impl Contender {
             model: self.model,
             parameters: parameter_count(self.model) as u32,
             rmse_mm,
-            standard_error_mm: self.standard_error_mm(sights),
+            bounded_rmse_mm: test.0,
+            test: test.1,
             fitted_rmse_mm: self.fit.as_ref().map(|f| f.result.rmse_after_mm),
             chosen,
         }
@@ -267,45 +289,59 @@ fn contenders(
         .collect()
 }
 
-/// The smallest model whose cross-validated RMSE is within one standard error of the best one's: the
-/// one-standard-error rule (Breiman, Friedman, Olshen and Stone 1984, section 3.4.3). The standard error is that of the
-/// best model's own RMSE over locations, so that the rule can be checked on the table of the report.
-fn choice(sights: &[Sight], contenders: &[Contender]) -> Option<usize> {
-    let compared: Vec<(usize, f64)> = contenders
-        .iter()
-        .enumerate()
-        .filter_map(|(i, c)| Some((i, root_mean_square(c.errors_mm.as_deref()?))))
-        .collect();
-    let (best, least) = *compared.iter().min_by(|a, b| a.1.total_cmp(&b.1))?;
-    let error = contenders[best].standard_error_mm(sights).unwrap_or(0.0);
-    let limit = least + error.max(NO_DIFFERENCE_MM);
-    compared
-        .iter()
-        .find(|(_, rmse)| *rmse <= limit)
-        .map(|(i, _)| *i)
+/// The contenders that could be validated, compared.
+struct Comparison<'a> {
+    losses: Losses<'a>,
+    /// The smallest that no larger one beats.
+    best: usize,
+    steps: Vec<Option<Step>>,
 }
 
-/// By how many standard errors of the paired difference `a` is worse than `b`; `None` when there is no difference.
-fn loses(sights: &[Sight], a: &Contender, b: &Contender) -> Option<f64> {
-    let (one, two) = (a.errors_mm.as_deref()?, b.errors_mm.as_deref()?);
-    if root_mean_square(one) - root_mean_square(two) <= NO_DIFFERENCE_MM {
-        return None;
+impl<'a> Comparison<'a> {
+    /// `None` when no model could be validated.
+    fn of(locations: &'a [u32], contenders: &[Contender]) -> Option<Self> {
+        let errors: Vec<Option<&[f64]>> =
+            contenders.iter().map(|c| c.errors_mm.as_deref()).collect();
+        let losses = Losses::new(locations, errors.iter().flatten().copied());
+        let (best, steps) = climb(&losses, &errors)?;
+        Some(Self {
+            losses,
+            best,
+            steps,
+        })
     }
-    let (mean, error) = mean_difference(&locations(sights), &squares(one), &squares(two));
-    error.map(|e| if e > 0.0 { mean / e } else { f64::INFINITY })
-}
 
-fn clearly_worse(sights: &[Sight], used: &Contender, better: &Contender) -> Option<String> {
-    let sigmas = loses(sights, used, better).filter(|s| *s > CLEARLY_WORSE)?;
-    let rmse = |c: &Contender| c.errors_mm.as_deref().map_or(f64::NAN, root_mean_square);
-    Some(format!(
-        "the calibration `{}` named by the protocol is clearly worse than `{}`: cross-validated RMSE {:.2} mm against \
-         {:.2} mm, {sigmas:.0} standard errors apart",
-        model_name(used.model),
-        model_name(better.model),
-        rmse(used),
-        rmse(better)
-    ))
+    /// Bounded error of a contender, and how it did against the one in hand.
+    fn test(&self, i: usize, contenders: &[Contender]) -> (Option<f64>, Option<ModelTest>) {
+        let bounded = contenders[i].errors_mm.as_deref();
+        let test = self.steps[i].map(|step| ModelTest {
+            against: contenders[step.against].model,
+            gain_mm: step.difference.mm,
+            standard_error_mm: step.difference.standard_error_mm,
+            ratio: step.difference.ratio(),
+            needed: step.difference.needed,
+        });
+        (bounded.map(|e| self.losses.rms_mm(e)), test)
+    }
+
+    /// Says so when the model that is used errs more than `better` by more than noise explains.
+    fn clearly_worse(&self, used: &Contender, better: &Contender) -> Option<String> {
+        let (a, b) = (used.errors_mm.as_deref()?, better.errors_mm.as_deref()?);
+        let found: Difference = self.losses.clearly_worse(a, b)?;
+        found.is_significant().then(|| {
+            format!(
+                "the calibration `{}` is clearly worse than `{}`: {:.2} mm against {:.2} mm at locations left out (errors \
+                 bounded at {:.1} mm), a paired difference of {:.2} ± {:.2} mm (standard error)",
+                model_name(used.model),
+                model_name(better.model),
+                self.losses.rms_mm(a),
+                self.losses.rms_mm(b),
+                self.losses.bound_mm(),
+                found.mm,
+                found.standard_error_mm
+            )
+        })
+    }
 }
 
 /// What a reader must know about a calibration.
@@ -355,8 +391,4 @@ fn locations_of(sights: &[Sight]) -> usize {
     all.sort_unstable();
     all.dedup();
     all.len()
-}
-
-fn squares(errors: &[f64]) -> Vec<f64> {
-    errors.iter().map(|e| e * e).collect()
 }

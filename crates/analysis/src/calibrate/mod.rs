@@ -7,11 +7,12 @@
 //! ten robust standard deviations of the best solution's errors, so that the last fit is ordinary least squares
 //! for all but outliers. Each start first goes downhill on a smooth stand-in for the error (`problem`).
 //!
-//! [`calibrate`] fits one model; `choose` fits the nested ones, compares them by `crossval` and takes the
-//! smallest that does; `threshold` finds how many cluster events a press needs to be worth its place.
+//! [`calibrate`] fits one model; `choose` fits the nested ones, and `paired` takes the smallest whose errors at places left
+//! out (`crossval`) no larger one lowers; `threshold` finds how many cluster events a press needs to be worth its place.
 
 mod choose;
 mod crossval;
+mod paired;
 mod parameters;
 mod problem;
 mod solver;
@@ -186,6 +187,7 @@ impl Fit {
             starts_agreeing: 0,
             termination: end.termination.to_owned(),
             compared: Vec::new(),
+            bound_mm: None,
         };
         Self {
             geometry,

@@ -65,23 +65,4 @@ impl Cusum {
         }
         found
     }
-
-    /// Alarms at one threshold. After each the detector starts anew: at 0, when `cool_down` bins have passed.
-    #[must_use]
-    pub fn alarms(&self, smoothed: &[f64], threshold: f64, cool_down: usize) -> u32 {
-        let (mut alarms, mut sum, mut run) = (0, 0.0, 0);
-        let mut bins = smoothed.iter();
-        while let Some(x) = bins.next() {
-            sum = self.step(sum, *x);
-            run = if sum >= threshold { run + 1 } else { 0 };
-            if run == self.consecutive {
-                alarms += 1;
-                (sum, run) = (0.0, 0);
-                if cool_down > 0 && bins.nth(cool_down - 1).is_none() {
-                    break;
-                }
-            }
-        }
-        alarms
-    }
 }

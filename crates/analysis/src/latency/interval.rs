@@ -1,5 +1,5 @@
-//! Estimates of a detector at one threshold, with bootstrap intervals over locations (exact ones where nothing, or
-//! everything, was detected).
+//! Estimates of a detector at one threshold, with bootstrap intervals over locations; exact ones for false alarms, and where
+//! nothing, or everything, was detected.
 
 use rayon::prelude::*;
 
@@ -12,24 +12,22 @@ use crate::seeded;
 /// Share of a 95 % interval that lies outside on each side.
 const TAIL: f64 = 0.025;
 /// Quantities with an interval, in the order of [`Figures`].
-const COUNT: usize = 7;
-/// (value, n) of each: detected share, width, median, false alarms per second, 5th percentile, median and 95th percentile
-/// after contact.
+const COUNT: usize = 6;
+/// (value, n) of each: detected share, width, median, 5th percentile, median and 95th percentile after contact.
 type Figures = [(Option<f64>, u32); COUNT];
 const DETECTED: usize = 0;
-const FALSE_ALARMS: usize = 3;
 
 /// One trial at one threshold.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Outcome {
     /// Its location.
     pub location: u32,
-    /// Onset after the contact, ms.
+    /// Onset of the touch after the contact, ms; `None` when it was not detected, or a false alarm came first.
     pub onset_ms: Option<f64>,
-    /// False alarms in its background.
-    pub alarms: u32,
-    /// Length of the background, s.
-    pub background_s: f64,
+    /// A false alarm ended the search.
+    pub false_alarm: bool,
+    /// Time in which a trip is a false alarm, s.
+    pub at_risk_s: f64,
 }
 
 /// What is estimated.
@@ -42,9 +40,9 @@ pub struct Estimates {
     pub width_ms: Estimate,
     /// Median of all onsets, ms; n: those.
     pub median_ms: Estimate,
-    /// False alarms per second; n: backgrounds. Without any the interval is the exact Poisson one over all background.
+    /// False alarms over the time at risk, per second; n: trials. The interval is the exact Poisson one.
     pub false_alarms_per_s: Estimate,
-    /// 5th, 50th and 95th percentile of the onsets not before the contact, ms; n: those.
+    /// 5th, 50th and 95th percentile of the onsets, ms; n: those.
     pub from_contact_ms: [Estimate; 3],
 }
 
@@ -53,8 +51,6 @@ pub struct Estimates {
 pub struct Plan {
     /// An onset counts within this of the median, ms.
     pub window_ms: f64,
-    /// An onset earlier than this is before the contact, ms.
-    pub earliest_ms: f64,
     /// Resamples of the bootstrap.
     pub resamples: u32,
     /// Its seed.
@@ -88,7 +84,6 @@ impl Plan {
             let bootstrap = end(TAIL).zip(end(1.0 - TAIL));
             let ends = value.zip(bootstrap).map(|(value, ends)| match k {
                 DETECTED => exact::share(value, places.len(), ends),
-                FALSE_ALARMS => exact::rate_per_s(value, background_s(outcomes), ends),
                 _ => ends,
             });
             Estimate {
@@ -102,8 +97,8 @@ impl Plan {
             detected_rate: estimate(DETECTED),
             width_ms: estimate(1),
             median_ms: estimate(2),
-            false_alarms_per_s: estimate(FALSE_ALARMS),
-            from_contact_ms: [estimate(4), estimate(5), estimate(6)],
+            false_alarms_per_s: false_alarms_per_s(outcomes),
+            from_contact_ms: [estimate(3), estimate(4), estimate(5)],
         }
     }
 
@@ -112,10 +107,7 @@ impl Plan {
         let trials = all().count() as u32;
         let onsets: Vec<f64> = all().filter_map(|o| o.onset_ms).collect();
         let mut late: Vec<f64> = onsets.clone();
-        late.retain(|t| *t >= self.earliest_ms);
         let hits = Hits::of(onsets, self.window_ms);
-        let alarms: u64 = all().map(|o| u64::from(o.alarms)).sum();
-        let background_s = background_s(all());
         let share = (trials > 0).then(|| f64::from(hits.count) / f64::from(trials));
         let n = late.len() as u32;
         let mut after = |q| (quantile(&mut late, q), n);
@@ -123,10 +115,6 @@ impl Plan {
             (share, trials),
             (hits.width_ms, hits.count),
             (hits.median_ms, hits.onsets),
-            (
-                (background_s > 0.0).then(|| alarms as f64 / background_s),
-                trials,
-            ),
             after(0.05),
             after(0.5),
             after(0.95),
@@ -134,6 +122,16 @@ impl Plan {
     }
 }
 
-fn background_s<'a>(outcomes: impl IntoIterator<Item = &'a Outcome>) -> f64 {
-    outcomes.into_iter().map(|o| o.background_s).sum()
+/// Of no time at risk there is no rate, neither 0 nor any other.
+fn false_alarms_per_s(outcomes: &[Outcome]) -> Estimate {
+    let count = outcomes.iter().filter(|o| o.false_alarm).count();
+    let at_risk_s: f64 = outcomes.iter().map(|o| o.at_risk_s).sum();
+    let known = at_risk_s > 0.0;
+    let ends = known.then(|| exact::rate_per_s(count as u64, at_risk_s));
+    Estimate {
+        value: known.then(|| count as f64 / at_risk_s),
+        low: ends.map(|e| e.0),
+        high: ends.map(|e| e.1),
+        n: outcomes.len() as u32,
+    }
 }

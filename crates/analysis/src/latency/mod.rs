@@ -2,9 +2,11 @@
 //!
 //! The method is the paper's ("Data Ablation and Latency Distribution Analysis"): the events of both cameras, binned
 //! and smoothed, a one-sided CUSUM tuned to a rate increase over the background, an onset where it stays above a
-//! threshold for some bins, the threshold chosen by detections against false alarms. Three things differ. Both cameras
-//! are placed on host time by their own clock fits. Rates are events over the length of a window, with a floor. And
-//! where the contact was measured, onsets are also reported as latencies from it, with their uncertainty.
+//! threshold for some bins, the threshold chosen by detections against false alarms. Four things differ. Both cameras
+//! are placed on host time by their own clock fits. Rates are events over the length of a window, with a floor. Where the
+//! contact was measured, onsets are also reported as latencies from it, with their uncertainty. And the first trip ends
+//! the search, as it would online: one before the contact is a false alarm, counted over the time in which there could be
+//! one, and its press is not detected.
 //!
 //! [`spans`] says which time is trial and which background, [`bins`] counts, [`smooth`] smooths, [`cusum`] detects,
 //! [`sweep`] chooses the threshold, [`interval`] estimates, [`course`] is for drawing.
@@ -62,20 +64,22 @@ pub fn study(analysis: &Analysis, kept: &Kept) -> Option<Latency> {
         Background::Before => Edges::Renormalised,
         Background::After => Edges::ZeroPadded,
     };
+    let margin_ms = margin_ms(analysis, &clocks);
     let grid = sweep::thresholds(settings.threshold_range, settings.thresholds);
-    let detector = Detector::new(settings, edges, grid);
+    let detector = Detector::new(settings, edges, grid, margin_ms);
     let trials = look(&usable, &detector, None);
     let found = Found::new(analysis, &detector, settings.target_rate, &trials);
 
     let asked = settings.reduced;
     let (first, last) = asked.threshold_range;
     let few = sweep::thresholds(asked.threshold_range, asked.thresholds);
-    let few = Detector::new(settings, edges, few);
+    let few = Detector::new(settings, edges, few, margin_ms);
     let thinning = Some((asked.factor, analysis.settings.seed));
     let thinned = look(&usable, &few, thinning);
     let reduced = Found::new(analysis, &few, asked.target_rate, &thinned);
 
-    let onset = |t: &Trial| found.chosen.and_then(|i| t.onsets_ms[i]);
+    let onset = |t: &Trial| found.chosen.and_then(|i| t.searches[i].onset_ms());
+    let early = |t: &Trial| Some((t.label.press, t.searches[found.chosen?].false_alarm_ms()?));
     let mut rates: Vec<f64> = trials.iter().map(|t| t.background_per_s).collect();
     let covered = |f: fn(&Spans) -> f64| {
         usable
@@ -96,13 +100,16 @@ pub fn study(analysis: &Analysis, kept: &Kept) -> Option<Latency> {
         },
         zero_padded: edges == Edges::ZeroPadded,
         decision_delay_ms: decision_delay_ms(&detector),
+        earliest_ms: detector.earliest_ms,
         background_s: trials.iter().map(|t| t.background_s).sum(),
+        at_risk_s: found.outcomes.iter().map(|o| o.at_risk_s).sum(),
         background_rate_per_s: quantile(&mut rates, 0.5).unwrap_or(0.0),
         detected_rate: found.estimates.detected_rate,
         width_ms: found.estimates.width_ms,
         median_ms: found.estimates.median_ms,
         false_alarms_per_s: found.estimates.false_alarms_per_s,
-        from_contact: from_contact(analysis, &clocks, &detector, &trials, &found),
+        false_detections: trials.iter().filter_map(early).collect(),
+        from_contact: from_contact(analysis, &clocks, &trials, &found),
         reduced: Some(ReducedLatency {
             factor: asked.factor,
             thresholds: (first, last, asked.thresholds),
@@ -167,12 +174,12 @@ fn look(usable: &[Usable<'_>], detector: &Detector, thinning: Option<(u32, u64)>
     found.into_iter().flatten().collect()
 }
 
-/// False alarms before each trial; nothing without a threshold.
+/// False alarms before each contact; nothing without a threshold.
 fn backgrounds(trials: &[Trial], found: &Found) -> Vec<TrialBackground> {
     let of = |(t, o): (&Trial, &Outcome)| TrialBackground {
         press: t.label.press,
-        alarms: o.alarms,
-        length_s: o.background_s,
+        alarms: u32::from(o.false_alarm),
+        length_s: o.at_risk_s,
     };
     let chosen = found
         .chosen
@@ -192,25 +199,20 @@ impl Found {
     fn new(analysis: &Analysis, detector: &Detector, target_rate: f64, trials: &[Trial]) -> Self {
         let settings = &analysis.settings;
         let rows = sweep::sweep(trials, detector, settings.latency.window_ms);
-        // As far from the contact as an onset may be from the median, so that a schedule may be a little off.
-        let earliest_ms = -settings.latency.window_ms;
-        let chosen = sweep::choose(&rows, target_rate, earliest_ms);
-        let cool_down = chosen.map_or(0, |i| sweep::cool_down(rows[i].width_ms, detector.bin_ms));
-        let outcome = |t: &Trial| Outcome {
-            location: t.label.location,
-            onset_ms: chosen.and_then(|i| t.onsets_ms[i]),
-            alarms: chosen.map_or(0, |i| t.alarms(i, detector.thresholds[i], cool_down)),
-            // Without a threshold there is no false-alarm rate, neither 0 nor any other.
-            background_s: if chosen.is_some() {
-                t.background_s
-            } else {
-                0.0
-            },
+        let chosen = sweep::choose(&rows, target_rate);
+        let outcome = |t: &Trial| {
+            let search = chosen.map(|i| t.searches[i]);
+            Outcome {
+                location: t.label.location,
+                onset_ms: search.and_then(|s| s.onset_ms()),
+                false_alarm: search.is_some_and(|s| s.false_alarm_ms().is_some()),
+                // Without a threshold there is no false-alarm rate, neither 0 nor any other.
+                at_risk_s: search.map_or(0.0, |s| s.at_risk_s),
+            }
         };
-        let outcomes: Vec<Outcome> = trials.par_iter().map(outcome).collect();
+        let outcomes: Vec<Outcome> = trials.iter().map(outcome).collect();
         let plan = Plan {
             window_ms: settings.latency.window_ms,
-            earliest_ms: -reach_ms(detector),
             resamples: settings.bootstrap_resamples,
             seed: settings.seed,
         };
@@ -255,42 +257,69 @@ fn uniform(width: f64) -> f64 {
     width / 12f64.sqrt()
 }
 
+/// Standard uncertainty of a latency, ms, by where it comes from.
+struct Uncertainty {
+    bins_ms: f64,
+    clocks_ms: f64,
+    contact_ms: f64,
+}
+
+impl Uncertainty {
+    /// `None` when the contacts were not measured on a clock of their own: they come from a schedule, or a camera's clock
+    /// from the events themselves.
+    fn of(analysis: &Analysis, clocks: &[ClockFit; 2]) -> Option<Self> {
+        let timing = &analysis.contact_timing;
+        if timing.scheduled || clocks.iter().any(|c| c.method == ClockMethod::EventRates) {
+            return None;
+        }
+        let stamped = analysis.alignment.interval_us(MapName::RobotFromHost);
+        let pose_us = libm::hypot(
+            uniform(timing.pose_interval_us),
+            uniform(stamped.unwrap_or(0.0)),
+        );
+        Some(Self {
+            bins_ms: uniform(analysis.settings.latency.bin_ms),
+            clocks_ms: from_clocks_ms(analysis, clocks),
+            contact_ms: 1e-3 * libm::hypot(pose_us, timing.crossing_se_us),
+        })
+    }
+
+    fn total_ms(&self) -> f64 {
+        libm::hypot(libm::hypot(self.bins_ms, self.clocks_ms), self.contact_ms)
+    }
+}
+
+/// How much earlier than its contact a touch may seem to begin, ms: the 95 % uncertainty of a measured contact. One that
+/// was not measured may be a little off: as far as an onset may be from the median.
+fn margin_ms(analysis: &Analysis, clocks: &[ClockFit; 2]) -> f64 {
+    Uncertainty::of(analysis, clocks)
+        .map_or(analysis.settings.latency.window_ms, |u| 1.96 * u.total_ms())
+}
+
 /// Latencies from the measured contact. The trigger box ties host time, on which the contact was measured, to each
 /// camera's clock.
 fn from_contact(
     analysis: &Analysis,
     clocks: &[ClockFit; 2],
-    detector: &Detector,
     trials: &[Trial],
     found: &Found,
 ) -> Option<ContactLatency> {
-    let timing = &analysis.contact_timing;
-    if timing.scheduled || clocks.iter().any(|c| c.method == ClockMethod::EventRates) {
-        return None;
-    }
-    let onset = |t: &Trial| found.chosen.and_then(|i| t.onsets_ms[i]);
-    let onsets = || trials.iter().map(onset);
-    let from_bins_ms = uniform(detector.bin_ms);
-    let from_clocks_ms = from_clocks_ms(analysis, clocks);
-    let stamped = analysis.alignment.interval_us(MapName::RobotFromHost);
-    let pose_us = libm::hypot(
-        uniform(timing.pose_interval_us),
-        uniform(stamped.unwrap_or(0.0)),
-    );
-    let from_contact_ms = 1e-3 * libm::hypot(pose_us, timing.crossing_se_us);
+    let uncertainty = Uncertainty::of(analysis, clocks)?;
+    let searches = || {
+        trials
+            .iter()
+            .filter_map(|t| Some(t.searches[found.chosen?]))
+    };
     let [p5_ms, median_ms, p95_ms] = found.estimates.from_contact_ms;
     Some(ContactLatency {
         p5_ms,
         median_ms,
         p95_ms,
-        before_contact: onsets()
-            .flatten()
-            .filter(|t| *t < -reach_ms(detector))
-            .count() as u32,
-        missed: onsets().filter(Option::is_none).count() as u32,
-        uncertainty_ms: libm::hypot(libm::hypot(from_bins_ms, from_clocks_ms), from_contact_ms),
-        from_bins_ms,
-        from_clocks_ms,
-        from_contact_ms,
+        before_contact: searches().filter(|s| s.false_alarm_ms().is_some()).count() as u32,
+        missed: trials.len() as u32 - searches().filter(|s| s.trip.is_some()).count() as u32,
+        uncertainty_ms: uncertainty.total_ms(),
+        from_bins_ms: uncertainty.bins_ms,
+        from_clocks_ms: uncertainty.clocks_ms,
+        from_contact_ms: uncertainty.contact_ms,
     })
 }

@@ -17,7 +17,7 @@ pub fn thresholds((first, last): (f64, f64), count: u32) -> Vec<f64> {
 /// Onsets about their median.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hits {
-    /// Onsets at all.
+    /// Onsets at all, none of them before the contact.
     pub onsets: u32,
     /// Their median, ms.
     pub median_ms: Option<f64>,
@@ -48,10 +48,12 @@ impl Hits {
     }
 }
 
-/// Bins of a cool-down of one width; none without a width.
+/// False alarms of all trials at the threshold with this index, and the time at risk, s.
 #[must_use]
-pub fn cool_down(width_ms: Option<f64>, bin_ms: f64) -> usize {
-    width_ms.map_or(0, |w| (w / bin_ms).round() as usize)
+pub fn false_alarms(trials: &[Trial], index: usize) -> (u32, f64) {
+    let searches = || trials.iter().map(|t| t.searches[index]);
+    let alarms = searches().filter(|s| s.false_alarm_ms().is_some()).count();
+    (alarms as u32, searches().map(|s| s.at_risk_s).sum())
 }
 
 /// One row per threshold of `detector`; none without trials.
@@ -60,39 +62,39 @@ pub fn sweep(trials: &[Trial], detector: &Detector, window_ms: f64) -> Vec<Thres
     if trials.is_empty() {
         return Vec::new();
     }
-    let background_s: f64 = trials.iter().map(|t| t.background_s).sum();
     let rows = detector.thresholds.par_iter().enumerate();
     rows.map(|(i, &threshold)| {
-        let onsets = trials.iter().filter_map(|t| t.onsets_ms[i]).collect();
-        let hits = Hits::of(onsets, window_ms);
-        let cool_down = cool_down(hits.width_ms, detector.bin_ms);
-        let alarms: u64 = trials
-            .iter()
-            .map(|t| u64::from(t.alarms(i, threshold, cool_down)))
-            .sum();
+        let onsets = trials.iter().filter_map(|t| t.searches[i].onset_ms());
+        let hits = Hits::of(onsets.collect(), window_ms);
+        let (false_alarms, at_risk_s) = false_alarms(trials, i);
         ThresholdRow {
             threshold,
             onsets: hits.onsets,
             detected_rate: f64::from(hits.count) / trials.len() as f64,
             median_ms: hits.median_ms,
             width_ms: hits.width_ms,
-            false_alarms_per_s: alarms as f64 / background_s,
+            false_alarms,
+            at_risk_s,
+            // Without time at risk nothing can be an alarm.
+            false_alarms_per_s: if at_risk_s > 0.0 {
+                f64::from(false_alarms) / at_risk_s
+            } else {
+                0.0
+            },
         }
     })
     .collect()
 }
 
-/// The row with the fewest false alarms among those that detect at least `target_rate`; when none does, among those
-/// that detect most. The lowest threshold of equals; `None` when nothing counts at any.
-///
-/// A row whose median onset is earlier than `earliest_ms` cannot be chosen: at a low threshold every trial trips over
-/// its background soon after its start, and those onsets agree well with their own median.
+/// The row with the fewest false alarms per second among those that detect at least `target_rate`; when none does, among
+/// those that detect most. The lowest threshold of equals; `None` when nothing is detected at any.
 #[must_use]
-pub fn choose(rows: &[ThresholdRow], target_rate: f64, earliest_ms: f64) -> Option<usize> {
-    let touches = |r: &ThresholdRow| {
-        r.detected_rate > 0.0 && r.median_ms.is_some_and(|median| median >= earliest_ms)
+pub fn choose(rows: &[ThresholdRow], target_rate: f64) -> Option<usize> {
+    let candidates = || {
+        rows.iter()
+            .enumerate()
+            .filter(|(_, r)| r.detected_rate > 0.0)
     };
-    let candidates = || rows.iter().enumerate().filter(|(_, r)| touches(r));
     let best = candidates().map(|(_, r)| r.detected_rate);
     let wanted = target_rate.min(best.fold(0.0, f64::max));
     candidates()

@@ -25,15 +25,25 @@ pub struct Detector {
     pub consecutive: u32,
     /// Thresholds, ascending.
     pub thresholds: Vec<f64>,
+    /// An onset earlier than this after the contact (a negative time) is no detection of the touch, ms.
+    pub earliest_ms: f64,
 }
 
 impl Detector {
-    /// With these thresholds, ascending.
+    /// With these thresholds, ascending, for contacts known to `margin_ms`. A smoothed count can rise half a kernel before
+    /// its event: only what is earlier than both together is before the contact.
     #[must_use]
-    pub fn new(settings: &LatencySettings, edges: Edges, thresholds: Vec<f64>) -> Self {
+    pub fn new(
+        settings: &LatencySettings,
+        edges: Edges,
+        thresholds: Vec<f64>,
+        margin_ms: f64,
+    ) -> Self {
+        let kernel = Kernel::gaussian(settings.sigma_ms, settings.bin_ms);
         Self {
             bin_ms: settings.bin_ms,
-            kernel: Kernel::gaussian(settings.sigma_ms, settings.bin_ms),
+            earliest_ms: -(margin_ms + kernel.reach() as f64 * settings.bin_ms),
+            kernel,
             edges,
             alpha: settings.alpha,
             consecutive: settings.consecutive,
@@ -52,16 +62,26 @@ impl Detector {
         let smoothed = self.kernel.smooth(counts, self.edges);
         let background = self.kernel.smooth(background, self.edges);
         let onset_ms = |bin: usize| grid.centre_ms(bin, self.bin_ms);
-        let onsets = cusum.onsets(&smoothed, &self.thresholds).into_iter();
+        let early = (0..grid.len).take_while(|bin| onset_ms(*bin) < self.earliest_ms);
+        let early = early.count();
+        let search = |trip: Option<usize>| match trip {
+            Some(bin) if bin < early => Search {
+                trip: Some(Trip::BeforeContact(onset_ms(bin))),
+                at_risk_s: (bin + 1) as f64 * bin_s,
+            },
+            _ => Search {
+                trip: trip.map(|bin| Trip::Touch(onset_ms(bin))),
+                at_risk_s: early as f64 * bin_s,
+            },
+        };
+        let trips = cusum.onsets(&smoothed, &self.thresholds).into_iter();
         Trial {
             label,
-            onsets_ms: onsets.map(|bin| bin.map(onset_ms)).collect(),
-            alarmed: cusum.onsets(&background, &self.thresholds),
+            searches: trips.map(search).collect(),
             background_s,
             background_per_s: events as f64 / background_s,
             course: Drawn::new(grid, &smoothed, self.bin_ms),
             background,
-            cusum,
         }
     }
 
@@ -111,33 +131,58 @@ pub struct Label {
     pub location: u32,
 }
 
+/// The first trip of a detector: it ends the search, as it would online.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Trip {
+    /// Before the contact, ms after it (negative): a false alarm. The press that follows is not detected.
+    BeforeContact(f64),
+    /// Not before the contact, ms after it.
+    Touch(f64),
+}
+
+/// What a detector did at one threshold.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Search {
+    /// `None` when it never tripped.
+    pub trip: Option<Trip>,
+    /// How long it looked where a trip is a false alarm, s: from the start of the trial to the contact, or to the end of the
+    /// bin of the false alarm.
+    pub at_risk_s: f64,
+}
+
+impl Search {
+    /// The onset of a detected touch, ms after the contact.
+    #[must_use]
+    pub const fn onset_ms(&self) -> Option<f64> {
+        match self.trip {
+            Some(Trip::Touch(ms)) => Some(ms),
+            _ => None,
+        }
+    }
+
+    /// The onset of a false alarm, ms after the contact (negative).
+    #[must_use]
+    pub const fn false_alarm_ms(&self) -> Option<f64> {
+        match self.trip {
+            Some(Trip::BeforeContact(ms)) => Some(ms),
+            _ => None,
+        }
+    }
+}
+
 /// What a detector found in a trial.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trial {
     /// Which press.
     pub label: Label,
-    /// Onset at each threshold, ms after the contact.
-    pub onsets_ms: Vec<Option<f64>>,
-    /// First bin of the first false alarm at each threshold.
-    pub alarmed: Vec<Option<usize>>,
+    /// One per threshold.
+    pub searches: Vec<Search>,
     /// Length of the background, s.
     pub background_s: f64,
     /// Its events per second.
     pub background_per_s: f64,
     /// Smoothed rate of the trial, for drawing.
     pub course: Drawn,
-    /// Smoothed counts of the background.
+    /// Smoothed counts of the background, for drawing.
     pub background: Vec<f64>,
-    cusum: Cusum,
-}
-
-impl Trial {
-    /// False alarms in the background at the threshold with this index and height.
-    #[must_use]
-    pub fn alarms(&self, index: usize, threshold: f64, cool_down: usize) -> u32 {
-        match self.alarmed.get(index) {
-            Some(None) => 0,
-            _ => self.cusum.alarms(&self.background, threshold, cool_down),
-        }
-    }
 }

@@ -45,6 +45,10 @@ pub struct CalibrationResult {
     /// The models compared by leave-locations-out cross-validation, smallest first; empty when there was no choice
     /// or too few locations for one.
     pub compared: Vec<ModelComparison>,
+    /// Where the comparison bounds errors, mm: five robust standard deviations of one coordinate of the most accurate model's
+    /// errors, at least 1 mm. `None` without a comparison.
+    #[serde(default)]
+    pub bound_mm: Option<f64>,
 }
 
 /// One model of the comparison.
@@ -56,12 +60,33 @@ pub struct ModelComparison {
     pub parameters: u32,
     /// Cross-validated RMSE with its interval over locations, mm; the value is `None` when it could not be fitted.
     pub rmse_mm: Estimate,
-    /// Its standard error over locations, mm.
-    pub standard_error_mm: Option<f64>,
+    /// The same with every error bounded at [`CalibrationResult::bound_mm`], mm: what the models are compared by.
+    #[serde(default)]
+    pub bounded_rmse_mm: Option<f64>,
+    /// How it did against the model in hand when its turn came; `None` for the smallest one, and where it could not be
+    /// validated.
+    #[serde(default)]
+    pub test: Option<ModelTest>,
     /// RMSE over the presses that it was fitted to, mm.
     pub fitted_rmse_mm: Option<f64>,
     /// True for the one that is used.
     pub chosen: bool,
+}
+
+/// One step of the choice of a model: paired by location, errors bounded.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct ModelTest {
+    /// The model in hand: the smallest, or the last one that was better than what was in hand before it.
+    pub against: CalibrationModel,
+    /// Bounded error of the one in hand less that of this one, mm. Above 0: this one is better.
+    pub gain_mm: f64,
+    /// Standard error of the gain over locations, mm.
+    pub standard_error_mm: f64,
+    /// Gain over standard error; 0 when the gain is below 1e-6 mm.
+    pub ratio: f64,
+    /// The ratio from which this model replaces the one in hand: Student's t at a level of 0.3 shared by all
+    /// comparisons, one degree of freedom less than locations.
+    pub needed: f64,
 }
 
 /// How the least number of cluster events was chosen on the calibrating presses.
@@ -75,6 +100,10 @@ pub struct ThresholdChoice {
     pub n: u32,
     /// See `n`.
     pub left_out: u32,
+    /// How often a threshold gains as much as the best one by chance: by presses whose errors have nothing to do with their
+    /// cluster events. The best one is taken below 0.05. `None` when no threshold gains anything.
+    #[serde(default)]
+    pub chance: Option<f64>,
     /// (threshold, root mean square cost in mm) of the candidates, ascending; thinned to at most 60.
     pub candidates: Vec<(u32, f64)>,
 }

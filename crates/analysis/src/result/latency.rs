@@ -44,25 +44,35 @@ pub struct Latency {
     /// A detector that runs live knows an onset this much after its reported time, ms: it has to wait for the rest of
     /// the run of bins and for half the kernel.
     pub decision_delay_ms: f64,
-    /// Background time looked at, s: the sum of the background windows of the trials.
+    /// A trip earlier than this after the contact (a negative time) is before it, ms: half the kernel and the 95 %
+    /// uncertainty of a measured contact, or the window where it was not measured.
+    #[serde(default)]
+    pub earliest_ms: f64,
+    /// Background time that the background rates stand on, s: the sum of the background windows of the trials.
     pub background_s: f64,
+    /// Time in which a trip is a false alarm at the chosen threshold, s: from the start of each trial to its contact, or to
+    /// the false alarm that ended its search.
+    #[serde(default)]
+    pub at_risk_s: f64,
     /// Median background rate of both cameras, events per second.
     pub background_rate_per_s: f64,
     /// One row per threshold tried, ascending; empty without trials.
     pub sweep: Vec<ThresholdRow>,
-    /// Index of the threshold chosen in `sweep`; `None` when nothing was detected at any. A threshold whose median onset
-    /// is more than the window before the contact detects the background and is never chosen.
+    /// Index of the threshold chosen in `sweep`; `None` when nothing was detected at any.
     pub chosen: Option<u32>,
-    /// Share of trials detected within the window of the median onset, at the chosen threshold. Of all or none the
-    /// interval is exact, see [`Estimate`].
+    /// Share of trials detected within the window of the median onset, at the chosen threshold; a trial that tripped before
+    /// its contact is not. Of all or none the interval is exact, see [`Estimate`].
     pub detected_rate: Estimate,
     /// Width of the 5-95 % interval of the onsets that count, ms.
     pub width_ms: Estimate,
     /// Median onset after the contact (measured or scheduled), ms.
     pub median_ms: Estimate,
-    /// False alarms per second of background, with a cool-down of one width. Of none the interval is exact, see
-    /// [`Estimate`].
+    /// Trips before the contact, `false_detections`, over `at_risk_s`, per second; the interval is the exact Poisson one.
     pub false_alarms_per_s: Estimate,
+    /// (press, trip after its contact in ms, negative) of the presses whose search ended before the contact. They have no
+    /// latency.
+    #[serde(default)]
+    pub false_detections: Vec<(PressId, f64)>,
     /// Onsets against the hardware-timestamped contact; `None` when contact times come from a schedule or a camera's
     /// clock was aligned by the very events whose latency is asked for.
     pub from_contact: Option<ContactLatency>,
@@ -72,19 +82,19 @@ pub struct Latency {
     pub course: LatencyCourse,
     /// (press, onset after contact in ms or `None` when not detected) at the chosen threshold.
     pub onsets: Vec<(PressId, Option<f64>)>,
-    /// The background before each trial, at the chosen threshold; in order of the presses, empty without one.
+    /// The time before each contact, at the chosen threshold; in order of the presses, empty without one.
     #[serde(default)]
     pub backgrounds: Vec<TrialBackground>,
 }
 
-/// What a detector did before one trial, where nothing touched.
+/// What a detector did before one contact, where nothing touched.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct TrialBackground {
     /// Which trial.
     pub press: PressId,
-    /// False alarms, with a cool-down of one width.
+    /// False alarms: 0, or 1, which ended the search.
     pub alarms: u32,
-    /// How long it looked, s.
+    /// How long it looked, s: to the contact, or to the false alarm.
     pub length_s: f64,
 }
 
@@ -93,7 +103,7 @@ pub struct TrialBackground {
 pub struct ThresholdRow {
     /// h.
     pub threshold: f64,
-    /// Trials with any onset.
+    /// Trials that tripped, and not before their contact.
     pub onsets: u32,
     /// Share of trials with an onset within the window of the median onset.
     pub detected_rate: f64,
@@ -101,21 +111,26 @@ pub struct ThresholdRow {
     pub median_ms: Option<f64>,
     /// 95th minus 5th percentile of the onsets that count, ms.
     pub width_ms: Option<f64>,
-    /// False alarms per second.
+    /// Trials that tripped before their contact.
+    #[serde(default)]
+    pub false_alarms: u32,
+    /// Time in which a trip is a false alarm, s.
+    #[serde(default)]
+    pub at_risk_s: f64,
+    /// The one over the other; 0 without time at risk.
     pub false_alarms_per_s: f64,
 }
 
 /// Latency from the contact that the hardware timestamped.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ContactLatency {
-    /// 5th percentile of the onsets that are not before the contact, ms.
+    /// 5th percentile of the onsets, none of which is before the contact, ms.
     pub p5_ms: Estimate,
     /// Median, ms.
     pub median_ms: Estimate,
     /// 95th percentile, ms.
     pub p95_ms: Estimate,
-    /// Onsets further before the contact than half the kernel reaches: false alarms by definition, not part of the
-    /// percentiles.
+    /// Trials that tripped before their contact: [`Latency::false_detections`], not part of the percentiles.
     pub before_contact: u32,
     /// Trials never detected: beyond every percentile, not part of them.
     pub missed: u32,
@@ -149,7 +164,7 @@ pub struct ReducedLatency {
     pub detected_rate: Estimate,
     /// Width of the 5-95 % interval of the onsets that count, ms.
     pub width_ms: Estimate,
-    /// False alarms per second of background, with a cool-down of one width.
+    /// Trips before the contact over the time at risk, per second; the interval is the exact Poisson one.
     pub false_alarms_per_s: Estimate,
 }
 

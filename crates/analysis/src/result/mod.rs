@@ -13,7 +13,7 @@ pub use alignment::{
     Alignment, AlignmentStatus, ClockMap, ClockResidual, ClockResiduals, Knot, LineCounts, MapName,
 };
 pub use audit::{Fault, Finding, Law};
-pub use calibration::{CalibrationResult, ModelComparison, ThresholdChoice};
+pub use calibration::{CalibrationResult, ModelComparison, ModelTest, ThresholdChoice};
 pub use coverage::{Activity, BitRates, Cmre, Coverage, OffSensor};
 pub use latency::{
     ContactLatency, ContactTiming, Latency, LatencyCourse, ReducedLatency, ThresholdRow,
@@ -61,7 +61,7 @@ pub struct Analysis {
     pub scored: Metrics,
     /// Metrics over all scored presses with an estimate, exclusions ignored.
     pub scored_without_exclusions: Metrics,
-    /// RMSE over all attempted scored presses in which every failed one counts the stated penalty.
+    /// RMSE over all attempted scored presses, failed ones included.
     pub penalised: Penalised,
     /// The least number of cluster events, when it was chosen on the calibrating presses.
     pub threshold: Option<ThresholdChoice>,
@@ -173,8 +173,7 @@ pub enum ClockMethod {
 
 /// A number with its 95 % interval and the n behind it. Intervals come from a bootstrap, which sees no spread in what
 /// never or always happened: those of a share of 0 or 1 are exact binomial ones with the number of locations for n
-/// (0: up to 1 - 0.025^(1 / n); 1: from 0.025^(1 / n)), that of 0 counts in T seconds is the exact Poisson one (up to
-/// -ln(0.025) / T).
+/// (0: up to 1 - 0.025^(1 / n); 1: from 0.025^(1 / n)). That of a count over a time is the exact Poisson one.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Estimate {
     /// The value; `None` when n is too small for it.
@@ -225,15 +224,22 @@ pub struct Metrics {
     pub rmse_diagonal_percent: Option<f64>,
 }
 
-/// The RMSE with failures counted.
+/// The RMSE with failures counted. Its value is never below that of the presses that count, nor below that of all presses
+/// with an estimate.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Penalised {
-    /// What a failed press counts, mm.
+    /// What a failed press counts at least, mm. One with an estimate that errs by more counts its own error.
     pub penalty_mm: f64,
     /// True when the penalty was derived from the probed locations, false when the settings name it.
     pub derived: bool,
+    /// True when that was below the RMSE of the presses with an estimate, and the penalty was raised to it.
+    #[serde(default)]
+    pub raised: bool,
     /// Failed presses: attempted, and without an estimate that counts.
     pub failures: u32,
+    /// How many of them count an error of their own above the penalty.
+    #[serde(default)]
+    pub beyond_penalty: u32,
     /// The RMSE, mm.
     pub rmse_mm: Estimate,
 }

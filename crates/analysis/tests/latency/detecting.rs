@@ -76,12 +76,12 @@ fn a_background_has_a_rate_whatever_is_in_it() {
         let mut background = quiet.clone();
         background[bin] = events;
         let trial = look(&detector, -4250, &touch, &background);
-        let onset = trial.onsets_ms[9].unwrap();
+        let onset = onsets_ms(&trial)[9].unwrap();
         assert!((-2.0..=0.2).contains(&onset), "{events} events: {onset} ms");
         let mut single = vec![0; 8500];
         single[100] = 1;
         let none = look(&detector, -4250, &single, &background);
-        assert!(none.onsets_ms[4..].iter().all(Option::is_none));
+        assert!(onsets_ms(&none)[4..].iter().all(Option::is_none));
     }
 }
 
@@ -92,7 +92,7 @@ fn trials_without_an_answer_are_answered_with_none() {
     for counts in [vec![0; 8500], vec![0, 1, 0, 0, 1, 0], vec![1], vec![]] {
         let trial = look(&detector, 0, &counts, &[1, 0, 0, 1, 0]);
         assert!(
-            trial.onsets_ms.iter().all(Option::is_none),
+            onsets_ms(&trial).iter().all(Option::is_none),
             "{} bins",
             counts.len()
         );
@@ -102,23 +102,20 @@ fn trials_without_an_answer_are_answered_with_none() {
     instant[4250] = 10_000_000;
     let trial = look(&detector, -4250, &instant, &[0; 2000]);
     assert!(
-        trial
-            .onsets_ms
+        onsets_ms(&trial)
             .iter()
             .all(|t| t.is_some_and(|t| (-2.0..=0.2).contains(&t)))
     );
     // 5e7 events per second throughout are background, four times as many are not.
     let flood = vec![10_000; 8500];
     let trial = look(&detector, -4250, &flood, &flood[..2000]);
-    assert!(trial.onsets_ms.iter().all(Option::is_none));
-    assert_eq!(trial.alarms(0, 1.0, 10), 0);
+    assert!(onsets_ms(&trial).iter().all(Option::is_none));
     let more: Vec<u32> = (0..8500)
         .map(|i| if i < 4250 { 10_000 } else { 40_000 })
         .collect();
     let trial = look(&detector, -4250, &more, &flood[..2000]);
     assert!(
-        trial
-            .onsets_ms
+        onsets_ms(&trial)
             .iter()
             .all(|t| t.is_some_and(|t| (-2.0..=0.2).contains(&t)))
     );
@@ -143,7 +140,7 @@ fn a_planted_step_is_found_in_its_bin() {
         let counts = random.counts(rate, 8500);
         let background = random.counts(|_| 500.0, 2250);
         // Twenty events per bin against a threshold of ten: the first bin decides.
-        let onset = |d: &Detector| look(d, -4250, &counts, &background).onsets_ms[9].unwrap();
+        let onset = |d: &Detector| onsets_ms(&look(d, -4250, &counts, &background))[9].unwrap();
         let begins_ms = planted as f64 * 0.2;
         assert!((onset(&sharp) - begins_ms - 0.1).abs() < 1e-9, "{planted}");
         let early = onset(&smooth) - begins_ms;
@@ -156,20 +153,72 @@ fn false_alarms_on_pure_background_are_as_rare_as_theory_says() {
     // Lorden 1971: the mean time between false alarms of an unsmoothed CUSUM is at least exp(h) bins. For Poisson counts the
     // sum jumps in steps of ln 4, so the true rate lies below, within the overshoot of about one such step and the share
     // of excursions that a run of one bin asks for.
-    let (rate, seconds) = (2000.0, 200.0);
-    let counts = Random(5).counts(|_| rate, (seconds / BIN_S) as usize);
-    let smoothed: Vec<f64> = counts.iter().map(|c| f64::from(*c)).collect();
-    let cusum = Cusum::new(4.0, rate, BIN_S, 1);
-    for h in [3.0f64, 5.0, 7.0] {
-        let found = f64::from(cusum.alarms(&smoothed, h, 0)) / seconds;
+    let rate = 2000.0;
+    let mut random = Random(5);
+    let detector = Detector {
+        kernel: Kernel::gaussian(0.0, 0.2),
+        consecutive: 1,
+        thresholds: vec![3.0, 5.0, 7.0],
+        earliest_ms: 0.0,
+        ..detector()
+    };
+    // A background of 20 s, so that its rate is known.
+    let background = random.counts(|_| rate, 100_000);
+    let trials: Vec<Trial> = (0..400)
+        .map(|_| {
+            look(
+                &detector,
+                -2500,
+                &random.counts(|_| rate, 2500),
+                &background,
+            )
+        })
+        .collect();
+    for (row, h) in sweep(&trials, &detector, 100.0)
+        .iter()
+        .zip([3.0f64, 5.0, 7.0])
+    {
         let bound = (-h).exp() / BIN_S;
+        let found = row.false_alarms_per_s;
         assert!(
             found < bound && found > 0.02 * bound,
             "h {h}: {found} alarms/s, bound {bound}"
         );
+        assert_eq!(found, f64::from(row.false_alarms) / row.at_risk_s);
     }
-    // A cool-down leaves time in which nothing can alarm.
-    assert!(cusum.alarms(&smoothed, 3.0, 500) < cusum.alarms(&smoothed, 3.0, 0));
+}
+
+#[test]
+fn a_trip_before_the_contact_ends_the_search() {
+    // 0.85 s before the contact to 0.85 s after it; a touch of 20 ms from 10 ms on.
+    let detector = Detector {
+        earliest_ms: -3.0,
+        ..detector()
+    };
+    let trial = |burst_ms: Option<f64>| {
+        let mut counts = vec![0; 8500];
+        counts[4300..4400].fill(10);
+        if let Some(ms) = burst_ms {
+            let at = (4250.0 + ms * 5.0) as usize;
+            counts[at..at + 10].fill(10);
+        }
+        look(&detector, -4250, &counts, &[0; 2500]).searches[9]
+    };
+    let quiet = trial(None);
+    assert!((quiet.onset_ms().unwrap() - 10.0).abs() < 2.1);
+    assert!((quiet.at_risk_s - 0.847).abs() < 3e-4, "{quiet:?}");
+    for early_ms in [-800.0, -600.0, -40.0, -6.0] {
+        let found = trial(Some(early_ms));
+        let at = found.false_alarm_ms().unwrap();
+        assert!((at - early_ms).abs() < 2.1 && found.onset_ms().is_none());
+        // From the start of the trial to the end of the bin of the alarm.
+        assert!(
+            (found.at_risk_s - (0.8501 + at * 1e-3)).abs() < 1e-9,
+            "{found:?}"
+        );
+    }
+    // Within the uncertainty of the contact.
+    assert!((trial(Some(-0.5)).onset_ms().unwrap() + 0.5).abs() < 2.1);
 }
 
 #[test]
@@ -208,6 +257,8 @@ fn the_threshold_has_the_fewest_false_alarms_among_those_that_detect_enough() {
             detected_rate,
             median_ms: Some(20.0),
             width_ms: None,
+            false_alarms: 0,
+            at_risk_s: 1.0,
             false_alarms_per_s,
         };
         list.iter().enumerate().map(row).collect()
@@ -220,30 +271,13 @@ fn the_threshold_has_the_fewest_false_alarms_among_those_that_detect_enough() {
         (0.95, 1.0),
         (0.9, 0.5),
     ]);
-    assert_eq!(choose(&all, 0.95, -100.0), Some(2));
-    assert_eq!(choose(&all, 0.99, -100.0), Some(2));
-    assert_eq!(choose(&all, 0.9, -100.0), Some(4));
-    assert_eq!(
-        choose(&rows(&[(0.5, 3.0), (0.5, 2.0)]), 0.95, -100.0),
-        Some(1)
-    );
-    assert_eq!(choose(&rows(&[(0.0, 3.0), (0.0, 2.0)]), 0.95, -100.0), None);
-    assert_eq!(choose(&rows(&[(0.0, 3.0)]), 0.0, -100.0), None);
-    assert_eq!(choose(&[], 0.95, -100.0), None);
-    // Onsets that agree well, on the background 0.8 s before the contact.
-    let mut early = all.clone();
-    early.extend(rows(&[(0.0, 0.0); 5]));
-    early.extend(rows(&[(0.0, 0.0); 5]).into_iter().map(|r| ThresholdRow {
-        median_ms: None,
-        ..r
-    }));
-    early.push(ThresholdRow {
-        median_ms: Some(-800.0),
-        detected_rate: 1.0,
-        ..all[1]
-    });
-    assert_eq!(choose(&early, 0.95, -100.0), Some(2));
-    assert_eq!(choose(&early, 0.95, -1000.0), Some(15));
+    assert_eq!(choose(&all, 0.95), Some(2));
+    assert_eq!(choose(&all, 0.99), Some(2));
+    assert_eq!(choose(&all, 0.9), Some(4));
+    assert_eq!(choose(&rows(&[(0.5, 3.0), (0.5, 2.0)]), 0.95), Some(1));
+    assert_eq!(choose(&rows(&[(0.0, 3.0), (0.0, 2.0)]), 0.95), None);
+    assert_eq!(choose(&rows(&[(0.0, 3.0)]), 0.0), None);
+    assert_eq!(choose(&[], 0.95), None);
     // Trials in which nothing is found: a share of 0, no width, no choice.
     let detector = detector();
     let silent = vec![look(&detector, 0, &[0; 100], &[1; 100]); 3];
@@ -253,7 +287,7 @@ fn the_threshold_has_the_fewest_false_alarms_among_those_that_detect_enough() {
             .iter()
             .all(|r| r.detected_rate == 0.0 && r.width_ms.is_none())
     );
-    assert_eq!((found.len(), choose(&found, 0.95, -100.0)), (20, None));
+    assert_eq!((found.len(), choose(&found, 0.95)), (20, None));
     assert_eq!(sweep(&[], &detector, 100.0), []);
     assert_eq!(thresholds((17.0, 19.0), 3), [17.0, 18.0, 19.0]);
     assert_eq!(thresholds((5.0, 9.0), 1), [5.0]);
@@ -281,26 +315,30 @@ proptest! {
         let trial = look(&detector, -300, &counts, &background);
         let events: u32 = background.iter().sum();
         let rate = f64::from(events).max(0.5) / 0.1;
-        for (h, onset) in detector.thresholds.iter().zip(&trial.onsets_ms) {
+        for (h, onset) in detector.thresholds.iter().zip(&onsets_ms(&trial)) {
             let slow = slow_onset(&detector, &counts, rate, *h);
             let slow_ms = slow.map(|bin| (bin as f64 - 300.0 + 0.5) * 0.2);
             prop_assert_eq!(*onset, slow_ms, "h {}", h);
         }
     }
 
-    /// Each alarm is the first onset since the detector was started anew.
+    /// A false alarm is the onset in a trial that is before the contact, and the time at risk ends with it.
     #[test]
-    fn alarms_are_onsets_one_after_another(
-        seed in 1u64.., rate in 100.0f64..30_000.0, h in 0.5f64..6.0, cool_down in 0usize..200,
+    fn searches_are_onsets_cut_at_the_contact(
+        seed in 1u64.., rate in 100.0f64..30_000.0, h in 0.5f64..6.0, first in -900i64..0, margin_ms in 0.0f64..20.0,
     ) {
-        let counts = Random(seed).counts(|bin| if bin % 500 < 20 { 3.0 * rate } else { rate }, 3000);
-        let smoothed: Vec<f64> = counts.iter().map(|c| f64::from(*c)).collect();
-        let cusum = Cusum::new(4.0, rate, BIN_S, 3);
-        let (mut alarms, mut from) = (0, 0);
-        while let Some(onset) = smoothed.get(from..).and_then(|rest| cusum.onsets(rest, &[h])[0]) {
-            alarms += 1;
-            from += onset + 3 + cool_down;
-        }
-        prop_assert_eq!(cusum.alarms(&smoothed, h, cool_down), alarms);
+        let counts = Random(seed).counts(|bin| if bin % 500 < 20 { 3.0 * rate } else { rate }, 1200);
+        let background = Random(seed ^ 1).counts(|_| rate, 500);
+        let anywhere = Detector { thresholds: vec![h], ..detector() };
+        let cut = Detector { earliest_ms: -margin_ms, ..anywhere.clone() };
+        let onset = onsets_ms(&look(&anywhere, first, &counts, &background))[0];
+        let search = look(&cut, first, &counts, &background).searches[0];
+        let early = onset.filter(|t| *t < -margin_ms);
+        prop_assert_eq!(search.false_alarm_ms(), early);
+        prop_assert_eq!(search.onset_ms(), onset.filter(|_| early.is_none()));
+        // Bins whose middle is before the contact, up to the onset's.
+        let bins = (0..1200).filter(|i| (first + i) as f64 * 0.2 + 0.1 < -margin_ms);
+        let bins = bins.filter(|i| early.is_none_or(|t| (first + i) as f64 * 0.2 + 0.1 <= t + 1e-9));
+        prop_assert!((search.at_risk_s - bins.count() as f64 * BIN_S).abs() < 1e-9);
     }
 }

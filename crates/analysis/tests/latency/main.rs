@@ -13,7 +13,7 @@ use proptest::prelude::*;
 use skinrig_analysis::analyze;
 use skinrig_analysis::kept::{Kept, KeptEvent, KeptPress, KeptView};
 use skinrig_analysis::latency::bins::{Grid, Sight};
-use skinrig_analysis::latency::cusum::{Cusum, background_rate_per_s};
+use skinrig_analysis::latency::cusum::background_rate_per_s;
 use skinrig_analysis::latency::interval::{Outcome, Plan};
 use skinrig_analysis::latency::smooth::{Edges, Kernel};
 use skinrig_analysis::latency::study;
@@ -46,7 +46,12 @@ impl Random {
 
 fn detector() -> Detector {
     let settings = LatencySettings::default();
-    Detector::new(&settings, Edges::Renormalised, thresholds((1.0, 20.0), 20))
+    // About onsets, wherever they are.
+    let edges = Edges::Renormalised;
+    Detector {
+        earliest_ms: f64::NEG_INFINITY,
+        ..Detector::new(&settings, edges, thresholds((1.0, 20.0), 20), 0.0)
+    }
 }
 
 fn label(press: u32) -> Label {
@@ -54,6 +59,11 @@ fn label(press: u32) -> Label {
         press: PressId::from_index(press),
         location: press,
     }
+}
+
+/// The onset at each threshold, ms.
+fn onsets_ms(trial: &Trial) -> Vec<Option<f64>> {
+    trial.searches.iter().map(|s| s.onset_ms()).collect()
 }
 
 /// Bins from `first` to `first + counts.len()`.

@@ -74,6 +74,7 @@ fn planted_latencies_come_back_with_their_uncertainty() {
     );
     assert!((found.width_ms.value.unwrap() - 21.6).abs() < 1.0);
     assert_eq!((contact.before_contact, contact.missed), (0, 0));
+    assert_counts_are_listed(&found);
     // 1000 µs between poses and 200 µs bins over the root of 12; marks are good to 0.5 µs, the clocks to a µs or so.
     assert!((contact.from_contact_ms - 0.288_675).abs() < 1e-6);
     assert!((contact.from_bins_ms - 0.057_735).abs() < 1e-6);
@@ -100,12 +101,55 @@ fn planted_latencies_come_back_with_their_uncertainty() {
     );
 }
 
+/// The law of the false alarms: what is listed is what is counted, over exactly the time that was looked at.
+fn assert_counts_are_listed(found: &Latency) {
+    let listed: Vec<PressId> = found.false_detections.iter().map(|f| f.0).collect();
+    let alarmed = found.backgrounds.iter().filter(|b| b.alarms > 0);
+    assert_eq!(listed, alarmed.map(|b| b.press).collect::<Vec<_>>());
+    assert!(
+        found
+            .backgrounds
+            .iter()
+            .all(|b| b.alarms <= 1 && b.length_s > 0.0)
+    );
+    let at_risk_s: f64 = found.backgrounds.iter().map(|b| b.length_s).sum();
+    assert!((at_risk_s - found.at_risk_s).abs() < 1e-9);
+    let rate = found.false_alarms_per_s;
+    assert!((rate.value.unwrap() * at_risk_s - listed.len() as f64).abs() < 1e-9);
+    assert!(rate.low.unwrap() <= rate.value.unwrap() && rate.value < rate.high);
+    let row = &found.sweep[found.chosen.unwrap() as usize];
+    assert_eq!(
+        (row.false_alarms as usize, row.false_alarms_per_s),
+        (listed.len(), rate.value.unwrap())
+    );
+    for (press, at) in &found.false_detections {
+        assert!(*at < found.earliest_ms);
+        assert!(found.onsets.iter().any(|o| o.0 == *press && o.1.is_none()));
+    }
+    assert!(
+        found
+            .onsets
+            .iter()
+            .all(|o| o.1.is_none_or(|t| t >= found.earliest_ms))
+    );
+    let per_s = |rows: &[ThresholdRow]| {
+        rows.iter()
+            .map(|r| r.false_alarms_per_s)
+            .collect::<Vec<_>>()
+    };
+    assert!(
+        per_s(&found.sweep).is_sorted_by(|a, b| a >= b),
+        "a higher threshold never trips earlier"
+    );
+}
+
 #[test]
 fn what_is_before_the_contact_or_never_comes_is_counted_apart() {
     let (mut analysis, kept) = planted(|n| match n {
         0 => None,
         // Before the idle time that the background is taken from.
-        1 | 2 => Some(-7.8e5),
+        1 => Some(-7.8e5),
+        2 => Some(-6.3e5),
         _ => Some(2e4),
     });
     // High enough that the background alone does not cross it near the contact by chance.
@@ -118,11 +162,51 @@ fn what_is_before_the_contact_or_never_comes_is_counted_apart() {
         "{rate}: {:?}",
         found.onsets
     );
+    assert_counts_are_listed(&found);
+    let early: Vec<(PressId, f64)> = found.false_detections.clone();
+    assert_eq!(early.len(), 2);
+    for ((press, at), (n, planted)) in early.iter().zip([(1, -780.0), (2, -630.0)]) {
+        assert_eq!(*press, kept.presses[n].press);
+        assert!((at - planted).abs() < 2.5, "{at}");
+    }
+    // 23 trials look for 0.85 s, two only until they trip, less half a kernel and the contact's uncertainty.
+    let looked = 23.0 * (0.85 + found.earliest_ms * 1e-3) + 0.07 + 0.22;
+    assert!(
+        (found.at_risk_s - looked).abs() < 0.01,
+        "{} s",
+        found.at_risk_s
+    );
+    assert!(
+        found.earliest_ms < -2.0 && found.earliest_ms > -2.5,
+        "{}",
+        found.earliest_ms
+    );
+    // Garwood's limits of two events.
+    let rate = found.false_alarms_per_s;
+    assert!((rate.low.unwrap() * found.at_risk_s - 0.2422).abs() < 1e-3);
+    assert!((rate.high.unwrap() * found.at_risk_s - 7.2247).abs() < 1e-3);
     let contact = found.from_contact.unwrap();
     assert_eq!((contact.before_contact, contact.missed), (2, 1));
     assert_eq!(contact.median_ms.n, 22);
     assert_eq!(contact.from_contact_ms, 0.0);
     assert!((contact.p5_ms.value.unwrap() - 20.0).abs() < 2.1);
+}
+
+#[test]
+fn contacts_that_were_not_measured_may_be_off_by_the_window() {
+    // 40 ms before the scheduled contact throughout.
+    let (mut analysis, kept) = planted(|_| Some(-4e4));
+    assert_eq!(
+        studied(&analysis, &kept).detected_rate.value.unwrap_or(0.0),
+        0.0
+    );
+    analysis.contact_timing.scheduled = true;
+    let found = studied(&analysis, &kept);
+    assert_eq!(
+        (found.earliest_ms, found.detected_rate.value),
+        (-102.0, Some(1.0))
+    );
+    assert_counts_are_listed(&found);
 }
 
 #[test]
@@ -150,7 +234,6 @@ fn what_was_left_out_by_hand_is_no_trial_and_what_the_skin_missed_is() {
 fn no_false_alarm_and_no_miss_is_not_certainty() {
     let plan = Plan {
         window_ms: 100.0,
-        earliest_ms: 0.0,
         resamples: 100,
         seed: 1,
     };
@@ -158,8 +241,8 @@ fn no_false_alarm_and_no_miss_is_not_certainty() {
     let one = |i: u32| Outcome {
         location: i / 2,
         onset_ms: Some(20.0),
-        alarms: 0,
-        background_s: 0.5,
+        false_alarm: false,
+        at_risk_s: 0.5,
     };
     let all: Vec<Outcome> = (0..12).map(one).collect();
     let near = |found: Option<f64>, wanted: f64| (found.unwrap() - wanted).abs() < 1e-12;

@@ -587,6 +587,7 @@ fn presses_named_by_hand_are_rows_with_that_rule() {
     assert_eq!(a.scored.rmse_mm.n, 24);
     // It was attempted, so it is a failure.
     assert_eq!((a.penalised.failures, a.penalised.rmse_mm.n), (1, 25));
+    assert_eq!((a.penalised.beyond_penalty, a.penalised.raised), (0, false));
     let count = |e: &skinrig_analysis::result::Estimate| e.value.unwrap() * f64::from(e.n);
     assert!((count(&a.scored.located_rate) - 24.0).abs() < 1e-9);
     let rms = |e: &skinrig_analysis::result::Estimate| e.value.unwrap().powi(2) * f64::from(e.n);

@@ -12,7 +12,6 @@ mod bootstrap;
 mod compare;
 mod comparison;
 mod components;
-mod distributions;
 mod family;
 mod inference;
 mod measure;

@@ -2,9 +2,9 @@
 
 use super::compare::direction;
 use super::comparison::{Components, Enough, Needed, Verdict};
-use super::distributions::student_quantile;
 use super::measure::Measure;
 use super::question::{Better, Question, Settings};
+use skinrig_analysis::distributions::student_quantile;
 
 /// More locations than anybody presses.
 const MOST: u32 = 100_000;

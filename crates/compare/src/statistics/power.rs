@@ -2,11 +2,11 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::distributions::student_quantile;
 use super::measure::measure as measured;
 use super::refusal::{Refusal, Side};
 use super::sample::Sample;
 use super::spread::Repeats;
+use skinrig_analysis::distributions::student_quantile;
 
 /// Where the variance of one skin's metric comes from. With `k` locations pressed `r` times each its value has variance
 /// `between / k + within / (k r)`.

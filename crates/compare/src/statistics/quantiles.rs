@@ -4,11 +4,11 @@
 //! they are without a model of the misses. Limits are those of Woodruff (1952): the share of trials up to the percentile
 //! has an interval, and its ends are read off the times.
 
-use super::distributions::normal_quantile;
 use super::measure::{ByPlace, Measure, Shape, correlation, error};
 use super::refusal::{Refusal, Side};
 use super::sample::{Clusters, late};
 use super::scores;
+use skinrig_analysis::distributions::normal_quantile;
 
 /// A percentile among sorted times.
 #[derive(Debug, Clone, PartialEq)]

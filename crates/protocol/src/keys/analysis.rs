@@ -171,7 +171,7 @@ pub(crate) static ANALYSIS: Table = Table {
         optional(
             "failure_penalty",
             millimetres(limits::LENGTH_MM),
-            "The error that a failed press counts in the penalised RMSE; when absent the RMS distance of the scored presses from their mean: the error of an answer that knows nothing.",
+            "The least that a failed press counts in the RMSE with failures counted; when absent the RMS distance of the scored presses from their mean: the error of an answer that knows nothing. Raised to the RMSE of the presses with an estimate where that is more.",
         ),
         default(
             "within",
@@ -286,7 +286,7 @@ pub(crate) const CALIBRATIONS: &[Word] = &[
     ),
     (
         "auto",
-        "the smallest of them whose cross-validated error is within one standard error of the best",
+        "the smallest of them that no larger one beats at places left out, by more than noise explains",
     ),
 ];
 

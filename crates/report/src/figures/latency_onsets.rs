@@ -13,12 +13,14 @@ pub fn latency_onsets(input: &ReportInput<'_>) -> Option<Figure> {
     let study = input.analysis.latency.as_ref()?;
     let counted = derive::onsets_ms(study);
     let (low, median, high) = derive::onset_percentiles(study)?;
-    let missed = study.onsets.iter().filter(|(_, o)| o.is_none()).count();
-    let far = study.onsets.len() - missed - counted.len();
+    let undetected = study.onsets.iter().filter(|(_, o)| o.is_none()).count();
+    let early = study.false_detections.len();
+    let missed = undetected.saturating_sub(early);
+    let far = study.onsets.len() - undetected - counted.len();
     let caption = format!(
         "Detected onsets after the contact, {} presses within {} ms of the median onset. Lines: 5th percentile {} ms, \
-         median {} ms, 95th percentile {} ms. Not drawn: {far} onsets further from the median, {missed} presses never \
-         detected. An onset further before the contact than half the smoothing kernel reaches is a false alarm.",
+         median {} ms, 95th percentile {} ms. Not drawn: {far} onsets further from the median, {early} presses whose \
+         detector tripped before the contact (false alarms), {missed} presses never detected.",
         counted.len(),
         number(Some(study.settings.window_ms), 0),
         number(Some(low), 1),

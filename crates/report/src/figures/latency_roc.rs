@@ -35,10 +35,10 @@ pub fn latency_roc(input: &ReportInput<'_>) -> Option<Figure> {
     );
     let caption = format!(
         "Choice of the detector's threshold: share of {} trials with an onset within {} ms of the median onset, against \
-         false alarms per second of background ({} s looked at). A dot for each of {} thresholds, some in one place. {choice}",
+         false alarms per second: trips before the contact over the time in which there can be one, up to the contact or \
+         the trip. A dot for each of {} thresholds, some in one place. {choice}",
         study.trials,
         number(Some(study.settings.window_ms), 0),
-        number(Some(study.background_s), 1),
         rows.len(),
     );
     let mut canvas = Canvas::new(

@@ -21,8 +21,8 @@ pub(crate) const fn model_name(model: CalibrationModel) -> &'static str {
     }
 }
 
-/// Cross-validated RMSE of the nested models with its interval, the error on the fitted presses beside it, and the
-/// line of one standard error above the best. `None` where no models were compared.
+/// Cross-validated RMSE of the nested models with its interval, beside it the bounded one that they are compared by and the
+/// error on the fitted presses. `None` where no models were compared.
 #[must_use]
 pub fn models(input: &ReportInput<'_>) -> Option<Figure> {
     let rows = &input.analysis.calibration.as_ref()?.compared;
@@ -30,9 +30,9 @@ pub fn models(input: &ReportInput<'_>) -> Option<Figure> {
         return None;
     }
     let caption = "Choice of the calibration model. Dots: RMSE on locations left out of the fit, with its 95 % interval \
-                   over locations. Small dots: RMSE on the presses that were fitted, always more optimistic. Dashed: one \
-                   standard error above the best. The smallest model below it is used (ring), unless the protocol names \
-                   one."
+                   over locations; bars: the same with the longest errors bounded, by which the models are compared, \
+                   paired by location (the table below gives the differences). Small dots: RMSE on the presses that were \
+                   fitted, always more optimistic. Ring: the one used."
         .to_owned();
     let mut canvas = Canvas::new(
         input,
@@ -56,19 +56,6 @@ pub fn models(input: &ReportInput<'_>) -> Option<Figure> {
     };
     let svg = &mut canvas.svg;
     axes.draw(svg);
-    let best = rows
-        .iter()
-        .filter_map(|r| Some((finite(r.rmse_mm.value)?, finite(r.standard_error_mm)?)))
-        .min_by(|a, b| a.0.total_cmp(&b.0));
-    if let Some((value, error)) = best {
-        let y = axes.y.at(value + error);
-        svg.line("ref", (66.0, y), (604.0, y));
-    }
-    // A value on the line of one standard error is written below it.
-    let near_line = |value: f64| {
-        let line = best.map(|(value, error)| axes.y.at(value + error));
-        line.is_some_and(|line| (axes.y.at(value) - line).abs() < 9.0)
-    };
     for (i, row) in rows.iter().enumerate() {
         let x = axes.x.at(i as f64);
         let name = format!(
@@ -86,10 +73,7 @@ pub fn models(input: &ReportInput<'_>) -> Option<Figure> {
                 let y = axes.y.at(value);
                 svg.path("dots strong c1", &dots([(x, y)]));
                 svg.text(
-                    (
-                        x + 12.0,
-                        y + 4.0 + 12.0 * f64::from(u8::from(near_line(value))),
-                    ),
+                    (x + 12.0, y + 4.0),
                     "tick halo",
                     "start",
                     &number(Some(value), 2),
@@ -110,6 +94,10 @@ pub fn models(input: &ReportInput<'_>) -> Option<Figure> {
                 svg.text((x, 372.0), "note", "middle", "not fitted");
             }
         }
+        if let Some(value) = finite(row.bounded_rmse_mm) {
+            let y = axes.y.at(value);
+            svg.line("ref", (x - 22.0, y), (x - 4.0, y));
+        }
         if let Some(value) = finite(row.fitted_rmse_mm) {
             svg.path("dots mid c2", &dots([(x - 12.0, axes.y.at(value))]));
         }
@@ -120,7 +108,7 @@ pub fn models(input: &ReportInput<'_>) -> Option<Figure> {
         &[
             (Sample::Dot("dots strong c1"), "locations left out"),
             (Sample::Dot("dots mid c2"), "fitted presses"),
-            (Sample::Line("ref"), "best + 1 standard error"),
+            (Sample::Line("ref"), "left out, bounded"),
         ],
     );
     let n = rows.iter().map(|r| r.rmse_mm.n).max().unwrap_or(0);

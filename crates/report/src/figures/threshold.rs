@@ -24,14 +24,26 @@ pub fn threshold(input: &ReportInput<'_>) -> Option<Figure> {
     let mut caption = format!(
         "Choice of the least number of cluster events, on the {} calibrating presses alone. Cost of a threshold: root \
          mean square over presses of the error, where a press left out counts {} mm, the error of an answer that knows \
-         nothing. Ring: the threshold chosen, {} events in the weaker camera; it leaves out {} of them.",
+         nothing, and a kept one at most sqrt(2) times as much. Ring: the threshold chosen, {} events in the weaker camera; it leaves out {} of them.",
         choice.n,
         number(Some(choice.penalty_mm), 1),
         choice.events,
         choice.left_out,
     );
     if floor {
-        caption += " It is the least one tried: no higher one costs less.";
+        caption += &choice.chance.map_or_else(
+            || " It is the least one tried: no higher one costs less.".to_owned(),
+            |p| {
+                let p = number(Some(p), 3);
+                format!(
+                    " It is the least one tried: what a higher one gains is no more than chance gives (p = {p}), or stands \
+                     on one location."
+                )
+            },
+        );
+    } else if let Some(p) = choice.chance {
+        let p = number(Some(p), 3);
+        caption += &format!(" Chance gives as large a gain with p = {p} (permutation test).");
     }
     let mut canvas = Canvas::new(
         input,

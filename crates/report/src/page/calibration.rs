@@ -4,7 +4,7 @@ use skinrig_analysis::result::{Analysis, CalibrationResult};
 
 use super::grid::Grid;
 use crate::figures::model_name;
-use crate::format::{interval, number, words};
+use crate::format::{NONE, interval, number, words};
 
 /// The compared models.
 pub(super) fn models(a: &Analysis) -> Option<Grid> {
@@ -20,7 +20,11 @@ pub(super) fn models(a: &Analysis) -> Option<Grid> {
             "#parameters",
             "#RMSE, locations left out (mm)",
             "#95 % interval",
-            "#standard error (mm)",
+            "#bounded RMSE (mm)",
+            "against",
+            "#gain ± standard error (mm)",
+            "#in standard errors",
+            "#needed",
             "#RMSE, fitted presses (mm)",
             "",
         ],
@@ -32,7 +36,17 @@ pub(super) fn models(a: &Analysis) -> Option<Grid> {
                 m.parameters.to_string(),
                 number(m.rmse_mm.value, 3),
                 interval(&m.rmse_mm, 1.0, 3),
-                number(m.standard_error_mm, 3),
+                number(m.bounded_rmse_mm, 3),
+                m.test.map_or(NONE, |t| model_name(t.against)).to_owned(),
+                m.test.map_or_else(
+                    || NONE.to_owned(),
+                    |t| {
+                        let gain = number(Some(t.gain_mm), 3);
+                        format!("{gain} ± {}", number(Some(t.standard_error_mm), 3))
+                    },
+                ),
+                number(m.test.map(|t| t.ratio), 2),
+                number(m.test.map(|t| t.needed), 2),
                 number(m.fitted_rmse_mm, 3),
                 if m.chosen { "used" } else { "" }.to_owned(),
             ],
@@ -47,26 +61,21 @@ pub(super) fn models(a: &Analysis) -> Option<Grid> {
 /// Why the model is the one used.
 fn why(a: &Analysis, c: &CalibrationResult) -> String {
     use skinrig_model::CalibrationModel::Auto;
-    let best = c
-        .compared
-        .iter()
-        .filter_map(|m| Some((m.rmse_mm.value?, m)))
-        .min_by(|x, y| x.0.total_cmp(&y.0));
-    match (a.settings.calibration, best) {
-        (Auto, Some((value, best))) => {
-            let error = best.standard_error_mm.unwrap_or(0.0);
-            format!(
-                "Used: the smallest model whose error on left-out locations is at most {} mm, that is one standard error \
-                 ({} mm) above the best, {} ({} mm).",
-                number(Some(value + error), 3),
-                number(Some(error), 3),
-                model_name(best.model),
-                number(Some(value), 3),
-            )
-        }
-        (Auto, None) => "No model could be validated.".to_owned(),
-        (named, _) => format!("Used: {}, as the settings say.", model_name(named)),
-    }
+    let used = match a.settings.calibration {
+        Auto => "the last model that replaced the one in hand".to_owned(),
+        named if named == c.model => format!("{}, as the settings say", model_name(named)),
+        named => format!(
+            "{}; the settings say {}, whose fit failed or needs more places",
+            model_name(c.model),
+            model_name(named)
+        ),
+    };
+    format!(
+        "Used: {used}. The smallest model is taken in hand; each larger one in turn replaces it if its error on left-out \
+         locations is lower by at least the needed number of standard errors. Gain: bounded RMSE of the model in hand less \
+         its own, with the standard error of the paired differences over locations. Errors above {} mm count as that.",
+        number(c.bound_mm, 1),
+    )
 }
 
 /// How well the fit is determined.

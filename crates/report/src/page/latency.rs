@@ -105,11 +105,18 @@ fn notes(grid: &mut Grid, l: &Latency) {
         l.unusable,
         l.shortened,
     ));
-    if l.false_alarms_per_s.value == Some(0.0) && l.background_s > 0.0 {
+    if l.at_risk_s > 0.0 {
         grid.note(format!(
-            "No false alarm in {} s: the interval is the exact Poisson one (up to 3.69 / time); a bootstrap over \
-             locations cannot tell.",
-            number(Some(l.background_s), 1),
+            "False alarms: {} trips more than {} ms before the contact, in {} s from the start of each trial to its contact \
+             or to the trip, which ends the search. The interval is the exact Poisson one.",
+            l.false_detections.len(),
+            number(Some(-l.earliest_ms), 1),
+            number(Some(l.at_risk_s), 1),
+        ));
+    }
+    if let Some(list) = crate::detector::false_detections(l) {
+        grid.note(format!(
+            "Tripped before the contact, and so not detected: {list}."
         ));
     }
     for remark in crate::detector::remarks(l) {
@@ -156,8 +163,8 @@ pub(super) fn from_contact(a: &Analysis) -> Option<Grid> {
     grid.row(part("of it: clocks of the cameras", c.from_clocks_ms));
     grid.row(part("of it: resolution of the contact", c.from_contact_ms));
     grid.note(format!(
-        "{} onsets further before the contact than half the smoothing kernel reaches (false alarms) and {} presses never \
-         detected are not part of the percentiles. Where \
+        "{} presses whose detector tripped before the contact (false alarms) and {} presses never detected are not part of \
+         the percentiles. Where \
          the surface is taken to be shifts all contacts alike and is not in the budget.",
         c.before_contact, c.missed
     ));

@@ -112,6 +112,7 @@ pub(crate) fn render(input: &ReportInput<'_>) -> Result<String, ReportError> {
             n => a.scored_without_exclusions.rmse_mm.n,
         },
         penalised => penalised(a).filter(|_| usable),
+        geometry_note => derive::geometry_note(a),
         threshold_note => threshold_note(a),
         findings => findings::values(&a.findings),
         contents => contents(input),
@@ -236,7 +237,7 @@ fn penalised(a: &Analysis) -> Option<Value> {
     (p.failures > 0 && p.rmse_mm.value.is_some()).then(|| {
         context! {
             value => number(p.rmse_mm.value, 2), interval => interval(&p.rmse_mm, 1.0, 2), n => p.rmse_mm.n,
-            failures => p.failures, penalty => number(Some(p.penalty_mm), 1),
+            failures => p.failures, penalty => number(Some(p.penalty_mm), 1), beyond => p.beyond_penalty,
         }
     })
 }

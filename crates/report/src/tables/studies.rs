@@ -2,7 +2,8 @@
 
 use serde_json::{Value, json};
 use skinrig_analysis::result::{
-    Analysis, Estimate, Latency, Reduction, ReductionCurve, ReductionRow, ReferenceReduction,
+    Analysis, Estimate, Latency, ModelTest, Reduction, ReductionCurve, ReductionRow,
+    ReferenceReduction,
 };
 
 use super::{Table, rounded};
@@ -123,6 +124,11 @@ fn sweep(l: &Latency) -> Table {
         )
         .column("median_ms", rows.iter().map(|r| rounded(r.median_ms, 3)))
         .column("width_ms", rows.iter().map(|r| rounded(r.width_ms, 3)))
+        .column("false_alarms", rows.iter().map(|r| json!(r.false_alarms)))
+        .column(
+            "at_risk_s",
+            rows.iter().map(|r| rounded(Some(r.at_risk_s), 4)),
+        )
         .column(
             "false_alarms_per_s",
             rows.iter().map(|r| rounded(Some(r.false_alarms_per_s), 6)),
@@ -159,12 +165,21 @@ fn course(l: &Latency) -> Table {
 
 fn onsets(l: &Latency) -> Table {
     let onset = l.onsets.iter().map(|(_, t)| rounded(*t, 3));
+    let early = l.onsets.iter().map(|(press, _)| {
+        let tripped = l.false_detections.iter().find(|(p, _)| p == press);
+        rounded(tripped.map(|(_, t)| *t), 3)
+    });
     Table::new()
         .column("press", l.onsets.iter().map(|(p, _)| json!(p)))
         .column("onset_after_contact_ms", onset)
+        .column("false_alarm_after_contact_ms", early)
 }
 
 fn models(rows: &[skinrig_analysis::result::ModelComparison]) -> Table {
+    let test = |of: fn(&ModelTest) -> f64| {
+        rows.iter()
+            .map(move |m| rounded(m.test.as_ref().map(of), 5))
+    };
     let table = Table::new()
         .column("model", rows.iter().map(|m| json!(m.model)))
         .column("parameters", rows.iter().map(|m| json!(m.parameters)));
@@ -179,9 +194,17 @@ fn models(rows: &[skinrig_analysis::result::ModelComparison]) -> Table {
         5,
     )
     .column(
-        "standard_error_mm",
-        rows.iter().map(|m| rounded(m.standard_error_mm, 5)),
+        "bounded_rmse_mm",
+        rows.iter().map(|m| rounded(m.bounded_rmse_mm, 5)),
     )
+    .column(
+        "against",
+        rows.iter().map(|m| json!(m.test.map(|t| t.against))),
+    )
+    .column("gain_mm", test(|t| t.gain_mm))
+    .column("gain_standard_error_mm", test(|t| t.standard_error_mm))
+    .column("gain_in_standard_errors", test(|t| t.ratio))
+    .column("needed_standard_errors", test(|t| t.needed))
     .column(
         "fitted_rmse_mm",
         rows.iter().map(|m| rounded(m.fitted_rmse_mm, 5)),

@@ -260,6 +260,9 @@ pub(crate) fn table(input: &ReportInput<'_>, color: bool) -> String {
             f.rmse_mm.n,
         );
     }
+    if let Some(note) = crate::derive::geometry_note(a).filter(|_| usable) {
+        out += &paint.warn(&wrap("geometry  ", &note));
+    }
     for d in a.depths.iter().filter(|_| usable) {
         let _ = writeln!(
             out,
@@ -295,9 +298,13 @@ pub(crate) fn table(input: &ReportInput<'_>, color: bool) -> String {
     }
     if usable && f.failures > 0 {
         let text = format!(
-            "{} failed, each counted as {} mm where failures count",
+            "{} failed, each counted as {} mm where failures count{}",
             f.failures,
-            number(Some(f.penalty_mm), 1)
+            number(Some(f.penalty_mm), 1),
+            match f.beyond_penalty {
+                0 => String::new(),
+                n => format!("; {n} of them as their own larger error"),
+            }
         );
         out += &wrap("penalty   ", &text);
     }

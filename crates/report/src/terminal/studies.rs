@@ -126,6 +126,10 @@ fn latency(l: &Latency) -> String {
         with(&l.false_alarms_per_s, 1.0, 2)
     );
     let mut out = wrap("detection ", &text);
+    if let Some(list) = crate::detector::false_detections(l) {
+        let text = format!("tripped before the contact, and so not detected: {list}");
+        out += &wrap("          ", &text);
+    }
     out += &match &l.from_contact {
         Some(c) => {
             let text = format!(

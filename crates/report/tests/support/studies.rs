@@ -69,12 +69,17 @@ pub fn latency(noise: &mut Noise, presses: &[PressResult]) -> Latency {
             let onset = 18.0 + 5.0 * noise.normal() + 12.0 * noise.uniform().powi(3);
             let onset = match p.press.index() % 97 {
                 5 => None,
-                6 => Some(-41.0),
+                6 => None,
                 _ => Some(onset),
             };
             (p.press, onset)
         })
         .collect();
+    let early = onsets.iter().filter(|(press, _)| press.0 % 97 == 6);
+    let false_detections = early
+        .map(|(press, _)| (*press, -41.0))
+        .collect::<Vec<_>>()
+        .into_iter();
     let sweep: Vec<ThresholdRow> = (0..20)
         .map(|i| {
             let h = 1.0 + f64::from(i);
@@ -84,11 +89,9 @@ pub fn latency(noise: &mut Noise, presses: &[PressResult]) -> Latency {
                 detected_rate: 1.0 - 0.0001 * h.powf(2.2),
                 median_ms: Some(12.0 + 0.4 * h),
                 width_ms: Some(26.0 + 0.25 * h),
-                false_alarms_per_s: if i < 15 {
-                    38.0 * (-0.62 * h).exp()
-                } else {
-                    0.0
-                },
+                false_alarms: if i < 15 { 60 - 4 * i } else { 3 },
+                at_risk_s: 241.7,
+                false_alarms_per_s: f64::from(if i < 15 { 60 - 4 * i } else { 3 }) / 241.7,
             }
         })
         .collect();
@@ -110,13 +113,21 @@ pub fn latency(noise: &mut Noise, presses: &[PressResult]) -> Latency {
         covered_ms: (700.0, 850.0),
         zero_padded: false,
         decision_delay_ms: 1.4,
-        background_s: 241.7,
+        earliest_ms: -2.6,
+        background_s: 150.0,
+        at_risk_s: 241.7,
         background_rate_per_s: 20_900.0,
         chosen: Some(15),
         detected_rate: estimate(0.983, 0.012, 300),
         width_ms: estimate(28.6, 2.1, 295),
         median_ms: estimate(19.4, 0.8, 295),
-        false_alarms_per_s: estimate(0.08, 0.05, 300),
+        false_alarms_per_s: Estimate {
+            value: Some(3.0 / 241.7),
+            low: Some(0.619 / 241.7),
+            high: Some(8.767 / 241.7),
+            n: 300,
+        },
+        false_detections: false_detections.collect(),
         from_contact: Some(ContactLatency {
             p5_ms: estimate(10.2, 0.9, 295),
             median_ms: estimate(19.5, 0.7, 295),
@@ -162,7 +173,14 @@ pub fn models() -> Vec<ModelComparison> {
         model,
         parameters,
         rmse_mm: estimate(validated, 0.2, 256),
-        standard_error_mm: Some(0.1),
+        bounded_rmse_mm: Some(validated - 0.05),
+        test: (parameters > 0).then_some(ModelTest {
+            against: CalibrationModel::None,
+            gain_mm: 5.87 - validated,
+            standard_error_mm: 0.1,
+            ratio: (5.87 - validated) / 0.1,
+            needed: 1.29,
+        }),
         fitted_rmse_mm: Some(fitted),
         chosen: model == CalibrationModel::Full,
     })
@@ -198,6 +216,7 @@ pub fn threshold() -> ThresholdChoice {
         penalty_mm: 28.3,
         n: 256,
         left_out: 3,
+        chance: Some(0.001),
         candidates: [20, 31, 45, 67, 90, 140, 260, 410, 900, 1900, 3200]
             .map(|e| (e, cost(e)))
             .to_vec(),

@@ -1,17 +1,20 @@
-//! Normal and Student's distribution: probabilities and quantiles.
+//! Normal, Student's and Poisson's distribution: probabilities, quantiles and the exact interval of a count.
 
 /// P(Z <= z) of the standard normal distribution.
-pub(super) fn normal_cdf(z: f64) -> f64 {
+#[must_use]
+pub fn normal_cdf(z: f64) -> f64 {
     0.5 * libm::erfc(-z * std::f64::consts::FRAC_1_SQRT_2)
 }
 
 /// The quantile `p` (0..1) of the standard normal distribution.
-pub(super) fn normal_quantile(p: f64) -> f64 {
+#[must_use]
+pub fn normal_quantile(p: f64) -> f64 {
     invert(p, normal_cdf)
 }
 
 /// P(T <= t) of Student's distribution with `df` degrees of freedom (above 0; they need not be whole).
-pub(super) fn student_cdf(t: f64, df: f64) -> f64 {
+#[must_use]
+pub fn student_cdf(t: f64, df: f64) -> f64 {
     if t.is_infinite() {
         return if t > 0.0 { 1.0 } else { 0.0 };
     }
@@ -24,7 +27,8 @@ pub(super) fn student_cdf(t: f64, df: f64) -> f64 {
 }
 
 /// The quantile `p` (0..1) of Student's distribution with `df` degrees of freedom.
-pub(super) fn student_quantile(p: f64, df: f64) -> f64 {
+#[must_use]
+pub fn student_quantile(p: f64, df: f64) -> f64 {
     invert(p, |t| student_cdf(t, df))
 }
 
@@ -50,6 +54,42 @@ fn invert(p: f64, cdf: impl Fn(f64) -> f64) -> f64 {
     }
     let at = 0.5 * (low + high);
     if p < 0.5 { -at } else { at }
+}
+
+/// P(X <= k) of a Poisson variable with this mean (at least 0): its terms, summed from the largest down.
+#[must_use]
+pub fn poisson_cdf(k: u64, mean: f64) -> f64 {
+    if mean <= 0.0 {
+        return 1.0;
+    }
+    let log_mean = libm::log(mean);
+    let term = |i: u64| libm::exp(i as f64 * log_mean - mean - libm::lgamma(i as f64 + 1.0));
+    // Terms that far below the mean and below k add nothing to a double.
+    let from = (k.min(mean as u64) as f64 - 40.0 * (mean.sqrt() + 1.0)).max(0.0) as u64;
+    (from..=k).rev().map(term).sum::<f64>().min(1.0)
+}
+
+/// The exact two-sided interval of the mean of a Poisson variable that was found to be `count` (Garwood 1936): below its
+/// lower end `count` or more, above its upper end `count` or fewer are seen with a probability of less than `tail`.
+#[must_use]
+pub fn poisson_interval(count: u64, tail: f64) -> (f64, f64) {
+    let spread = 10.0 * (count as f64 + 25.0).sqrt();
+    let solve = |is_above: &dyn Fn(f64) -> bool| {
+        let (mut low, mut high) = (0.0, count as f64 + spread);
+        for _ in 0..100 {
+            let middle = 0.5 * (low + high);
+            if is_above(middle) {
+                high = middle;
+            } else {
+                low = middle;
+            }
+        }
+        0.5 * (low + high)
+    };
+    let low = count.checked_sub(1).map_or(0.0, |fewer| {
+        solve(&|mean| 1.0 - poisson_cdf(fewer, mean) > tail)
+    });
+    (low, solve(&|mean| poisson_cdf(count, mean) < tail))
 }
 
 /// The regularised incomplete beta function I_x(a, b): continued fraction 8.17.22 of the NIST Digital Library of
@@ -112,5 +152,28 @@ mod tests {
         assert!((student_quantile(0.975, 1e7) - 1.959_964).abs() < 1e-5);
         assert_eq!(student_quantile(0.5, 3.0), 0.0);
         assert!((student_cdf(-2.0, 7.3) + student_cdf(2.0, 7.3) - 1.0).abs() < 1e-14);
+    }
+
+    #[test]
+    fn poisson_intervals_are_those_of_the_tables() {
+        // Garwood 1936, two-sided 95 %.
+        for (count, low, high) in [
+            (0, 0.0, 3.6889),
+            (1, 0.0253, 5.5716),
+            (2, 0.2422, 7.2247),
+            (10, 4.7954, 18.3904),
+            (100, 81.3640, 121.6268),
+        ] {
+            let found = poisson_interval(count, 0.025);
+            assert!((found.0 - low).abs() < 1e-4, "{count}: {found:?}");
+            assert!((found.1 - high).abs() < 1e-4, "{count}: {found:?}");
+        }
+        // Large counts: the normal approximation.
+        let (low, high) = poisson_interval(1_000_000, 0.025);
+        assert!(
+            (low / (1e6 - 1960.0) - 1.0).abs() < 1e-5 && (high / (1e6 + 1961.0) - 1.0).abs() < 1e-5
+        );
+        assert!((poisson_cdf(3, 2.0) - 0.857_123_460_498_547).abs() < 1e-14);
+        assert_eq!((poisson_cdf(0, 0.0), poisson_cdf(7, 0.0)), (1.0, 1.0));
     }
 }
