@@ -3,7 +3,7 @@
 
 use skinrig_analysis::analyze;
 use skinrig_analysis::calibrate::{calibrate, choose};
-use skinrig_analysis::clock::{PressSpan, fit_rates};
+use skinrig_analysis::clock::{PressSpan, align_by_rates, fit_rates};
 use skinrig_analysis::dbscan::Dbscan;
 use skinrig_analysis::grid::PixelGrid;
 use skinrig_analysis::kept::Keep;
@@ -146,11 +146,14 @@ fn whole() {
     let scores = ScoreSet::from_presses(&done.presses, &input.outcomes);
     let mut rates = RateHistogram::new(10_000);
     source.0[0].iter().for_each(|e| rates.add(e.t_us));
+    let mut second = RateHistogram::new(10_000);
+    source.0[1].iter().for_each(|e| second.add(e.t_us));
     let spans: Vec<PressSpan> = done
         .presses
         .iter()
-        .filter_map(|p| p.timing)
-        .map(|t| PressSpan {
+        .filter_map(|p| Some((p.role, p.timing?)))
+        .map(|(role, t)| PressSpan {
+            sync: role == PressRole::Sync,
             contact_us: t.contact.0 as f64 * 1e-3,
             release_us: t.release.0 as f64 * 1e-3,
         })
@@ -164,6 +167,10 @@ fn whole() {
     );
     table.row("clock fit from event rates", 1.0, || {
         std::hint::black_box(fit_rates(&rates, &spans).is_ok());
+    });
+    table.row("clocks of both cameras from event rates", 1.0, || {
+        let both = [Some(&rates), Some(&second)];
+        std::hint::black_box(align_by_rates(both, &spans).evidence);
     });
     table.row("calibration", 1.0, || {
         std::hint::black_box(calibrate(&set, &start, CalibrationModel::Full, 1));

@@ -2,26 +2,26 @@
 
 use skinrig_model::{CameraId, PressTiming};
 
-use crate::accumulate::{Accumulated, Accumulator, SLACK_US, Wanted, rate_bin_us};
+use crate::accumulate::{Accumulated, Accumulator, SLACK_US, Wanted};
 use crate::calibrate::Calibrated;
-use crate::clock::{PressSpan, fit_marks, fit_rates};
 use crate::closeups::{Closeups, keep_plans, zoom_plans};
 use crate::error::AnalysisError;
-use crate::held::Held;
 use crate::input::{EventSource, SessionInput};
 use crate::judge::{Judged, Seen, judge};
 use crate::keeper::KeepPlan;
 use crate::kept::{Keep, Kept, KeptPress};
 use crate::metrics::{Exclusions, metrics, penalised};
 use crate::rates::RateHistogram;
+use crate::reading::{Reading, Readings, spans};
 use crate::result::{
-    ANALYSIS_VERSION, Activity, Alignment, Analysis, ClockFit, ClockMap, ContactTiming,
-    DepthResult, MapName, OffSensor, PressPicture, PressResult, PressView, RateSeries, RateZoom,
+    ANALYSIS_VERSION, Activity, Alignment, AlignmentStatus, Analysis, ClockFit, ClockMap,
+    ContactTiming, DepthResult, MapName, OffSensor, PressPicture, PressResult, PressView,
+    RateSeries, RateZoom, RatesEvidence,
 };
 use crate::segment::{Window, windows};
 use crate::sets::ScoreSet;
-use crate::timebase::{Tie, Ties, TimeBase};
-use crate::untimed::{self, Untimed};
+use crate::timebase::{Ties, TimeBase};
+use crate::untimed::Untimed;
 use crate::{audit, bit_rates, caveats, check, cmre, coverage, latency, legs, reduction, verdict};
 
 /// Windows that share less than this, µs, only touch: their ends are rounded.
@@ -58,10 +58,16 @@ pub fn analyze_and_keep(
     let legs = legs::clocks(input, base.as_ref());
     let pressed = spans(input).into_iter().map(|s| s.contact_us);
     let nominal = legs::nominal_only(&input.legs, &legs, pressed);
+    let Readings {
+        cameras: [reading_one, reading_two],
+        evidence,
+        violations,
+    } = Readings::new(input, source, base.as_ref())?;
     let [one, two] = std::thread::scope(|scope| {
+        let plan = &plan;
         let second =
-            scope.spawn(|| camera_pass(input, source, CameraId::Two, &plan, base.as_ref()));
-        let first = camera_pass(input, source, CameraId::One, &plan, base.as_ref());
+            scope.spawn(move || camera_pass(input, source, CameraId::Two, plan, reading_two));
+        let first = camera_pass(input, source, CameraId::One, plan, reading_one);
         let second = match second.join() {
             Ok(result) => result,
             Err(panic) => std::panic::resume_unwind(panic),
@@ -147,7 +153,7 @@ pub fn analyze_and_keep(
         rig: input.rig,
         geometry,
         counts,
-        alignment,
+        alignment: judged_by_rates(alignment, evidence, violations),
         clocks: [one.clock, two.clock],
         legs,
         contact_timing: contact_timing(input, scheduled),
@@ -203,6 +209,25 @@ fn uncertified(clocks: [Option<ClockFit>; 2]) -> Alignment {
             .filter_map(|(fit, name)| Some(ClockMap::of_line(name, &fit?)))
             .collect(),
         ..Alignment::default()
+    }
+}
+
+/// With what an alignment by event rates says of itself.
+fn judged_by_rates(
+    found: Alignment,
+    rates: Option<RatesEvidence>,
+    violations: Vec<String>,
+) -> Alignment {
+    let status = if violations.is_empty() {
+        found.status
+    } else {
+        AlignmentStatus::Invalid
+    };
+    Alignment {
+        status,
+        violations: [found.violations, violations].concat(),
+        rates,
+        ..found
     }
 }
 
@@ -300,67 +325,20 @@ fn camera_pass(
     source: &dyn EventSource,
     camera: CameraId,
     plan: &Closeups,
-    base: Option<&TimeBase>,
+    reading: Reading,
 ) -> Result<CameraResult, AnalysisError> {
     let settings = &input.settings;
     let k = camera.index();
-    let base_clock = base.and_then(|b| b.clocks[k]);
-    let mut warnings: Vec<String> = Vec::new();
-    let mut rates = Some(RateHistogram::new(rate_bin_us(settings)));
-    let mut activity = None;
-    let mut held = None;
-    let mut off_sensor = OffSensor::default();
-    let by_marks = |channel| fit_marks(&input.edges[k], channel, &input.marks);
-    let marks = input
-        .rig
-        .trigger_channel
-        .filter(|_| base_clock.is_none())
-        .and_then(by_marks);
-    let untimed = untimed::rows(input, camera, base, marks.as_ref());
-    let by_marks = |u: &&Untimed| u.tie == Tie::Mark;
-    let far = untimed.iter().flatten().filter(by_marks).count();
-    if far > 0 {
-        warnings.push(format!(
-            "{far} presses are more than {} s from the nearest trigger mark that was seen: they are not timed",
-            input.settings.alignment.max_tie_distance_us * 1e-6
-        ));
-    }
-    let clock = if base_clock.is_some() {
-        base_clock
-    } else if let Some(found) = marks {
-        warnings.extend(found.warnings);
-        Some(found.fit)
-    } else {
-        if !input.marks.is_empty() {
-            warnings.push(format!(
-                "too few trigger marks to fit the clock ({} sent, {} edges seen): event rates are used instead",
-                input.marks.len(),
-                input.edges[k].len()
-            ));
-        }
-        let wanted = Wanted {
-            rates: rates.take(),
-            held: Some(Held::default()),
-            ..Wanted::default()
-        };
-        let empty = Accumulator::new(camera, settings, wanted);
-        let first = pass(source, camera, empty)?;
-        (rates, activity, held) = (first.rates, first.activity, first.held);
-        off_sensor = first.off_sensor;
-        let found = rates
-            .as_ref()
-            .map_or_else(|| Err(String::new()), |r| fit_rates(r, &spans(input)));
-        match found {
-            Ok(found) => {
-                warnings.extend(found.warnings);
-                Some(found.fit)
-            }
-            Err(why) => {
-                warnings.push(format!("no clock alignment: {why}"));
-                None
-            }
-        }
-    };
+    let Reading {
+        clock,
+        rates,
+        read,
+        activity,
+        held,
+        untimed,
+        off_sensor,
+        mut warnings,
+    } = reading;
     let list = clock.map_or_else(Vec::new, |c| {
         windows(timings(input), &input.earlier, &c, settings)
     });
@@ -378,12 +356,7 @@ fn camera_pass(
             off_sensor,
         },
         (Some(clock), rates) => {
-            let aligned_by_rates = clock.method == crate::result::ClockMethod::EventRates;
-            let (fresh, known) = if aligned_by_rates {
-                (None, rates)
-            } else {
-                (rates, None)
-            };
+            let (fresh, known) = if read { (None, rates) } else { (rates, None) };
             let wanted = Wanted {
                 windows: &list,
                 pictured: &plan.pictures,
@@ -463,7 +436,7 @@ fn camera_pass(
     })
 }
 
-fn pass(
+pub(crate) fn pass(
     source: &dyn EventSource,
     camera: CameraId,
     mut accumulator: Accumulator<'_>,
@@ -472,17 +445,6 @@ fn pass(
         .for_each_slice(camera, &mut |events| accumulator.take(events))
         .map_err(|message| AnalysisError::Events { camera, message })?;
     accumulator.finish()
-}
-
-fn spans(input: &SessionInput) -> Vec<PressSpan> {
-    let mut spans: Vec<PressSpan> = timings(input)
-        .map(|(_, t)| PressSpan {
-            contact_us: t.contact.0 as f64 * 1e-3,
-            release_us: t.release.0 as f64 * 1e-3,
-        })
-        .collect();
-    spans.sort_by(|a, b| a.contact_us.total_cmp(&b.contact_us));
-    spans
 }
 
 pub(crate) fn by_row(rows: usize, views: Vec<(usize, PressView)>) -> Vec<Option<PressView>> {

@@ -39,6 +39,7 @@ pub mod metrics;
 pub mod motion;
 mod pixels;
 pub mod rates;
+mod reading;
 pub mod reduction;
 pub mod reference_code;
 pub mod result;

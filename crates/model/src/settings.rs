@@ -253,6 +253,11 @@ pub struct AlignmentSettings {
     pub max_tie_distance_us: f64,
     /// The robot's poses are stamped late by at most this, µs: one interval of a 1 kHz stream. Stated, not measured.
     pub robot_delay_us: f64,
+    /// Least share of the planned presses within a recording that have a burst in the event rates, and of the bursts among the
+    /// planned presses that are one of them, where clocks are aligned by event rates: with less, the plan is not what was done.
+    pub min_explained: f64,
+    /// Least natural logarithm of the odds of an alignment by event rates against all others together. 7: 1100 to 1.
+    pub min_log_odds: f64,
 }
 
 impl Default for AlignmentSettings {
@@ -267,6 +272,8 @@ impl Default for AlignmentSettings {
             min_coverage: 0.85,
             max_tie_distance_us: 2_500_000.0,
             robot_delay_us: 1_000.0,
+            min_explained: 0.5,
+            min_log_odds: 7.0,
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Owns how numbers are written for people: digits, units, intervals, the dash for "no value".
 
-use skinrig_analysis::result::Estimate;
+use skinrig_analysis::result::{Estimate, RatesEvidence};
 
 /// What stands where there is no value.
 pub(crate) const NONE: &str = "–";
@@ -69,6 +69,26 @@ pub(crate) fn sentence(remark: &str) -> String {
     let first = letters.next().map(char::to_uppercase);
     let first = first.into_iter().flatten();
     first.chain(letters).chain(['.']).collect()
+}
+
+/// How sure an alignment by event rates is, as a clause.
+pub(crate) fn by_rates(evidence: &RatesEvidence) -> String {
+    let mut parts = vec![format!(
+        "by event rates, log-odds {} against all other alignments",
+        number(Some(evidence.log_odds), 1)
+    )];
+    for (k, sights) in evidence.cameras.iter().enumerate() {
+        if let Some(s) = sights {
+            parts.push(format!(
+                "camera {}: {} of {} presses found, {} bursts unexplained",
+                k + 1,
+                s.found,
+                s.expected,
+                s.unexplained
+            ));
+        }
+    }
+    parts.join(", ")
 }
 
 /// The text, or "not recorded" when it is empty.

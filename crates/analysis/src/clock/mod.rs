@@ -1,13 +1,19 @@
 //! Camera clocks: where host time lies on a camera's clock, and how surely.
 
+mod activity;
+mod bursts;
 mod correlate;
 pub(crate) mod line;
 mod marks;
 mod presses;
+mod refine;
+mod search;
+mod shifts;
+mod tally;
 
 pub use line::{Line, Pair, fit as fit_line};
 pub use marks::{MarksFit, fit_marks};
-pub use presses::{PressSpan, RatesFit, fit_rates};
+pub use presses::{PressSpan, RatesAlignment, RatesFit, align_by_rates, fit_rates};
 
 use skinrig_model::HostTime;
 

@@ -31,6 +31,9 @@ pub struct Alignment {
     pub maps: Vec<ClockMap>,
     /// The trigger input of each camera; empty when not certified.
     pub lines: Vec<LineCounts>,
+    /// How sure an alignment by event rates is; `None` where no camera was aligned by them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rates: Option<RatesEvidence>,
     /// How often the trigger box lost its clock.
     pub resets: u32,
     /// The map from host to camera time, piecewise affine between these knots, for camera 1 and camera 2.
@@ -38,6 +41,35 @@ pub struct Alignment {
     /// What each fitted map leaves of its points, for drawing; empty when not certified.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub residuals: Vec<ClockResiduals>,
+}
+
+/// How sure an alignment by the presses in the event rates is: against all shifts of the plan over the recordings, both cameras
+/// judged together, bursts outside the plan included.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct RatesEvidence {
+    /// Natural logarithm of the odds of the alignment against all others together, and against the plan being foreign to
+    /// the recordings.
+    pub log_odds: f64,
+    /// How much later the planned presses come in each camera by the likeliest other alignment, s; `None` when none is likelier
+    /// than a plan that is foreign to the recordings.
+    pub runner_up_s: Option<[f64; 2]>,
+    /// Usual time from one planned press to the next, s.
+    pub period_s: f64,
+    /// What each camera saw of the plan; `None` for one that was not aligned by its event rates.
+    pub cameras: [Option<RatesSights>; 2],
+}
+
+/// What one camera saw of the planned presses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct RatesSights {
+    /// Planned presses within the recording.
+    pub expected: u32,
+    /// Of them, those with a burst of events.
+    pub found: u32,
+    /// Bursts that no planned press explains.
+    pub unexplained: u32,
+    /// Of them, those between the first and the last planned press, but for presses in the plan's rhythm.
+    pub strays: u32,
 }
 
 impl Alignment {

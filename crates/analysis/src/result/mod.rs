@@ -11,6 +11,7 @@ mod reference;
 
 pub use alignment::{
     Alignment, AlignmentStatus, ClockMap, ClockResidual, ClockResiduals, Knot, LineCounts, MapName,
+    RatesEvidence, RatesSights,
 };
 pub use audit::{Fault, Finding, Law};
 pub use calibration::{CalibrationResult, ModelComparison, ModelTest, ThresholdChoice};

@@ -145,6 +145,7 @@ impl TimeBase {
             status: AlignmentStatus::Valid,
             violations: Vec::new(),
             warnings: Vec::new(),
+            rates: None,
             maps: base.maps(&base.timed(ties.used_at_us, limits), limits),
             lines: [0, 1].map(|k| base.counts(k)).to_vec(),
             resets,

@@ -5,7 +5,7 @@ use std::path::Path;
 use skinrig_formats::Decoder;
 use skinrig_model::{CameraId, StreamFormat};
 
-use crate::dataset::{DRIFT_PPM, Dataset, OFFSET_US, PRESSES, events, positions};
+use crate::dataset::{DRIFT_PPM, Dataset, OFFSET_US, PRESSES, csv, events, positions};
 use crate::replay::assert_replays;
 /// The event rates are looked at in bins of 10 ms.
 const WITHIN_US: f64 = 25_000.0;
@@ -69,6 +69,53 @@ fn a_dataset_is_imported_its_clocks_aligned_and_its_presses_located() {
         assert!(stored == events(camera), "{camera}");
     }
     skinrig(&["verify", &text(&session)]).code(0);
+}
+
+#[test]
+fn more_presses_than_the_schedule_says_are_told_apart_by_the_sync_presses_or_the_session_is_invalid()
+ {
+    let lab = Lab::new();
+    let data = Dataset::new(&lab);
+    std::fs::write(&data.presses, csv(&positions()[..PRESSES - 3])).unwrap();
+    let import = |folder: &str, set: &[&str]| {
+        let mut arguments = data.arguments(&lab.path(folder));
+        for key in [&["presses_per_repetition=9"], set].concat() {
+            arguments.extend(["--set".to_owned(), key.to_owned()]);
+        }
+        skinrig(&arguments)
+    };
+    import("s", &[]).code(0);
+    let results = read_json(&only(&lab.path("s"), ".results.json"));
+    assert_eq!(results["valid"], true);
+    let evidence = &results["analysis"]["alignment"]["rates"];
+    assert!(evidence["log_odds"].as_f64().unwrap() > 7.0, "{evidence:#}");
+    for (k, planted_us) in OFFSET_US.into_iter().enumerate() {
+        assert_eq!(evidence["cameras"][k]["unexplained"], 3, "{evidence:#}");
+        let found_us = results["analysis"]["clocks"][k]["offset_us"]
+            .as_f64()
+            .unwrap();
+        assert!(
+            (found_us - planted_us).abs() < 2.0 * WITHIN_US,
+            "{found_us}"
+        );
+    }
+
+    // A single sync press in step with the path: nothing says which of the presses are the planned ones.
+    let said = import("t", &["sync.count=1", "sync.pause_after=1.5 s"]).code(4);
+    said.complains(&["INVALID", "log-odds", "all other alignments", "next:"]);
+    let results = read_json(&only(&lab.path("t"), ".results.json"));
+    assert_eq!(results["valid"], false);
+    assert!(
+        said.out.contains("INVALID   alignment by event rates"),
+        "{said:?}"
+    );
+    assert!(
+        said.out.contains("RMSE                     INVALID"),
+        "{said:?}"
+    );
+    let page = std::fs::read_to_string(only(&lab.path("t"), ".report.html")).unwrap();
+    assert!(page.contains("data-testid=\"invalid\""));
+    skinrig(&["analyze", &text(&only(&lab.path("t"), ".session.sqlite"))]).code(4);
 }
 
 #[test]

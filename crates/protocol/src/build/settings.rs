@@ -219,6 +219,8 @@ fn alignment(f: &Field) -> Option<AlignmentSettings> {
         min_coverage: f.number("min_coverage")?,
         max_tie_distance_us: microseconds("max_tie_distance")?,
         robot_delay_us: microseconds("robot_delay")?,
+        min_explained: f.number("min_explained")?,
+        min_log_odds: f.number("min_log_odds")?,
     })
 }
 

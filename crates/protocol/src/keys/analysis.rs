@@ -547,6 +547,18 @@ pub(crate) static ALIGNMENT: Table = Table {
             "1 ms",
             "The robot's poses are stamped late by at most this; stated, not measured.",
         ),
+        default(
+            "min_explained",
+            SHARE,
+            "0.5",
+            "Where clocks are aligned by event rates: least share of the planned presses that are found, and of the bursts among them that are planned presses.",
+        ),
+        default(
+            "min_log_odds",
+            Shape::Number(Range::from_zero(1000.0)),
+            "7",
+            "Least natural logarithm of the odds of an alignment by event rates against all others together; 7 is 1100 to 1.",
+        ),
     ],
     exactly_one: &[],
 };

@@ -3,7 +3,7 @@
 use skinrig_analysis::result::{Alignment, AlignmentStatus, Analysis};
 
 use super::grid::Grid;
-use crate::format::{NONE, number};
+use crate::format::{NONE, by_rates, number, sentence};
 
 /// One row per map between two clocks.
 pub(super) fn maps(a: &Analysis) -> Option<Grid> {
@@ -46,8 +46,11 @@ pub(super) fn maps(a: &Analysis) -> Option<Grid> {
         ]);
     }
     grid.note(words(certificate));
+    if let Some(evidence) = &certificate.rates {
+        grid.note(sentence(&by_rates(evidence)));
+    }
     for warning in &certificate.warnings {
-        grid.note(crate::format::sentence(warning));
+        grid.note(sentence(warning));
     }
     grid.note(
         "The interval of host from box holds for certain: the box's clock was read between two instants of the host. Robot \

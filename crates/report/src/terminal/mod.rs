@@ -408,37 +408,37 @@ fn left_out(a: &Analysis, sync: bool) -> String {
 
 /// The alignment certificate in a line or two.
 fn alignment_lines(certificate: &Alignment) -> String {
+    let mut parts = Vec::new();
+    for (name, what) in [
+        (MapName::Camera1FromBox, "camera 1"),
+        (MapName::Camera2FromBox, "camera 2"),
+        (MapName::HostFromBox, "host"),
+    ] {
+        if let Some(half_us) = certificate.interval_us(name) {
+            parts.push(format!("{what} ± {} µs", number(Some(half_us), 1)));
+        }
+    }
+    for (k, line) in certificate.lines.iter().enumerate() {
+        let extra = line.doubled + line.spurious;
+        parts.push(format!(
+            "input {}: {} % lost, {} % doubled or spurious",
+            k + 1,
+            number(Some(100.0 * line.share(line.lost)), 1),
+            number(Some(100.0 * line.share(extra)), 1)
+        ));
+    }
+    let verdict = match certificate.status {
+        AlignmentStatus::Valid => "valid",
+        AlignmentStatus::Invalid => "INVALID",
+        AlignmentStatus::NotCertified => "not certified: no usable reports of a trigger box",
+    };
+    let by_box = (!parts.is_empty()).then(|| format!("on the box's clock {}", parts.join(", ")));
+    let by_rates = certificate.rates.as_ref().map(crate::format::by_rates);
+    let figures: Vec<String> = [by_box, by_rates].into_iter().flatten().collect();
     let text = match certificate.status {
-        AlignmentStatus::NotCertified => {
-            "not certified: no usable reports of a trigger box".to_owned()
-        }
-        status => {
-            let mut parts = Vec::new();
-            for (name, what) in [
-                (MapName::Camera1FromBox, "camera 1"),
-                (MapName::Camera2FromBox, "camera 2"),
-                (MapName::HostFromBox, "host"),
-            ] {
-                if let Some(half_us) = certificate.interval_us(name) {
-                    parts.push(format!("{what} ± {} µs", number(Some(half_us), 1)));
-                }
-            }
-            for (k, line) in certificate.lines.iter().enumerate() {
-                let extra = line.doubled + line.spurious;
-                parts.push(format!(
-                    "input {}: {} % lost, {} % doubled or spurious",
-                    k + 1,
-                    number(Some(100.0 * line.share(line.lost)), 1),
-                    number(Some(100.0 * line.share(extra)), 1)
-                ));
-            }
-            let verdict = if status == AlignmentStatus::Valid {
-                "valid"
-            } else {
-                "INVALID"
-            };
-            format!("{verdict}: on the box's clock {}", parts.join(", "))
-        }
+        _ if figures.is_empty() => verdict.to_owned(),
+        AlignmentStatus::NotCertified => format!("{verdict}; {}", figures.join("; ")),
+        _ => format!("{verdict}: {}", figures.join("; ")),
     };
     wrap("alignment ", &text)
 }
