@@ -95,7 +95,7 @@ fn gather(sessions: &[SessionSummary]) -> Vec<Prototype> {
         *count += 1;
         last.clone_from(started_at);
         let (rmse_mm, without) = match summary(&session.path, session_id) {
-            Ok(found) if !found.valid => (None, Some("INVALID: clocks not known".to_owned())),
+            Ok(found) if !found.valid => (None, Some("INVALID: not to be used".to_owned())),
             Ok(found) if found.rmse_mm.value.is_none() => {
                 (None, Some("no scored press located".to_owned()))
             }

@@ -23,7 +23,8 @@ pub struct Summary {
     pub analysis_version: u32,
     /// Hash of its result.
     pub results_hash: String,
-    /// False when the numbers are not to be used: the clocks are not known well enough.
+    /// False when the numbers are not to be used: its clocks are not known well enough, or the audit found
+    /// that positions, cameras or rows are others than they are taken for.
     pub valid: bool,
     /// How the presses ended.
     pub counts: PressCounts,
@@ -42,7 +43,7 @@ impl Summary {
             session_id: input.provenance.session_id.clone(),
             analysis_version: analysis.version,
             results_hash: input.provenance.results_hash.clone(),
-            valid: analysis.alignment.is_usable(),
+            valid: analysis.is_valid(),
             counts: analysis.counts,
             rmse_mm: scored.rmse_mm,
             repeat_std_mm: scored.repeat_std_mm,
@@ -70,6 +71,6 @@ pub(crate) fn json(input: &ReportInput<'_>) -> Value {
         "comparison": comparison::rows(input.analysis),
         "provenance": input.provenance,
         "summary": Summary::of(input),
-        "valid": input.analysis.alignment.is_usable(),
+        "valid": input.analysis.is_valid(),
     })
 }

@@ -45,5 +45,6 @@ fn finding(law: Law, fault: Fault, camera: Option<CameraId>, evidence: String) -
         camera,
         evidence,
         advice: advice::of(fault).to_owned(),
+        invalidates: fault.invalidates(),
     }
 }
