@@ -4,10 +4,11 @@ use crate::result::{Fault, Finding};
 
 /// The findings that do not follow from a more certain one, the most certain first.
 pub fn leading_first(mut found: Vec<Finding>) -> Vec<Finding> {
-    found.sort_by_key(|f| place(f.fault));
+    found.sort_by_key(|f| (place(f.fault), !f.invalidates));
     let mut kept: Vec<Finding> = Vec::new();
     for finding in found {
-        if !kept.iter().any(|k| explains(k, &finding)) {
+        let again = |k: &Finding| k.fault == finding.fault && k.camera == finding.camera;
+        if !kept.iter().any(|k| again(k) || explains(k, &finding)) {
             kept.push(finding);
         }
     }

@@ -281,7 +281,8 @@ impl Sample {
 
 #[cfg(test)]
 mod tests {
-    use skinrig_nightly::{Cause, RULES};
+    use skinrig_nightly::Cause;
+    use skinrig_nightly::rules::RULES;
 
     use super::*;
 
