@@ -274,7 +274,7 @@ fn judge(run: &Run, fault: PlantedFault, without: &Ideal) -> Cell {
         }
     }
     let analysis = analyze_session(&run.path, Choices::default()).map(|r| r.analysis);
-    let usable = analysis.as_ref().is_ok_and(|a| a.alignment.is_usable());
+    let usable = analysis.as_ref().is_ok_and(|a| a.is_valid());
     if let Ok(analysis) = &analysis
         && usable
     {
@@ -420,11 +420,7 @@ fn each_fault_in_each_phase_ends_as_documented() {
     let analysis = analyze_session(&ideal.path, Choices::default())
         .unwrap()
         .analysis;
-    assert!(
-        analysis.alignment.is_usable(),
-        "{:?}",
-        analysis.alignment.violations
-    );
+    assert!(analysis.is_valid(), "{:?}", analysis.invalid_because());
     let presses: BTreeMap<_, _> = analysis.presses.into_iter().map(|p| (p.press, p)).collect();
     let timings: Vec<PressTiming> = presses.values().filter_map(|p| p.timing).collect();
     let recorded = recorded(&SessionReader::open(&ideal.path).unwrap());

@@ -3,6 +3,7 @@
 use skinrig_model::{CameraId, PressTiming};
 
 use crate::accumulate::{Accumulated, Accumulator, SLACK_US, Wanted};
+use crate::audit::Streams;
 use crate::calibrate::Calibrated;
 use crate::closeups::{Closeups, keep_plans, zoom_plans};
 use crate::error::AnalysisError;
@@ -20,8 +21,9 @@ use crate::result::{
 };
 use crate::segment::{Window, windows};
 use crate::sets::ScoreSet;
-use crate::timebase::{Ties, TimeBase};
-use crate::untimed::Untimed;
+use crate::stream::{Silences, contacts_s};
+use crate::timebase::{Tie, Ties, TimeBase};
+use crate::untimed::{self, Untimed};
 use crate::{audit, bit_rates, caveats, check, cmre, coverage, latency, legs, reduction, verdict};
 
 /// Windows that share less than this, µs, only touch: their ends are rounded.
@@ -127,6 +129,10 @@ pub fn analyze_and_keep(
         );
     }
     let [mut one, mut two] = cameras;
+    let streams = Streams {
+        silences: [&mut one, &mut two].map(|c| std::mem::take(&mut c.silences)),
+        contacts_s: [&mut one, &mut two].map(|c| std::mem::take(&mut c.contacts_s)),
+    };
     let kept = paired(
         &presses,
         &plan,
@@ -179,7 +185,7 @@ pub fn analyze_and_keep(
         zooms: [one.zooms, two.zooms].concat(),
         motion: None,
     };
-    evaluate(&mut analysis, input, &kept);
+    evaluate(&mut analysis, input, &streams, &kept);
     Ok((analysis, kept))
 }
 
@@ -242,10 +248,10 @@ fn contact_timing(input: &SessionInput, scheduled: bool) -> ContactTiming {
 }
 
 /// Fills in what stands on the finished table of presses. The parts look at the table only, not at each other.
-fn evaluate(analysis: &mut Analysis, input: &SessionInput, kept: &Kept) {
+fn evaluate(analysis: &mut Analysis, input: &SessionInput, streams: &Streams, kept: &Kept) {
     let table = &*analysis;
     let (findings, (coverage, cmre, bit_rates)) = rayon::join(
-        || audit::audit(input, table),
+        || audit::audit(input, table, streams),
         || {
             (
                 coverage::coverage(table),
@@ -271,6 +277,9 @@ struct CameraResult {
     views: Vec<Option<PressView>>,
     data_lost: Vec<bool>,
     untimed: Vec<Option<Untimed>>,
+    silences: Silences,
+    /// Contacts that stand out of the counts, s on the host's clock, where a schedule lists the presses.
+    contacts_s: Vec<f64>,
     pictures: Vec<PressPicture>,
     zooms: Vec<RateZoom>,
     kept: Vec<KeepPlan>,
@@ -414,6 +423,8 @@ fn camera_pass(
             off_sensor.events, off_sensor.of
         ));
     }
+    let (silences, contacts_s) = stream(input, &collected, clock.as_ref());
+    let lost = [&input.gaps[k][..], &silences.spans()].concat();
     let series = collected
         .rates
         .map(|r| r.series(clock.as_ref()))
@@ -422,7 +433,9 @@ fn camera_pass(
         clock,
         rates: series,
         views: by_row(input.planned.len(), collected.views),
-        data_lost: lost_rows(input.planned.len(), &list, &input.gaps[k]),
+        data_lost: lost_rows(input.planned.len(), &list, &lost),
+        silences,
+        contacts_s,
         untimed,
         pictures: collected.pictures,
         zooms: collected.zooms,
@@ -434,6 +447,36 @@ fn camera_pass(
             .map(|w| format!("{camera}: {w}"))
             .collect(),
     })
+}
+
+/// What the counts of a camera say by themselves.
+fn stream(
+    input: &SessionInput,
+    collected: &Accumulated,
+    clock: Option<&ClockFit>,
+) -> (Silences, Vec<f64>) {
+    let (Some(rates), Some(clock)) = (&collected.rates, clock) else {
+        return (Silences::default(), Vec::new());
+    };
+    let pressed = spans(input);
+    let (Some(first), Some(last)) = (pressed.first(), pressed.last()) else {
+        return (Silences::default(), Vec::new());
+    };
+    let ends = (
+        clock.camera_us(first.contact_us),
+        clock.camera_us(last.release_us),
+    );
+    let views = collected.views.iter().map(|(_, view)| *view);
+    let silences = Silences::new(rates, views, ends);
+    let scheduled = input.outcomes.iter().flatten().any(|o| o.scheduled);
+    let contacts_s = if scheduled {
+        let listed = pressed.iter();
+        let listed = listed.map(|s| (s.contact_us * 1e-6, s.release_us * 1e-6));
+        contacts_s(rates, clock, &listed.collect::<Vec<_>>())
+    } else {
+        Vec::new()
+    };
+    (silences, contacts_s)
 }
 
 pub(crate) fn pass(

@@ -93,9 +93,9 @@ pub enum AnalysisError {
         /// The most that there may be.
         most: usize,
     },
-    /// The session is invalid: its clocks are not known well enough.
-    #[error("the session is INVALID: its clocks are not known well enough: {0}")]
-    NotAligned(String),
+    /// The session is invalid: none of its numbers is to be used.
+    #[error("the session is INVALID: {0}")]
+    Invalid(String),
     /// No press can be located in any way.
     #[error(
         "expected scored presses with measured times in the clocks of both cameras, found none; `skinrig analyze` says what is missing"

@@ -11,7 +11,7 @@
 mod accumulate;
 mod activity;
 mod analyze;
-pub mod audit;
+mod audit;
 pub mod bit_rates;
 pub mod calibrate;
 mod caveats;
@@ -46,6 +46,7 @@ pub mod result;
 pub mod seeded;
 pub mod segment;
 pub mod sets;
+mod stream;
 pub mod sums;
 pub mod timebase;
 pub mod tradeoff;

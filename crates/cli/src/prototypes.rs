@@ -101,7 +101,7 @@ fn gather(sessions: &[SessionSummary], analysis: Option<&str>) -> Vec<Prototype>
         last.clone_from(started_at);
         let found = summary(&session.path, session_id, analysis);
         let (rmse_mm, without) = match &found {
-            Ok(found) if !found.valid => (None, Some("INVALID: clocks not known".to_owned())),
+            Ok(found) if !found.valid => (None, Some("INVALID: not to be used".to_owned())),
             Ok(found) if found.rmse_mm.value.is_none() => {
                 (None, Some("no scored press located".to_owned()))
             }

@@ -367,17 +367,21 @@ pub fn print_results(results: &Results, json: bool, paths: &(PathBuf, PathBuf)) 
     }
 }
 
-/// Ok, or code 4 when the session's alignment is invalid or the scored RMSE is above the limit (or there is none to compare).
+/// Ok, or code 4 when the session is INVALID or the scored RMSE is above the limit (or there is none to compare).
 ///
 /// # Errors
 /// [`Failure::limit`].
 pub fn check_limit(results: &Results, max_rmse_mm: Option<f64>) -> Outcome {
-    let alignment = &results.analysis.alignment;
-    if !alignment.is_usable() {
+    let analysis = &results.analysis;
+    if !analysis.is_valid() {
+        let next = if analysis.alignment.is_usable() {
+            "mend what the audit names (its findings say what to do), and import or analyse again"
+        } else {
+            "see the alignment certificate in the report; limits are below `analysis.alignment`"
+        };
         return Err(Failure::limit(format!(
-            "the session is INVALID: its clocks are not known well enough\n  {}\n  \
-             next: see the alignment certificate in the report; limits are below `analysis.alignment`",
-            alignment.violations.join("\n  ")
+            "the session is INVALID: none of its numbers is to be used\n  {}\n  next: {next}",
+            analysis.invalid_because().join("\n  ")
         )));
     }
     let Some(limit) = max_rmse_mm else {

@@ -133,7 +133,7 @@ pub fn tradeoff(args: &TradeoffArgs, json: bool) -> Outcome {
     };
     let measured = measure(&input, &events, plan, &mut thread_cpu_s);
     let result = measured.map_err(|e| match e {
-        AnalysisError::NotAligned(_) => Failure::limit(e),
+        AnalysisError::Invalid(_) => Failure::limit(e),
         other => Failure::input(other),
     })?;
     let answers = answers(&result, args);

@@ -44,7 +44,7 @@ pub struct Row {
 pub fn rows(analysis: &Analysis) -> Vec<Row> {
     let thinned = reduced_row(analysis);
     let cells = |metric| {
-        if !analysis.alignment.is_usable() {
+        if !analysis.is_valid() {
             return (Cell::Text("INVALID"), Cell::Missing);
         }
         (

@@ -30,7 +30,8 @@ pub struct Summary {
     /// Values that were overridden when the session was recorded, as `key=value`.
     #[serde(default)]
     pub overrides: Vec<String>,
-    /// False when the numbers are not to be used: the clocks are not known well enough.
+    /// False when the numbers are not to be used: its clocks are not known well enough, or the audit found
+    /// that positions, cameras or rows are others than they are taken for.
     pub valid: bool,
     /// How the presses ended.
     pub counts: PressCounts,
@@ -51,7 +52,7 @@ impl Summary {
             variant: input.provenance.variant.clone(),
             overrides: input.provenance.overrides.clone(),
             results_hash: input.provenance.results_hash.clone(),
-            valid: analysis.alignment.is_usable(),
+            valid: analysis.is_valid(),
             counts: analysis.counts,
             rmse_mm: scored.rmse_mm,
             repeat_std_mm: scored.repeat_std_mm,
@@ -79,6 +80,6 @@ pub(crate) fn json(input: &ReportInput<'_>) -> Value {
         "comparison": comparison::rows(input.analysis),
         "provenance": input.provenance,
         "summary": Summary::of(input),
-        "valid": input.analysis.alignment.is_usable(),
+        "valid": input.analysis.is_valid(),
     })
 }

@@ -114,6 +114,20 @@ fn an_invalid_session_says_so_in_the_place_of_every_metric() {
     let hero = page.split("data-testid=\"metric-rmse\"").nth(1).unwrap();
     let hero = &hero[..hero.find("</div>").unwrap()];
     assert!(hero.contains("INVALID") && !hero.contains(&rmse), "{hero}");
+
+    // So does a finding after which the numbers are not the skin's.
+    analysis.alignment.status = skinrig_analysis::result::AlignmentStatus::Valid;
+    analysis.alignment.violations.clear();
+    analysis.findings = support::studies::findings();
+    assert!(analysis.is_valid());
+    analysis.findings[0].invalidates = true;
+    let (table, document, _) = read(&analysis);
+    assert!(
+        table.contains("INVALID   cameras swapped: ") && !table.contains(&rmse),
+        "{table}"
+    );
+    assert_eq!(document["valid"], false);
+    assert_eq!(document["summary"]["valid"], false);
 }
 
 #[test]

@@ -8,6 +8,21 @@ pub const fn of(fault: Fault) -> &'static str {
         Fault::CamerasSwapped => {
             "exchange the two camera files of the import (--camera1, --camera2), or the camera serials of the rig"
         }
+        Fault::OneCameraTwice => {
+            "give the import the recording of the other camera, or the rig two different camera serials"
+        }
+        Fault::PictureTurned => {
+            "check how the camera is mounted and whether its recording was mirrored or turned afterwards; record again or turn it back"
+        }
+        Fault::GeometryOff => {
+            "compare the positions of the cameras with the rig description; the calibration makes up for it, but starts far away"
+        }
+        Fault::AxesExchanged => {
+            "compare the columns of the position table with the skin frame of the rig description: which is x, which is y"
+        }
+        Fault::PositionsDisplaced => {
+            "give the positions in the skin frame of the rig description (its origin, not the middle of the skin), or correct the camera positions there"
+        }
         Fault::AxisMirrored => {
             "compare the sign of the axis in the position table with the skin frame of the rig description"
         }
@@ -16,6 +31,21 @@ pub const fn of(fault: Fault) -> &'static str {
         }
         Fault::IndexShifted => {
             "compare the first and last rows of the press list with the recording: rows too many or too few, sync presses"
+        }
+        Fault::OrderOfPresses => {
+            "use the press list of this very recording, row by row in the order in which it was pressed"
+        }
+        Fault::PressesUnlisted => {
+            "correct presses_per_repetition and repetitions of the schedule, and the press list, to what was recorded"
+        }
+        Fault::SyncPattern => {
+            "correct sync.count, sync.interval and sync.pause_after of the schedule to what was recorded"
+        }
+        Fault::RecordingShort => {
+            "find out why the camera started late or stopped early; the presses that it has not recorded do not count"
+        }
+        Fault::RecordingGap => {
+            "check cable, power and load of the computer; the presses in the gap do not count"
         }
         Fault::CameraBlind => {
             "look at the event pictures: lens cap, light, focus, hot pixels, rows of the crop, cable"

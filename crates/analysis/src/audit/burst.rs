@@ -42,7 +42,10 @@ pub fn findings(analysis: &Analysis, touches: &[Touch<'_>]) -> Vec<Finding> {
             "expected events to burst in presses, found {:.1} standard errors above idle in the median of {} (camera 1) and {:.1} of {} (camera 2){but}",
             a.0, a.1, b.0, b.1
         );
-        return vec![finding(Law::BurstWithMotion, fault, None, evidence)];
+        let mut found = finding(Law::BurstWithMotion, fault, None, evidence);
+        // What was located was not the presses.
+        found.invalidates = true;
+        return vec![found];
     }
     let mut found: Vec<Finding> = Vec::new();
     for (camera, blind) in CameraId::ALL.into_iter().zip(blind) {

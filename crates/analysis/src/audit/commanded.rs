@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use skinrig_model::{Point2, PressRole};
 
 use super::finding;
+use super::frames::Frame;
 use super::statistics::median;
 use super::touch::Touch;
 use crate::input::SessionInput;
@@ -22,8 +23,6 @@ const MOST_SPEED_FACTOR: f64 = 2.0;
 const MOST_PRESSES: f64 = 0.2;
 /// A statement needs this many presses.
 const LEAST_PRESSES: usize = 4;
-/// Factors between units of length that are in use: m and cm for mm, inches, and the reverse.
-const FACTORS: [f64; 6] = [1e-3, 0.1, 1.0 / 25.4, 1e3, 10.0, 25.4];
 /// A path smaller than this share of the skin is in another unit when the centroids say that it is not small.
 const SMALL_PATH: f64 = 0.01;
 /// Columns that scatter by more than this in the median do not come from such a small path, px.
@@ -106,31 +105,19 @@ fn position(input: &SessionInput, path: &[&Touch<'_>]) -> Option<Finding> {
     if off <= MOST_OFF_MM {
         return None;
     }
-    let centre = input.rig.outline.centre;
-    let mut readings: Vec<Reading> = Vec::new();
-    for factor in FACTORS {
-        let scaled = |p: Point2| Point2::new(factor * p.x_mm, factor * p.y_mm);
-        let what = format!("the planned ones times {factor:.3}");
-        readings.push((Fault::UnitOfPositions, what, residual_mm(path, 0, scaled)));
-    }
-    for (about, name) in [(Point2::default(), "0"), (centre, "the skin's centre")] {
-        for (x, y, axes) in [
-            (true, false, "x"),
-            (false, true, "y"),
-            (true, true, "x and y"),
-        ] {
-            let flip = |v: f64, c: f64, yes: bool| if yes { 2.0 * c - v } else { v };
-            let mirrored =
-                |p: Point2| Point2::new(flip(p.x_mm, about.x_mm, x), flip(p.y_mm, about.y_mm, y));
-            let what = format!("the planned ones with {axes} mirrored about {name}");
-            readings.push((Fault::AxisMirrored, what, residual_mm(path, 0, mirrored)));
-        }
-    }
+    let mut readings: Vec<Reading> = Frame::all(&input.rig.outline)
+        .into_iter()
+        .chain(displaced(path))
+        .map(|frame| {
+            let left = residual_mm(path, 0, |p| frame.skin(p));
+            (frame.fault, format!("with {}", frame.words), left)
+        })
+        .collect();
     for by in (1..=MOST_SHIFT).flat_map(|k| [k, -k]) {
-        let what = format!("the planned ones {by:+} rows on");
+        let what = format!("of the planned ones {by:+} rows on");
         readings.push((Fault::IndexShifted, what, residual_mm(path, by, |p| p)));
     }
-    // A reading fits when what is left is small against the positions that it predicts.
+    // A reading fits when what is left is small against the planned positions.
     let fits = |(_, _, r): &Reading| {
         r.is_some_and(|(left, extent)| left < MOST_OFF_MM && left < 0.1 * extent)
     };
@@ -144,7 +131,7 @@ fn position(input: &SessionInput, path: &[&Touch<'_>]) -> Option<Finding> {
             let left = left_of(left);
             let evidence = format!(
                 "expected measured positions within {MOST_OFF_MM} mm of the planned ones, found them {off:.2} mm off in the \
-                 median, and {left:.3} mm off {what} (n {n})"
+                 median, and {left:.3} mm {what} (n {n})"
             );
             finding(Law::AsCommanded, fault, None, evidence)
         }
@@ -161,25 +148,40 @@ fn left_of(residual: Option<(f64, f64)>) -> f64 {
     residual.map_or(f64::INFINITY, |r| r.0)
 }
 
-/// Median distance of the measured positions from a reading of the planned ones `by` rows on, and the extent of
-/// that reading, mm; `None` without numbers.
+/// The frame that lies as far from the skin's as the measured positions do from the planned ones in the median.
+fn displaced(path: &[&Touch<'_>]) -> Option<Frame> {
+    let off = |of: fn(&Point2) -> f64| {
+        let each = path
+            .iter()
+            .filter_map(|t| Some(of(&t.planned) - of(&t.truth?)));
+        median(each.collect())
+    };
+    let by = [off(|p| p.x_mm)?, off(|p| p.y_mm)?];
+    Some(Frame::displaced(
+        by,
+        format!("({:+.1}, {:+.1}) mm added", by[0], by[1]),
+    ))
+}
+
+/// Median distance of the measured positions, in another frame, from the planned ones `by` rows on, and the extent of the
+/// latter, mm; `None` without numbers.
 fn residual_mm(
     path: &[&Touch<'_>],
     by: i32,
-    reading: impl Fn(Point2) -> Point2,
+    frame: impl Fn(Point2) -> Point2,
 ) -> Option<(f64, f64)> {
     let pairs: Vec<(Point2, Point2)> = path
         .iter()
         .enumerate()
         .filter_map(|(i, touch)| {
             let there = usize::try_from(i as i64 + i64::from(by)).ok()?;
-            Some((touch.truth?, reading(path.get(there)?.planned)))
+            Some((frame(touch.truth?), path.get(there)?.planned))
         })
-        .filter(|(_, p)| super::touch::is_number(*p))
+        .filter(|(p, _)| super::touch::is_number(*p))
         .collect();
-    let predicted: Vec<Point2> = pairs.iter().map(|p| p.1).collect();
+    let planned: Vec<Point2> = pairs.iter().map(|p| p.1).collect();
     let left = median(pairs.iter().map(|(a, b)| a.distance_mm(*b)).collect())?;
-    (pairs.len() >= LEAST_PRESSES).then(|| (left, extent_mm(&predicted)))
+    (pairs.len() >= LEAST_PRESSES).then(|| (left, extent_mm(&planned)))
 }
 
 fn depth(path: &[&Touch<'_>]) -> Option<Finding> {

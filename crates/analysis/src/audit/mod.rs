@@ -7,31 +7,52 @@ mod advice;
 mod burst;
 mod commanded;
 mod complete;
+mod covered;
 mod drift;
 mod follow;
+mod frames;
 mod order;
+mod pattern;
+mod readings;
 mod repetitions;
+mod resection;
+mod segments;
 mod statistics;
 mod touch;
+mod worth;
 
 use crate::input::SessionInput;
 use crate::result::{Analysis, Fault, Finding, Law};
+use crate::stream::Silences;
 use skinrig_model::CameraId;
+
+/// What the streams say by themselves, camera 1 and camera 2.
+#[derive(Debug, Clone, Default)]
+pub struct Streams {
+    /// Where they are silent.
+    pub silences: [Silences; 2],
+    /// Contacts that stand out of their counts, s on the host's clock; empty when nobody asks for them.
+    pub contacts_s: [Vec<f64>; 2],
+}
 
 /// The laws that the session breaks, the most certain finding first; empty for a plausible session.
 ///
-/// Reads the table of presses, the journal, the clock fits and the event rates of `analysis`; never where the
-/// presses were located: a calibration can absorb a fault that the nominal geometry shows.
+/// Reads the table of presses, the journal, the clock fits and the event rates of `analysis`. Where the presses were located
+/// plays a part only in the last law: a calibration can absorb a fault that the nominal geometry shows.
 #[must_use]
-pub fn audit(input: &SessionInput, analysis: &Analysis) -> Vec<Finding> {
+pub fn audit(input: &SessionInput, analysis: &Analysis, streams: &Streams) -> Vec<Finding> {
     let touches = touch::touches(input, analysis);
+    let [one, two] = &streams.silences;
     let found = [
         complete::findings(input, analysis),
+        covered::findings(input, analysis, [one, two]),
         commanded::findings(input, &touches),
+        pattern::findings(&touches, streams.contacts_s.each_ref().map(Vec::as_slice)),
         burst::findings(analysis, &touches),
         follow::findings(analysis, &touches),
         repetitions::findings(&touches),
         drift::findings(input, analysis),
+        worth::findings(analysis).into_iter().collect(),
     ]
     .concat();
     order::leading_first(found)
@@ -45,5 +66,6 @@ fn finding(law: Law, fault: Fault, camera: Option<CameraId>, evidence: String) -
         camera,
         evidence,
         advice: advice::of(fault).to_owned(),
+        invalidates: fault.invalidates(),
     }
 }

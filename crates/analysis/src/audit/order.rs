@@ -4,10 +4,11 @@ use crate::result::{Fault, Finding};
 
 /// The findings that do not follow from a more certain one, the most certain first.
 pub fn leading_first(mut found: Vec<Finding>) -> Vec<Finding> {
-    found.sort_by_key(|f| place(f.fault));
+    found.sort_by_key(|f| (place(f.fault), !f.invalidates));
     let mut kept: Vec<Finding> = Vec::new();
     for finding in found {
-        if !kept.iter().any(|k| explains(k, &finding)) {
+        let again = |k: &Finding| k.fault == finding.fault && k.camera == finding.camera;
+        if !kept.iter().any(|k| again(k) || explains(k, &finding)) {
             kept.push(finding);
         }
     }
@@ -19,18 +20,28 @@ const fn place(fault: Fault) -> u8 {
     match fault {
         Fault::JournalContradictory => 0,
         Fault::NoEvents => 1,
-        Fault::NoTruth => 2,
-        Fault::PressesMissing => 3,
-        Fault::UnitOfPositions => 4,
-        Fault::CameraBlind => 5,
-        Fault::IndexShifted => 6,
-        Fault::AxisMirrored => 7,
-        Fault::CamerasSwapped => 8,
-        Fault::ClockWrong => 9,
-        Fault::RobotOff => 10,
-        Fault::RigMoved => 11,
-        Fault::NoTriggers => 12,
-        Fault::Unknown => 13,
+        Fault::RecordingShort => 2,
+        Fault::RecordingGap => 3,
+        Fault::NoTruth => 4,
+        Fault::PressesMissing => 5,
+        Fault::OneCameraTwice => 6,
+        Fault::UnitOfPositions => 7,
+        Fault::CameraBlind => 8,
+        Fault::IndexShifted => 9,
+        Fault::OrderOfPresses => 10,
+        Fault::AxesExchanged => 11,
+        Fault::AxisMirrored => 12,
+        Fault::PictureTurned => 13,
+        Fault::CamerasSwapped => 14,
+        Fault::PositionsDisplaced => 15,
+        Fault::ClockWrong => 16,
+        Fault::SyncPattern => 17,
+        Fault::PressesUnlisted => 18,
+        Fault::RobotOff => 19,
+        Fault::RigMoved => 20,
+        Fault::GeometryOff => 21,
+        Fault::NoTriggers => 22,
+        Fault::Unknown => 23,
     }
 }
 
@@ -53,20 +64,36 @@ fn explains(a: &Finding, b: &Finding) -> bool {
             b.fault,
             Fault::RobotOff | Fault::Unknown | Fault::UnitOfPositions
         ),
-        Fault::PressesMissing => matches!(b.fault, Fault::CameraBlind | Fault::RobotOff),
-        Fault::UnitOfPositions
-        | Fault::IndexShifted
-        | Fault::AxisMirrored
-        | Fault::CamerasSwapped => matches!(
+        Fault::PressesMissing => matches!(
             b.fault,
-            Fault::UnitOfPositions
-                | Fault::IndexShifted
-                | Fault::AxisMirrored
-                | Fault::CamerasSwapped
-                | Fault::RobotOff
-                | Fault::RigMoved
-                | Fault::Unknown
+            Fault::CameraBlind | Fault::RobotOff | Fault::RecordingGap
         ),
+        // What is taken for something else: one of them is enough, and makes the rest look wrong.
+        Fault::UnitOfPositions
+        | Fault::OneCameraTwice
+        | Fault::IndexShifted
+        | Fault::OrderOfPresses
+        | Fault::AxesExchanged
+        | Fault::AxisMirrored
+        | Fault::PictureTurned
+        | Fault::CamerasSwapped
+        | Fault::PositionsDisplaced => {
+            b.fault.is_mistaken_identity()
+                || matches!(
+                    b.fault,
+                    Fault::RobotOff | Fault::RigMoved | Fault::GeometryOff | Fault::Unknown
+                )
+        }
+        Fault::RecordingShort => match b.fault {
+            Fault::CameraBlind | Fault::RecordingGap | Fault::NoTriggers => same_camera,
+            Fault::PressesMissing | Fault::RobotOff | Fault::RigMoved | Fault::Unknown => true,
+            _ => false,
+        },
+        Fault::RecordingGap => match b.fault {
+            Fault::CameraBlind => same_camera,
+            Fault::RobotOff => true,
+            _ => false,
+        },
         Fault::CameraBlind => match b.fault {
             Fault::ClockWrong => same_camera,
             Fault::RigMoved | Fault::Unknown => true,
@@ -79,7 +106,9 @@ fn explains(a: &Finding, b: &Finding) -> bool {
             )
         }
         Fault::RigMoved | Fault::RobotOff => matches!(b.fault, Fault::Unknown),
-        Fault::NoTriggers => false,
+        Fault::NoTriggers | Fault::GeometryOff | Fault::PressesUnlisted | Fault::SyncPattern => {
+            false
+        }
         // One law that nothing explains is enough.
         Fault::Unknown => b.fault == Fault::Unknown,
     }

@@ -76,12 +76,15 @@ fn disagreement(touches: &[Touch<'_>], camera: CameraId) -> Option<Finding> {
                 "expected repetitions of a place to agree, found {repetition} off by {within:.1} px in the median, where \
                  places differ by {between:.1} px from their middle ({camera}, n {n})"
             );
-            return Some(finding(
+            let mut found = finding(
                 Law::RepetitionsAgree,
                 Fault::Unknown,
                 Some(camera),
                 evidence,
-            ));
+            );
+            // The rows of a repetition are other presses than they are taken for.
+            found.invalidates = true;
+            return Some(found);
         }
     }
     None

@@ -27,14 +27,34 @@ pub enum Law {
 pub enum Fault {
     /// The two cameras' streams are exchanged.
     CamerasSwapped,
+    /// Both streams come from the same camera.
+    OneCameraTwice,
+    /// A camera's picture is mirrored or upside down.
+    PictureTurned,
+    /// A camera is far from where the rig description draws it.
+    GeometryOff,
     /// An axis of the measured positions (or of the skin frame) is mirrored.
     AxisMirrored,
+    /// The x and y columns of the measured positions are exchanged, or the positions are turned by 90 degrees.
+    AxesExchanged,
+    /// Positions are relative to another origin than the skin frame's.
+    PositionsDisplaced,
     /// Positions are in another unit (metres for millimetres, or the reverse).
     UnitOfPositions,
     /// The press list is shifted against the recording.
     IndexShifted,
+    /// The press list is in another order than the presses of the recording.
+    OrderOfPresses,
+    /// The recording holds presses that are not in the press list.
+    PressesUnlisted,
+    /// The sync presses are others than the press list says, in number or spacing.
+    SyncPattern,
     /// A camera saw nothing, or nothing but noise.
     CameraBlind,
+    /// A camera's recording begins after the first press or ends before the last.
+    RecordingShort,
+    /// A camera sent nothing for a while in the middle of the recording.
+    RecordingGap,
     /// A camera sent no events.
     NoEvents,
     /// There are no trigger edges where the rig has a trigger line.
@@ -56,6 +76,63 @@ pub enum Fault {
     Unknown,
 }
 
+impl Fault {
+    /// As people read it: `axis mirrored`.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::CamerasSwapped => "cameras swapped",
+            Self::OneCameraTwice => "one camera twice",
+            Self::PictureTurned => "picture turned",
+            Self::GeometryOff => "geometry off",
+            Self::AxisMirrored => "axis mirrored",
+            Self::AxesExchanged => "axes exchanged",
+            Self::PositionsDisplaced => "positions displaced",
+            Self::UnitOfPositions => "unit of positions",
+            Self::IndexShifted => "index shifted",
+            Self::OrderOfPresses => "order of presses",
+            Self::PressesUnlisted => "presses unlisted",
+            Self::SyncPattern => "sync pattern",
+            Self::CameraBlind => "camera blind",
+            Self::RecordingShort => "recording short",
+            Self::RecordingGap => "recording gap",
+            Self::NoEvents => "no events",
+            Self::NoTriggers => "no triggers",
+            Self::NoTruth => "no truth",
+            Self::PressesMissing => "presses missing",
+            Self::ClockWrong => "clock wrong",
+            Self::JournalContradictory => "journal contradictory",
+            Self::RobotOff => "robot off",
+            Self::RigMoved => "rig moved",
+            Self::Unknown => "unknown",
+        }
+    }
+
+    /// True when positions, cameras or rows are taken for others than they are.
+    #[must_use]
+    pub const fn is_mistaken_identity(self) -> bool {
+        matches!(
+            self,
+            Self::CamerasSwapped
+                | Self::OneCameraTwice
+                | Self::PictureTurned
+                | Self::AxisMirrored
+                | Self::AxesExchanged
+                | Self::PositionsDisplaced
+                | Self::UnitOfPositions
+                | Self::IndexShifted
+                | Self::OrderOfPresses
+        )
+    }
+
+    /// True for a fault after which the errors of the session are no errors of the skin. What is only absent, or moved,
+    /// leaves the rest usable.
+    #[must_use]
+    pub const fn invalidates(self) -> bool {
+        self.is_mistaken_identity() || matches!(self, Self::JournalContradictory)
+    }
+}
+
 /// One broken law.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Finding {
@@ -69,4 +146,7 @@ pub struct Finding {
     pub evidence: String,
     /// What to do next.
     pub advice: String,
+    /// True when the session's numbers are not to be used ([`Fault::invalidates`], or what a law makes sure of).
+    #[serde(default)]
+    pub invalidates: bool,
 }

@@ -8,6 +8,7 @@ mod latency;
 mod motion;
 mod reduction;
 mod reference;
+mod validity;
 
 pub use alignment::{
     Alignment, AlignmentStatus, ClockMap, ClockResidual, ClockResiduals, Knot, LineCounts, MapName,

@@ -98,7 +98,7 @@ pub struct Row {
 /// Reads the session once and measures every choice of the plan. `stopwatch` gives the CPU time of this thread, s.
 ///
 /// # Errors
-/// Those of [`crate::analyze`], [`AnalysisError::NotAligned`] and [`AnalysisError::NothingToCompare`].
+/// Those of [`crate::analyze`], [`AnalysisError::Invalid`] and [`AnalysisError::NothingToCompare`].
 pub fn measure(
     input: &SessionInput,
     source: &dyn EventSource,
@@ -118,9 +118,9 @@ pub fn measure(
         ..session.clone()
     };
     let (analysis, kept) = crate::analyze_and_keep(&reading, source, Keep::All)?;
-    if !analysis.alignment.is_usable() {
-        return Err(AnalysisError::NotAligned(
-            analysis.alignment.violations.join("; "),
+    if !analysis.is_valid() {
+        return Err(AnalysisError::Invalid(
+            analysis.invalid_because().join("; "),
         ));
     }
     let replay = Replay::new(input, &analysis, &kept).ok_or(AnalysisError::NothingToCompare)?;

@@ -242,12 +242,12 @@ fn a_camera_that_does_not_see_the_presses() {
         s
     });
 
-    // It goes dark half-way.
+    // It goes dark half-way: not even noise.
     let dark = Wishes {
         dark_from: Some(0.6),
         ..line
     };
-    names(Fault::CameraBlind, |seed| session(seed, dark));
+    names(Fault::RecordingShort, |seed| session(seed, dark));
     // It bursts, on one pixel.
     names(Fault::CameraBlind, |seed| {
         let mut s = sound(seed);

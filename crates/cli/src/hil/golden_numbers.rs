@@ -32,8 +32,8 @@ const CLOCKED: [&str; 8] = [
 /// Fills `found` with what `analysis` says, and with the evidence of what keeps it from being believed.
 pub fn numbers(analysis: &Analysis, lost_bytes: [u64; 2], found: &mut Findings) {
     evidence(analysis, lost_bytes, found);
-    if !analysis.alignment.is_usable() {
-        // Where an event belongs is not known: no number that stands on it is to be used.
+    if !analysis.is_valid() {
+        // Where an event or a press belongs is not known: no number that stands on it is to be used.
         for metric in CLOCKED {
             found.unmeasured(SKIN, metric);
         }
@@ -84,14 +84,7 @@ fn evidence(analysis: &Analysis, lost_bytes: [u64; 2], found: &mut Findings) {
     for finding in &analysis.findings {
         let what = format!("{}; {}", finding.evidence, finding.advice);
         let camera = finding.camera.map(|c| ["camera1", "camera2"][c.index()]);
-        let (kind, subject) = match finding.fault {
-            Fault::CameraBlind | Fault::NoEvents => {
-                (EvidenceKind::DeviceLost, camera.unwrap_or("camera1"))
-            }
-            Fault::NoTriggers | Fault::ClockWrong => (EvidenceKind::TriggerFault, "trigger box"),
-            Fault::RobotOff | Fault::NoTruth => (EvidenceKind::State, "robot"),
-            _ => (EvidenceKind::Audit, SKIN),
-        };
+        let (kind, subject) = witness(finding.fault, camera.unwrap_or("camera1"));
         found.saw(kind, subject, what);
     }
     for (camera, lost) in ["camera1", "camera2"].into_iter().zip(lost_bytes) {
@@ -99,6 +92,34 @@ fn evidence(analysis: &Analysis, lost_bytes: [u64; 2], found: &mut Findings) {
             let what = format!("expected no lost data, found {lost} bytes lost");
             found.saw(EvidenceKind::DataLost, camera, what);
         }
+    }
+}
+
+/// What a finding of the audit is evidence of, and of which device. A camera or a position that is not what the rig file
+/// says is the rig's fault and no reason to look at the skin.
+const fn witness(fault: Fault, camera: &'static str) -> (EvidenceKind, &'static str) {
+    match fault {
+        Fault::CameraBlind | Fault::NoEvents => (EvidenceKind::DeviceLost, camera),
+        Fault::RecordingShort | Fault::RecordingGap => (EvidenceKind::DataLost, camera),
+        Fault::CamerasSwapped
+        | Fault::OneCameraTwice
+        | Fault::PictureTurned
+        | Fault::GeometryOff
+        | Fault::RigMoved => (EvidenceKind::OtherDevice, camera),
+        Fault::NoTriggers | Fault::ClockWrong => (EvidenceKind::TriggerFault, "trigger box"),
+        Fault::RobotOff
+        | Fault::NoTruth
+        | Fault::UnitOfPositions
+        | Fault::AxisMirrored
+        | Fault::AxesExchanged
+        | Fault::PositionsDisplaced => (EvidenceKind::State, "robot"),
+        Fault::IndexShifted
+        | Fault::OrderOfPresses
+        | Fault::PressesUnlisted
+        | Fault::SyncPattern
+        | Fault::PressesMissing
+        | Fault::JournalContradictory
+        | Fault::Unknown => (EvidenceKind::Audit, SKIN),
     }
 }
 
@@ -255,5 +276,35 @@ impl Sample {
         let half = Z * self.of_mean().sqrt();
         half.is_finite()
             .then_some([self.mean - half, self.mean + half])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use skinrig_nightly::Cause;
+    use skinrig_nightly::rules::RULES;
+
+    use super::*;
+
+    #[test]
+    fn cameras_and_positions_that_are_not_what_the_rig_file_says_are_no_reason_to_look_at_the_skin()
+    {
+        let faults = [
+            (Fault::CamerasSwapped, "camera2"),
+            (Fault::OneCameraTwice, "camera2"),
+            (Fault::PictureTurned, "camera2"),
+            (Fault::GeometryOff, "camera2"),
+            (Fault::RecordingShort, "camera2"),
+            (Fault::AxisMirrored, "robot"),
+            (Fault::AxesExchanged, "robot"),
+            (Fault::PositionsDisplaced, "robot"),
+            (Fault::UnitOfPositions, "robot"),
+        ];
+        for (fault, device) in faults {
+            let (kind, subject) = witness(fault, "camera2");
+            assert_eq!(subject, device, "{fault:?}");
+            let rule = RULES.iter().find(|r| r.seen.contains(&kind));
+            assert_eq!(rule.and_then(|r| r.cause), Some(Cause::Rig), "{fault:?}");
+        }
     }
 }

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use skinrig_formats::Decoder;
-use skinrig_model::{CameraId, StreamFormat};
+use skinrig_model::{CameraId, Point2, StreamFormat};
 
 use crate::dataset::{DRIFT_PPM, Dataset, OFFSET_US, PRESSES, csv, events, positions};
 use crate::replay::assert_replays;
@@ -69,6 +69,48 @@ fn a_dataset_is_imported_its_clocks_aligned_and_its_presses_located() {
         assert!(stored == events(camera), "{camera}");
     }
     skinrig(&["verify", &text(&session)]).code(0);
+}
+
+/// Imports the dataset with these positions and cameras: the code and what was said.
+fn import_wrong(
+    change: impl Fn(Point2) -> Point2,
+    swapped: bool,
+) -> (crate::support::Said, serde_json::Value) {
+    let lab = Lab::new();
+    let mut data = Dataset::new(&lab);
+    let wrong: Vec<Point2> = positions().into_iter().map(change).collect();
+    std::fs::write(&data.presses, crate::dataset::csv(&wrong)).unwrap();
+    if swapped {
+        data.cameras.swap(0, 1);
+    }
+    let said = skinrig(&data.arguments(&lab.path("s")));
+    let results = read_json(&only(&lab.path("s"), ".results.json"));
+    (said, results)
+}
+
+#[test]
+fn positions_and_cameras_that_are_taken_for_others_make_the_session_invalid() {
+    let cases: [(&str, fn(Point2) -> Point2, bool); 4] = [
+        ("axes exchanged", |p| Point2::new(p.y_mm, p.x_mm), false),
+        ("axis mirrored", |p| Point2::new(p.x_mm, -p.y_mm), false),
+        (
+            "positions displaced",
+            |p| Point2::new(p.x_mm - 10.0, p.y_mm - 2.0),
+            false,
+        ),
+        ("cameras swapped", |p| p, true),
+    ];
+    for (fault, change, swapped) in cases {
+        let (said, results) = import_wrong(change, swapped);
+        let said = said.code(4).complains(&["the session is INVALID", fault]);
+        assert_eq!(results["valid"], false, "{fault}");
+        let rmse = results["analysis"]["scored"]["rmse_mm"]["value"].as_f64();
+        let headline = rmse.map(|mm| format!("{mm:.2} mm"));
+        assert!(
+            headline.is_none_or(|mm| !said.out.contains(&mm)),
+            "{said:?}"
+        );
+    }
 }
 
 #[test]

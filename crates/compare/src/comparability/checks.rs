@@ -57,16 +57,15 @@ fn each(subjects: &[Subject], of: impl Fn(&Session) -> String) -> Vec<String> {
 
 fn alignment(subjects: &[Subject]) -> Option<Difference> {
     let status = |s: &Session| match s.analysis.alignment.status {
-        _ if !s.analysis.alignment.is_usable() => {
-            format!("INVALID: {}", s.analysis.alignment.violations.join("; "))
+        _ if !s.analysis.is_valid() => {
+            format!("INVALID: {}", s.analysis.invalid_because().join("; "))
         }
         AlignmentStatus::Valid => "certified".to_owned(),
         _ => "not certified".to_owned(),
     };
     let values = each(subjects, status);
     if values.iter().any(|v| v.contains("INVALID")) {
-        let reason =
-            "the clocks of a session are not known well enough: none of its numbers is to be used";
+        let reason = "a session is INVALID: none of its numbers is to be used";
         return Some(blocked(
             difference(
                 "alignment",
@@ -75,7 +74,7 @@ fn alignment(subjects: &[Subject]) -> Option<Difference> {
                 values,
                 reason,
             ),
-            "record again, or see the alignment certificate in the session's report",
+            "mend what the session's report names and analyse it again, or record again",
         ));
     }
     let differ = values.iter().any(|v| *v != values[0]);

@@ -121,7 +121,7 @@ fn foot(input: &ReportInput<'_>) -> String {
     let stand_in = p
         .stand_in()
         .map_or_else(String::new, |word| format!(" · {word} rig"));
-    let usable = input.analysis.alignment.is_usable();
+    let usable = input.analysis.is_valid();
     let invalid = if usable { "" } else { "INVALID · " };
     let variant = p
         .variant

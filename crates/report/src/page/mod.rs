@@ -79,7 +79,7 @@ pub(crate) fn render(input: &ReportInput<'_>) -> Result<String, ReportError> {
         .map(|f| (f.id, figure_value(f)))
         .collect();
     let c = &a.counts;
-    let usable = a.alignment.is_usable();
+    let usable = a.is_valid();
     let count = |key: &str, name: &str, n: u32| context! { key, name, n };
     let frame = Frame {
         templates: &TEMPLATES,
@@ -97,7 +97,7 @@ pub(crate) fn render(input: &ReportInput<'_>) -> Result<String, ReportError> {
         variant => p.variant.as_ref().map(ToString::to_string),
         overrides => p.overrides.clone(),
         rig_kind => p.rig_kind.clone(),
-        violations => if usable { Vec::new() } else { a.alignment.violations.clone() },
+        violations => a.invalid_because(),
         usable,
         started => or_missing(&p.started),
         prototype => or_missing(&p.prototype),
@@ -199,8 +199,7 @@ fn grids(input: &ReportInput<'_>) -> BTreeMap<&'static str, Value> {
     .into_iter()
     // Of an invalid session only what says why.
     .filter(|(name, _)| {
-        a.alignment.is_usable()
-            || ["alignment", "trigger_lines", "msows", "skins", "sensors"].contains(name)
+        a.is_valid() || ["alignment", "trigger_lines", "msows", "skins", "sensors"].contains(name)
     })
     .filter_map(|(name, grid)| Some((name, Value::from(Serde(grid?)))))
     .collect()
@@ -210,7 +209,7 @@ fn grids(input: &ReportInput<'_>) -> BTreeMap<&'static str, Value> {
 fn contents(input: &ReportInput<'_>) -> Vec<(&'static str, &'static str)> {
     let a = input.analysis;
     let single = !a.pictures.is_empty() || !a.zooms.is_empty();
-    let rates = a.alignment.is_usable() && (a.bit_rates.is_some() || a.cmre.is_some());
+    let rates = a.is_valid() && (a.bit_rates.is_some() || a.cmre.is_some());
     [
         ("results", "Results", true),
         ("provenance", "Provenance", true),

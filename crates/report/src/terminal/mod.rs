@@ -30,7 +30,7 @@ pub(crate) struct MetricRow {
 pub(crate) fn metric_rows(a: &Analysis) -> Vec<MetricRow> {
     let m = &a.scored;
     let rows = vec_of_metrics(a, m);
-    if a.alignment.is_usable() {
+    if a.is_valid() {
         return rows;
     }
     // Numbers of an invalid session are not to be read: their places say so.
@@ -194,10 +194,8 @@ pub(crate) fn table(input: &ReportInput<'_>, color: bool) -> String {
     out += &wrap("run       ", &plain(&end));
     out.push('\n');
     let before = out.len();
-    for violation in &a.alignment.violations {
-        if !a.alignment.is_usable() {
-            out += &paint.warn(&wrap("INVALID   ", &plain(violation)));
-        }
+    for reason in a.invalid_because() {
+        out += &paint.warn(&wrap("INVALID   ", &plain(&reason)));
     }
     out += &paint.warn(&findings(a));
     if let Some(text) = crate::derive::disagreement(a) {
@@ -227,7 +225,7 @@ pub(crate) fn table(input: &ReportInput<'_>, color: bool) -> String {
         };
         let _ = writeln!(out, "{line}");
     }
-    let usable = a.alignment.is_usable();
+    let usable = a.is_valid();
     if let Some(share) = a.scored.rmse_diagonal_percent.filter(|_| usable) {
         let _ = writeln!(
             out,

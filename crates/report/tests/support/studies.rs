@@ -344,6 +344,7 @@ pub fn findings() -> Vec<Finding> {
                 and -0.88 (n = 2512 and 2497); exchanged they follow with 0.97 and 0.96"
                 .into(),
             advice: "check which camera wrote which file, and import again with the files exchanged".into(),
+            invalidates: false,
         },
         Finding {
             law: Law::ClockDrift,
@@ -351,6 +352,7 @@ pub fn findings() -> Vec<Finding> {
             camera: Some(CameraId::Two),
             evidence: "expected a drift within 100 ppm, found 312.4 ± 0.2 ppm (n = 2500)".into(),
             advice: "check the alignment of camera 2 before any time of it is used".into(),
+            invalidates: false,
         },
     ]
 }

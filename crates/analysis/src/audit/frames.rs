@@ -1,0 +1,135 @@
+//! Ways in which a table of positions can be written other than in the skin's frame, in mm.
+
+use skinrig_model::{Point2, SkinOutline};
+
+use crate::result::Fault;
+
+/// Factors between units of length that are in use: m and cm for mm, inches, and the reverse.
+const FACTORS: [f64; 6] = [1e-3, 0.1, 1.0 / 25.4, 1e3, 10.0, 25.4];
+
+/// One way: where a position of the table lies in the skin's frame.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Frame {
+    /// What is wrong with the table.
+    pub fault: Fault,
+    /// In words, as "the positions with ...".
+    pub words: String,
+    /// `[[xx, xy], [yx, yy]]`: turns, mirrors and scales about `about`.
+    matrix: [[f64; 2]; 2],
+    about: Point2,
+    /// Added afterwards, mm.
+    by: [f64; 2],
+}
+
+impl Frame {
+    /// The position of the skin's frame.
+    pub fn skin(&self, p: Point2) -> Point2 {
+        let (x, y) = (p.x_mm - self.about.x_mm, p.y_mm - self.about.y_mm);
+        let [[xx, xy], [yx, yy]] = self.matrix;
+        Point2::new(
+            self.about.x_mm + xx * x + xy * y + self.by[0],
+            self.about.y_mm + yx * x + yy * y + self.by[1],
+        )
+    }
+
+    /// The table is displaced by as much.
+    pub fn displaced(by: [f64; 2], words: String) -> Self {
+        Self {
+            fault: Fault::PositionsDisplaced,
+            words,
+            matrix: [[1.0, 0.0], [0.0, 1.0]],
+            about: Point2::default(),
+            by,
+        }
+    }
+
+    /// All ways that have a name, about 0 and about the middle of the skin.
+    pub fn all(outline: &SkinOutline) -> Vec<Self> {
+        let centre = outline.centre;
+        let mut all = Vec::new();
+        for (about, name) in [(Point2::default(), "0"), (centre, "the skin's centre")] {
+            for (fault, what, matrix) in TURNS {
+                all.push(Self {
+                    fault,
+                    words: format!("{what} about {name}"),
+                    matrix,
+                    about,
+                    by: [0.0; 2],
+                });
+            }
+        }
+        for factor in FACTORS {
+            all.push(Self {
+                fault: Fault::UnitOfPositions,
+                words: format!("all multiplied by {factor:.3}"),
+                matrix: [[factor, 0.0], [0.0, factor]],
+                about: Point2::default(),
+                by: [0.0; 2],
+            });
+        }
+        let corner = Point2::new(
+            centre.x_mm - 0.5 * outline.width_mm,
+            centre.y_mm - 0.5 * outline.height_mm,
+        );
+        for (origin, name) in [(centre, "centre"), (corner, "lower left corner")] {
+            for (sign, verb) in [(1.0, "added"), (-1.0, "taken off")] {
+                let by = [sign * origin.x_mm, sign * origin.y_mm];
+                all.push(Self::displaced(by, format!("the skin's {name} {verb}")));
+            }
+        }
+        all
+    }
+}
+
+/// The mirrored and the turned ones of the square's eight symmetries.
+const TURNS: [(Fault, &str, [[f64; 2]; 2]); 7] = [
+    (Fault::AxisMirrored, "x mirrored", [[-1.0, 0.0], [0.0, 1.0]]),
+    (Fault::AxisMirrored, "y mirrored", [[1.0, 0.0], [0.0, -1.0]]),
+    (
+        Fault::AxisMirrored,
+        "x and y mirrored",
+        [[-1.0, 0.0], [0.0, -1.0]],
+    ),
+    (
+        Fault::AxesExchanged,
+        "x and y exchanged",
+        [[0.0, 1.0], [1.0, 0.0]],
+    ),
+    (
+        Fault::AxesExchanged,
+        "x and y exchanged and both mirrored",
+        [[0.0, -1.0], [-1.0, 0.0]],
+    ),
+    (
+        Fault::AxesExchanged,
+        "x and y turned by 90 degrees",
+        [[0.0, -1.0], [1.0, 0.0]],
+    ),
+    (
+        Fault::AxesExchanged,
+        "x and y turned by -90 degrees",
+        [[0.0, 1.0], [-1.0, 0.0]],
+    ),
+];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_way_but_the_displaced_leaves_its_fixed_point_and_none_is_the_table_itself() {
+        let all = Frame::all(&SkinOutline::PAPER);
+        let at = Point2::new(-13.0, 7.0);
+        for frame in &all {
+            assert!(frame.skin(at).distance_mm(at) > 1.0, "{frame:?}");
+            if frame.fault != Fault::PositionsDisplaced {
+                assert!(frame.skin(frame.about).distance_mm(frame.about) < 1e-12);
+            }
+        }
+        let turned = Frame {
+            about: Point2::default(),
+            ..all[5].clone()
+        };
+        assert_eq!(turned.skin(Point2::new(1.0, 0.0)), Point2::new(0.0, 1.0));
+    }
+}

@@ -1,0 +1,109 @@
+//! Law: the recording holds the presses that the schedule lists, no more and no others.
+//!
+//! Only for recordings whose press times come from a schedule: a robot that is driven by this program lists what it does.
+
+use skinrig_model::PressRole;
+
+use super::finding;
+use super::touch::Touch;
+use crate::result::{Fault, Finding, Law};
+
+/// A contact within this of a listed one is it, s.
+const NEAR_S: f64 = 0.3;
+/// Contacts in both cameras within this of each other are one press, s.
+const TOGETHER_S: f64 = 0.15;
+/// Unlisted contacts before the path belong to the sync part within this many of its lengths, and so many seconds.
+const SYNC_LENGTHS: f64 = 2.0;
+const SYNC_S: f64 = 3.0;
+
+/// `contacts_s` are the contacts that stand out of the counts of each camera, s on the host's clock.
+pub fn findings(touches: &[Touch<'_>], contacts_s: [&[f64]; 2]) -> Vec<Finding> {
+    let scheduled: Vec<&Touch<'_>> = touches.iter().filter(|t| t.outcome.scheduled).collect();
+    let contact = |t: &&Touch<'_>| Some(t.timing?.contact.as_secs_f64());
+    let listed: Vec<f64> = scheduled.iter().filter_map(contact).collect();
+    let sync = scheduled.iter().filter(|t| t.role == PressRole::Sync);
+    let sync: Vec<f64> = sync.filter_map(|t| contact(&t)).collect();
+    let path = scheduled.iter().filter(|t| t.role != PressRole::Sync);
+    let Some(first) = path.filter_map(|t| contact(&t)).min_by(f64::total_cmp) else {
+        return Vec::new();
+    };
+    let near = |at: f64, all: &[f64], within: f64| all.iter().any(|l| (l - at).abs() <= within);
+    let [one, two] = contacts_s;
+    let made: Vec<f64> = one
+        .iter()
+        .copied()
+        .filter(|at| near(*at, two, TOGETHER_S))
+        .collect();
+    let unlisted: Vec<f64> = made
+        .iter()
+        .copied()
+        .filter(|at| !near(*at, &listed, NEAR_S))
+        .collect();
+    let (begin, end) = match (sync.first(), sync.last()) {
+        (Some(a), Some(b)) => (*a, *b),
+        _ => (first, first),
+    };
+    let from = begin - SYNC_LENGTHS * (end - begin) - SYNC_S;
+    let before = |at: &&f64| **at < first - NEAR_S;
+    let of_sync = |at: &&f64| before(at) && **at >= from && !sync.is_empty();
+    let seen: Vec<String> = made
+        .iter()
+        .filter(of_sync)
+        .map(|at| format!("{:+.1}", at - first))
+        .collect();
+    let unseen = sync
+        .iter()
+        .filter(|at| !near(**at, &made, NEAR_S))
+        .filter(|at| [one, two].iter().all(|all| !near(**at, all, NEAR_S)));
+    let (more, fewer) = (unlisted.iter().filter(of_sync).count(), unseen.count());
+    let mut found = Vec::new();
+    if more > 0 || (fewer > 0 && begin_is_recorded(contacts_s, begin)) {
+        let planned: Vec<String> = sync
+            .iter()
+            .map(|at| format!("{:+.1}", at - first))
+            .collect();
+        let evidence = format!(
+            "expected sync presses at {} s from the first press of the path, found presses at {} s",
+            planned.join(", "),
+            if seen.is_empty() {
+                "no".to_owned()
+            } else {
+                seen.join(", ")
+            }
+        );
+        found.push(finding(
+            Law::AsCommanded,
+            Fault::SyncPattern,
+            None,
+            evidence,
+        ));
+    }
+    let others: Vec<f64> = unlisted
+        .iter()
+        .filter(|at| !of_sync(at) && **at >= from)
+        .copied()
+        .collect();
+    if let (Some(a), Some(b)) = (others.first(), others.last()) {
+        let evidence = format!(
+            "expected the {} presses of the list, found {} more in both cameras, from {:.0} s to {:.0} s of the schedule",
+            listed.len(),
+            others.len(),
+            a,
+            b
+        );
+        found.push(finding(
+            Law::AsCommanded,
+            Fault::PressesUnlisted,
+            None,
+            evidence,
+        ));
+    }
+    found
+}
+
+/// Something was seen before the sync part should have begun, or at its begin: the cameras ran.
+fn begin_is_recorded(contacts_s: [&[f64]; 2], begin: f64) -> bool {
+    contacts_s
+        .iter()
+        .all(|all| all.first().is_some_and(|at| *at <= begin + NEAR_S))
+}

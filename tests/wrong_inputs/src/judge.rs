@@ -1,0 +1,214 @@
+//! Owns the verdict on a case: what came out, held against what was done.
+
+use std::fmt;
+
+use skinrig_analysis::result::Fault;
+use skinrig_analysis::{Analysis, analyze};
+use skinrig_model::{PressRole, PressVerdict};
+
+use crate::bench::Bench;
+use crate::cases::Case;
+
+/// A number is right when it is within its own interval, widened by this share of the true one and this length, mm, of the
+/// true number.
+const SHARE: f64 = 0.3;
+const SLACK_MM: f64 = 0.4;
+/// Presses whose two views show different presses, at most, as a share of those that count.
+const MIXED: f64 = 0.1;
+
+/// What a case may come out as.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Allowed {
+    /// The right number, valid; whatever is remarked besides.
+    Right,
+    /// A finding with this fault; valid only with the right number.
+    Named(Fault),
+    /// Not read, not aligned, or without a number, and a reason.
+    Refused,
+    /// Nothing in the data speaks against a wrong number, because of this.
+    Unknowable(&'static str),
+}
+
+/// What came out.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Observed {
+    /// Valid, and the number is right.
+    Right,
+    /// A fault that the case allows was named; whether the session is valid.
+    Named(Fault, bool),
+    /// No number, and why.
+    Refused(String),
+    /// INVALID for another cause than any that the case allows.
+    Misnamed(Vec<Fault>),
+    /// Valid with a wrong number.
+    Wrong(Numbers),
+}
+
+/// The number, and what it should be.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Numbers {
+    /// RMSE as reported, mm.
+    pub reported: f64,
+    /// Half of its interval, mm.
+    pub half_width: f64,
+    /// Distance of the estimates from where the tip truly was, mm.
+    pub done: Option<f64>,
+    /// RMSE of the same recording with faultless papers, mm.
+    pub faultless: Option<f64>,
+    /// Share of presses whose views show different presses.
+    pub mixed: f64,
+}
+
+impl Numbers {
+    fn of(bench: &Bench, analysis: &Analysis, faultless: Option<f64>) -> Option<Self> {
+        let rmse = analysis.scored.rmse_mm;
+        let (mut squares, mut n, mut mixed, mut counted) = (0.0, 0u32, 0u32, 0u32);
+        for press in analysis
+            .presses
+            .iter()
+            .filter(|p| p.role == PressRole::Score && p.verdict == PressVerdict::Valid.name())
+        {
+            let (Some(estimate), Some(timing)) = (press.estimate(), press.timing) else {
+                continue;
+            };
+            counted += 1;
+            let truly = [0, 1].map(|k| {
+                let clock = analysis.clocks[k]?;
+                let camera_us = clock.camera_us_of_host(timing.contact);
+                bench.pressed_at(bench.host_s(bench.feeds[k], camera_us))
+            });
+            match truly {
+                [Some(a), Some(b)] if a.distance_mm(b) < 1.0 => {
+                    squares += estimate.distance_mm(a).powi(2);
+                    n += 1;
+                }
+                _ => mixed += 1,
+            }
+        }
+        Some(Self {
+            reported: rmse.value?,
+            half_width: rmse.low.zip(rmse.high).map_or(0.0, |(a, b)| 0.5 * (b - a)),
+            done: (n > 0).then(|| (squares / f64::from(n)).sqrt()),
+            faultless,
+            mixed: f64::from(mixed) / f64::from(counted.max(1)),
+        })
+    }
+
+    /// Every number that is known agrees with the reported one.
+    #[must_use]
+    pub fn are_right(&self) -> bool {
+        let near = |other: Option<f64>| {
+            other.is_none_or(|other| {
+                (self.reported - other).abs() <= self.half_width + SHARE * other + SLACK_MM
+            })
+        };
+        self.mixed <= MIXED && near(self.done) && near(self.faultless)
+    }
+}
+
+/// The verdict on a case.
+#[derive(Debug, Clone)]
+pub struct Judged {
+    /// What came out.
+    pub observed: Observed,
+    /// True when the case allows that.
+    pub holds: bool,
+    /// The numbers, when there is one.
+    pub numbers: Option<Numbers>,
+    /// What the audit said.
+    pub findings: Vec<String>,
+}
+
+impl fmt::Display for Judged {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:?}\n    {:?}", self.observed, self.numbers)?;
+        self.findings
+            .iter()
+            .try_for_each(|finding| write!(f, "\n    {finding}"))
+    }
+}
+
+/// Analyses a case and judges what came out.
+#[must_use]
+pub fn judge(case: &Case, seed: u64) -> Judged {
+    let bench = (case.bench)(seed);
+    let analysis = bench
+        .input()
+        .and_then(|input| analyze(&input, &bench.events()).map_err(|e| e.to_string()));
+    let analysis = match analysis {
+        Ok(analysis) => analysis,
+        Err(why) => return refused(case, why),
+    };
+    let faultless = case.papers.and_then(|right| {
+        let mut bench = bench.clone();
+        right(&mut bench);
+        let input = bench.input().ok()?;
+        let analysis = analyze(&input, &bench.events()).ok()?;
+        analysis.scored.rmse_mm.value
+    });
+    let numbers = Numbers::of(&bench, &analysis, faultless);
+    let named = case.allowed.iter().find_map(|allowed| match allowed {
+        Allowed::Named(fault) if analysis.findings.iter().any(|f| f.fault == *fault) => {
+            Some(*fault)
+        }
+        _ => None,
+    });
+    let right = numbers.is_some_and(|n| n.are_right());
+    let valid = analysis.is_valid();
+    let observed = match (valid, named, numbers) {
+        (true, Some(fault), Some(_)) if right => Observed::Named(fault, true),
+        (true, None, Some(_)) if right => Observed::Right,
+        (true, _, Some(numbers)) => Observed::Wrong(numbers),
+        (_, Some(fault), _) => Observed::Named(fault, valid),
+        (true, None, None) => Observed::Refused("no number".to_owned()),
+        (false, None, _) if !analysis.alignment.is_usable() => {
+            Observed::Refused(analysis.alignment.violations.join("; "))
+        }
+        (false, None, _) => {
+            let faults: Vec<Fault> = analysis.findings.iter().map(|f| f.fault).collect();
+            if faults == [Fault::Unknown] {
+                Observed::Refused(analysis.invalid_because().join("; "))
+            } else {
+                Observed::Misnamed(faults)
+            }
+        }
+    };
+    let holds = case
+        .allowed
+        .iter()
+        .any(|allowed| match (allowed, &observed) {
+            (Allowed::Right, Observed::Right)
+            | (Allowed::Refused, Observed::Refused(_))
+            | (Allowed::Unknowable(_), Observed::Wrong(_) | Observed::Right) => true,
+            (Allowed::Named(a), Observed::Named(b, _)) => a == b,
+            _ => false,
+        });
+    let findings = analysis
+        .findings
+        .iter()
+        .map(|f| {
+            format!(
+                "{} {:?} invalidates {}: {}",
+                f.fault.name(),
+                f.camera,
+                f.invalidates,
+                f.evidence
+            )
+        })
+        .chain(analysis.alignment.violations.iter().cloned());
+    Judged {
+        observed,
+        holds,
+        numbers,
+        findings: findings.collect(),
+    }
+}
+
+fn refused(case: &Case, why: String) -> Judged {
+    Judged {
+        observed: Observed::Refused(why),
+        holds: case.allowed.contains(&Allowed::Refused),
+        numbers: None,
+        findings: Vec::new(),
+    }
+}

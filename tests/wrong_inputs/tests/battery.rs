@@ -1,0 +1,85 @@
+//! Every case of the battery, or a sample of the seeds: none ends valid with a wrong number.
+
+use rayon::prelude::*;
+use skinrig_wrong_inputs::cases::{Case, all};
+use skinrig_wrong_inputs::judge::{Allowed, Judged, Observed, judge};
+
+/// A row of the table in `docs/wrong-inputs.md`.
+fn row(case: &Case, judged: &Judged) -> String {
+    let unknowable = case.allowed.iter().find_map(|allowed| match allowed {
+        Allowed::Unknowable(why) => Some(*why),
+        _ => None,
+    });
+    let outcome = match (&judged.observed, unknowable) {
+        (Observed::Named(fault, false), _) => format!("named: {}; INVALID", fault.name()),
+        (Observed::Named(fault, true), _) => {
+            format!("named: {}; the number is right", fault.name())
+        }
+        (Observed::Refused(_), _) => "refused".to_owned(),
+        (Observed::Right, None) => "the number is right".to_owned(),
+        (_, Some(why)) => format!("cannot be known: {why}"),
+        (other, None) => format!("{other:?}"),
+    };
+    format!("| {} | {} | {outcome} |", case.group, case.name)
+}
+
+/// Every case with this many seeds; those that do not hold, with what came out.
+fn failures(seeds: u64) -> Vec<String> {
+    let cases: Vec<(Case, u64)> = all()
+        .into_iter()
+        .flat_map(|case| (0..seeds).map(move |seed| (case.clone(), seed)))
+        .collect();
+    let judged: Vec<(Case, u64, Judged)> = cases
+        .into_par_iter()
+        .map(|(case, seed)| {
+            let judged = judge(&case, seed);
+            (case, seed, judged)
+        })
+        .collect();
+    for (case, _, judged) in judged.iter().filter(|(_, seed, _)| *seed == 0) {
+        println!("{}", row(case, judged));
+    }
+    judged
+        .into_iter()
+        .filter(|(.., judged)| !judged.holds)
+        .map(|(case, seed, judged)| {
+            format!(
+                "{}: {}, seed {seed}: allowed {:?}, came out {judged}",
+                case.group, case.name, case.allowed
+            )
+        })
+        .collect()
+}
+
+#[test]
+fn no_wrong_input_ends_valid_with_a_wrong_number() {
+    assert!(all().len() >= 60, "{}", all().len());
+    let failures = failures(1);
+    assert!(
+        failures.is_empty(),
+        "{} fail:\n{}",
+        failures.len(),
+        failures.join("\n")
+    );
+}
+
+#[test]
+#[ignore = "ten seeds of every case take minutes: cargo test -p skinrig-wrong-inputs -- --ignored"]
+fn nor_does_any_of_ten_seeds() {
+    let failures = failures(10);
+    assert!(
+        failures.is_empty(),
+        "{} fail:\n{}",
+        failures.len(),
+        failures.join("\n")
+    );
+}
+
+#[test]
+fn every_case_stands_in_the_table_of_the_docs() {
+    let page = include_str!("../../../docs/wrong-inputs.md");
+    for case in all() {
+        let row = format!("| {} | {} | ", case.group, case.name);
+        assert!(page.contains(&row), "docs/wrong-inputs.md lacks: {row}");
+    }
+}
