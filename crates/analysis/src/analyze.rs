@@ -22,8 +22,8 @@ use crate::result::{
 use crate::segment::{Window, windows};
 use crate::sets::ScoreSet;
 use crate::stream::{Silences, contacts_s};
-use crate::timebase::{Tie, Ties, TimeBase};
-use crate::untimed::{self, Untimed};
+use crate::timebase::{Ties, TimeBase};
+use crate::untimed::Untimed;
 use crate::{audit, bit_rates, caveats, check, cmre, coverage, latency, legs, reduction, verdict};
 
 /// Windows that share less than this, µs, only touch: their ends are rounded.

@@ -329,13 +329,18 @@ impl Bench {
         let mut input = skinrig_planted::session(self.rig, settings);
         let mut random = Random::new(self.seed ^ 0x0b07);
         for (row, (plan, time)) in planned.iter().zip(&times).enumerate() {
-            let mut touch = Touch::new(plan.role, plan.repetition, plan.location, plan.at);
+            let mut touch = Touch::new(
+                plan.role,
+                plan.repetition.index(),
+                plan.location.index(),
+                plan.at,
+            );
             touch.timing = schedule.phases.at(*time);
             touch.scheduled = self.robot.is_none();
             if let Some(robot) = &self.robot {
                 if plan.role != PressRole::Sync {
                     let places = robot.planned.as_ref().unwrap_or(&self.table);
-                    touch.at = places[plan.location as usize];
+                    touch.at = places[plan.location.index() as usize];
                 }
                 touch.measured_at = Point2::new(
                     plan.at.x_mm + 0.02 * random.normal(),

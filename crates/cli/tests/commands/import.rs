@@ -79,7 +79,7 @@ fn import_wrong(
     let lab = Lab::new();
     let mut data = Dataset::new(&lab);
     let wrong: Vec<Point2> = positions().into_iter().map(change).collect();
-    std::fs::write(&data.presses, crate::dataset::csv(&wrong)).unwrap();
+    std::fs::write(&data.presses, csv(&wrong)).unwrap();
     if swapped {
         data.cameras.swap(0, 1);
     }
@@ -144,7 +144,7 @@ fn more_presses_than_the_schedule_says_are_told_apart_by_the_sync_presses_or_the
 
     // A single sync press in step with the path: nothing says which of the presses are the planned ones.
     let said = import("t", &["sync.count=1", "sync.pause_after=1.5 s"]).code(4);
-    said.complains(&["INVALID", "log-odds", "all other alignments", "next:"]);
+    let said = said.complains(&["INVALID", "log-odds", "all other alignments", "next:"]);
     let results = read_json(&only(&lab.path("t"), ".results.json"));
     assert_eq!(results["valid"], false);
     assert!(

@@ -177,6 +177,7 @@ pub fn analysis(side: u32, repetitions: u32) -> Analysis {
         reference: None,
         findings: vec![],
         activity,
+        off_sensor: [OffSensor::default(); 2],
         depths: vec![],
         rates,
         presses,
@@ -220,6 +221,7 @@ fn alignment() -> Alignment {
             map(MapName::Camera2FromBox, 0.43, 2.2),
         ],
         lines: vec![line; 2],
+        rates: None,
         resets: 0,
         camera_from_host: [vec![], vec![]],
         residuals: studies::clock_residuals(),
@@ -570,6 +572,7 @@ pub fn empty() -> Analysis {
         reduction: None,
         latency: None,
         activity: vec![],
+        off_sensor: [OffSensor::default(); 2],
         ..full
     }
 }

@@ -75,7 +75,7 @@ pub fn latency(noise: &mut Noise, presses: &[PressResult]) -> Latency {
             (p.press, onset)
         })
         .collect();
-    let early = onsets.iter().filter(|(press, _)| press.0 % 97 == 6);
+    let early = onsets.iter().filter(|(press, _)| press.index() % 97 == 6);
     let false_detections = early
         .map(|(press, _)| (*press, -41.0))
         .collect::<Vec<_>>()
@@ -316,6 +316,7 @@ pub fn reference() -> ReferenceCode {
     ReferenceCode {
         presses: 256,
         calibrated: true,
+        parameters: vec![("x1".to_owned(), -61.2), ("skew2".to_owned(), 1.37)],
         with_centroids: 251,
         inside: 244,
         rmse_mm: Some(3.02),
