@@ -104,8 +104,11 @@ pub fn record(
 /// Seals the session, and tells what went wrong besides.
 pub(crate) fn close(sink: SessionSink, mut report: RunReport, operator: &Operator) -> RunReport {
     if let Err(error) = sink.seal() {
+        let is_complete = matches!(error, RecorderError::HeldOpen { .. });
         let error = error.to_string();
         match &report.end {
+            // All of it is on the disk: that a seal is put off is no fault of the run.
+            RunEnd::Completed if is_complete => report.problems.push(error),
             RunEnd::Completed => report.end = RunEnd::Faulted(format!("recorder: {error}")),
             RunEnd::Faulted(reason) if reason.contains(&error) => {}
             _ => report.problems.push(error),
