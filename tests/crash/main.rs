@@ -9,6 +9,7 @@
 #![cfg(unix)]
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on must fail")]
 
+mod disk;
 mod kills;
 mod lab;
 mod power;

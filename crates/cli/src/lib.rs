@@ -44,6 +44,7 @@ pub mod tradeoff;
 pub mod verify;
 pub mod version;
 pub mod watch;
+mod whole_file;
 
 use std::ffi::OsString;
 
@@ -54,6 +55,7 @@ use crate::exit::{Exit, Outcome};
 
 /// Runs the program with these arguments (the first is its own name) and says how it ended.
 pub fn main_with(arguments: impl IntoIterator<Item = OsString>) -> Exit {
+    signals::take_file_limits_as_errors();
     let arguments: Vec<OsString> = arguments.into_iter().collect();
     let cli = match Cli::try_parse_from(tag::spelled_out(arguments.clone())) {
         Ok(cli) => cli,

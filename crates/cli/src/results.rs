@@ -1,6 +1,6 @@
 //! `skinrig analyze` and `skinrig report`, and the end of `run` and `import`: from a session to its results.
 
-use std::io::{IsTerminal, Write as _};
+use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
@@ -321,16 +321,7 @@ pub fn documents(results: &Results) -> Result<(String, String), Failure> {
 
 /// Writes a whole file or none: a full disk leaves no half of it.
 pub(crate) fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
-    let mut partial = path.as_os_str().to_owned();
-    partial.push(".partial");
-    let partial = PathBuf::from(partial);
-    // A file of its own: what an ended run left there, or a link that a stranger put there, is no place to write into.
-    let _ = std::fs::remove_file(&partial);
-    let written = std::fs::File::create_new(&partial)
-        .and_then(|mut file| file.write_all(bytes))
-        .and_then(|()| std::fs::rename(&partial, path));
-    written.map_err(|e| {
-        let _ = std::fs::remove_file(&partial);
+    crate::whole_file::write(path, bytes).map_err(|e| {
         let next = match e.kind() {
             std::io::ErrorKind::StorageFull => {
                 "free space there, or choose another place with --out"

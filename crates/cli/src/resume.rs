@@ -26,6 +26,7 @@ use crate::rig::{self, bench, gates, planted};
 use crate::run::{close, conclude, host_name};
 use crate::signals::Operator;
 use crate::sink::{Foreknowledge, SessionSink};
+use crate::source::Rescan;
 
 /// An unfinished session as it lies there.
 struct Unfinished {
@@ -45,16 +46,24 @@ struct Unfinished {
 pub fn resume(args: &ResumeArgs, command_line: &str, json: bool) -> Outcome {
     let operator = Operator::listen().map_err(Failure::internal)?;
     let session = &args.session;
-    let found = read(session)?;
-    if found.end == Some(RunEnd::Completed) {
+    // What cannot be read is for the check of the whole file to tell.
+    let is_completed =
+        |reader: SessionReader| matches!(reader.end(), Ok(Some((_, RunEnd::Completed))));
+    if SessionReader::open(session).is_ok_and(is_completed) {
         return only_seal(session);
     }
-    // From here on nobody else writes it.
-    let writer = SessionWriter::resume(session).map_err(Failure::input)?;
-    // And what was read before may have been written since.
+    // From here on nobody else writes it, and it is what was recorded.
+    let writer = SessionWriter::resume(session, &mut Rescan::default()).map_err(refusal)?;
     let found = read(session)?;
     let wanted = found.plan.wanted(&found.histories);
     if let (Some(end), false) = (&found.end, wanted.contains(&true)) {
+        drop(writer);
+        if SessionReader::open(session)
+            .and_then(|reader| reader.seal())
+            .is_ok_and(|seal| seal.is_none())
+        {
+            return only_seal(session);
+        }
         return Err(Failure::input(nothing_left(session, end)));
     }
     if !json {
@@ -73,6 +82,36 @@ pub fn resume(args: &ResumeArgs, command_line: &str, json: bool) -> Outcome {
         end_only(&found, header, writer)?
     };
     conclude(session, &report, args.no_analysis, None, json)
+}
+
+/// Why a session cannot go on: what is wrong with it, item by item, or why it cannot be read.
+fn refusal(error: RecorderError) -> Failure {
+    match error {
+        RecorderError::Unsound {
+            path,
+            problems,
+            more_problems,
+        } => {
+            let name = path.display();
+            let mut words = format!(
+                "{name}: expected a sound session to go on with, found {} problem(s)",
+                problems.len() as u64 + more_problems
+            );
+            for problem in &problems {
+                let own = format!("{name}: ");
+                words += &format!("\n  {}", problem.strip_prefix(&own).unwrap_or(problem));
+            }
+            if more_problems > 0 {
+                words += &format!("\n  and {more_problems} more");
+            }
+            words += &format!(
+                "\n  nothing was changed\n  next: `skinrig salvage {name}` copies what is whole into a new session"
+            );
+            Failure::limit(words)
+        }
+        RecorderError::Io { .. } | RecorderError::Sql { .. } => Failure::internal(error),
+        other => Failure::input(other),
+    }
 }
 
 /// Every press has its outcome, and how the run ended is in the session: that is not made a better end afterwards.
@@ -473,10 +512,11 @@ fn end_only(
 
 /// The session has its end and lacks only its seal.
 fn only_seal(session: &Path) -> Outcome {
-    let writer = SessionWriter::ended(session).map_err(Failure::input)?;
-    writer.finish().map_err(Failure::internal)?;
+    let writer = SessionWriter::ended(session, &mut Rescan::default()).map_err(refusal)?;
+    let tell = || errln!("{}", crate::sink::HELD_OPEN);
+    writer.finish_or_tell(tell).map_err(Failure::internal)?;
     outln!(
-        "{}: completed; only its seal was missing, and is there now\n  next: skinrig analyze {0}",
+        "{}: ended; only its seal was missing, and is there now\n  next: skinrig analyze {0}",
         session.display()
     );
     Ok(Exit::Ok)

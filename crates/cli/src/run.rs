@@ -110,11 +110,13 @@ pub fn record(
 /// Seals the session, and tells what went wrong besides.
 pub(crate) fn close(sink: SessionSink, mut report: RunReport, operator: &Operator) -> RunReport {
     if let Err(error) = sink.seal() {
+        let is_complete = matches!(error, RecorderError::HeldOpen { .. });
         let error = ControllerError::from(SinkFault(error.to_string()));
-        if report.end == RunEnd::Completed {
+        if report.end == RunEnd::Completed && !is_complete {
             report.end = RunEnd::Faulted(error.to_string());
             report.causes.push(error);
         } else if !report.causes.contains(&error) {
+            // Of a complete run all is on the disk: that its seal is put off is no fault of the run.
             report.problems.push(Problem { doing: "", error });
         }
     }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
 use skinrig_recorder::{
-    RecorderError, SESSION_SUFFIX, SessionReader, SessionState, SessionSummary, list, writer_of,
+    SESSION_SUFFIX, SessionReader, SessionState, SessionSummary, list, writer_of,
 };
 
 use crate::args::SessionsArgs;
@@ -88,7 +88,7 @@ pub fn find_running(place: &Path) -> Result<PathBuf, Failure> {
             "{shown}: expected a run under way, found a sealed session, which never changes\n  next: `skinrig tag {shown} --note \
              TEXT` writes a remark beside it; `skinrig resume {shown}` goes on with one that was stopped"
         ),
-        Ok(_) | Err(RecorderError::NotThere { .. }) => format!(
+        Ok(_) => format!(
             "{shown}: expected a run under way, found a session that nobody runs\n  next: `skinrig resume {shown}` goes on \
              with it"
         ),
@@ -209,6 +209,8 @@ fn line(session: &SessionSummary) -> String {
         .map(|n| n.to_string_lossy().into_owned())
         .unwrap_or_default();
     match &session.state {
+        SessionState::Empty if writer_of(&session.path).is_some() => format!("beginning: {file}"),
+        SessionState::Empty => format!("empty: {file}: without a record in it; remove it"),
         SessionState::Broken { reason } => format!("broken: {file}: {reason}"),
         SessionState::Readable {
             started_at,

@@ -1,6 +1,7 @@
 //! ctrl-C: once stops after the current press, twice aborts, three times halts. A polite end by the system (SIGTERM)
 //! and a terminal that goes away (SIGHUP) count as a ctrl-C: the robot must not stay in the skin. Who started the
-//! program with `nohup` said that it outlives its terminal: then SIGHUP stays ignored.
+//! program with `nohup` said that it outlives its terminal: then SIGHUP stays ignored. Every other signal that would end the
+//! program without a word counts too, SIGQUIT (ctrl-\) and a used up limit of processor time as two: those retract at once.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
@@ -119,8 +120,11 @@ pub fn on_ctrl_c(react: impl Fn(u8) + Send + 'static) -> Result<(), String> {
         .name("ctrl-c".into())
         .spawn(move || {
             runtime.block_on(async {
-                while signals.next().await.is_some() {
-                    react(PRESSED.fetch_add(1, Ordering::SeqCst).saturating_add(1));
+                loop {
+                    let least = signals.next().await;
+                    let pressed = PRESSED.load(Ordering::SeqCst).saturating_add(1).max(least);
+                    PRESSED.store(pressed, Ordering::SeqCst);
+                    react(pressed);
                 }
             });
         })
@@ -128,42 +132,71 @@ pub fn on_ctrl_c(react: impl Fn(u8) + Send + 'static) -> Result<(), String> {
         .map_err(refused)
 }
 
-/// What asks for an end.
+/// What asks for an end, each with the count of ctrl-C that it is at least.
 #[cfg(unix)]
-struct Signals {
-    interrupt: tokio::signal::unix::Signal,
-    terminate: tokio::signal::unix::Signal,
-    /// None: ignored when the program was started, and left so.
-    hangup: Option<tokio::signal::unix::Signal>,
-}
+struct Signals(Vec<(tokio::signal::unix::Signal, u8)>);
 
 #[cfg(unix)]
 impl Signals {
     fn new() -> std::io::Result<Self> {
+        use rustix::process::Signal;
         use tokio::signal::unix::{SignalKind, signal};
-        let hangup = match hangup_is_ignored() {
-            true => None,
-            false => Some(signal(SignalKind::hangup())?),
-        };
-        Ok(Self {
-            interrupt: signal(SignalKind::interrupt())?,
-            terminate: signal(SignalKind::terminate())?,
-            hangup,
-        })
+        let mut wanted = vec![
+            (Signal::QUIT, 2),
+            (Signal::XCPU, 2),
+            (Signal::INT, 1),
+            (Signal::TERM, 1),
+            (Signal::USR1, 1),
+            (Signal::USR2, 1),
+            (Signal::ALARM, 1),
+            (Signal::VTALARM, 1),
+            (Signal::PROF, 1),
+            #[cfg(target_os = "linux")]
+            (Signal::IO, 1),
+            #[cfg(target_os = "linux")]
+            (Signal::POWER, 1),
+        ];
+        if !hangup_is_ignored() {
+            wanted.push((Signal::HUP, 1));
+        }
+        let listen =
+            |(kind, least): (Signal, u8)| Ok((signal(SignalKind::from_raw(kind.as_raw()))?, least));
+        Ok(Self(
+            wanted
+                .into_iter()
+                .map(listen)
+                .collect::<std::io::Result<_>>()?,
+        ))
     }
 
-    async fn next(&mut self) -> Option<()> {
-        let hangup = async {
-            match &mut self.hangup {
-                Some(hangup) => hangup.recv().await,
-                None => std::future::pending().await,
+    /// Waits for the next one; the gravest first.
+    async fn next(&mut self) -> u8 {
+        std::future::poll_fn(|context| {
+            for (signal, least) in &mut self.0 {
+                if signal.poll_recv(context).is_ready() {
+                    return std::task::Poll::Ready(*least);
+                }
             }
-        };
-        tokio::select! {
-            seen = self.interrupt.recv() => seen,
-            seen = self.terminate.recv() => seen,
-            seen = hangup => seen,
-        }
+            std::task::Poll::Pending
+        })
+        .await
+    }
+}
+
+/// Makes a file that grows beyond the limit of the process (`ulimit -f`) an error of the write, as a full disk is one. Without
+/// this the system ends the program by SIGXFSZ, with the robot wherever it is.
+pub fn take_file_limits_as_errors() {
+    #[cfg(unix)]
+    {
+        use tokio::signal::unix::{SignalKind, signal};
+        let runtime = tokio::runtime::Builder::new_current_thread()
+            .enable_io()
+            .build();
+        // What cannot be listened to keeps its meaning; no command works less well for it.
+        let Ok(runtime) = runtime else { return };
+        let _inside = runtime.enter();
+        // The handler stays for the rest of the process; nobody needs to hear from it.
+        let _ = signal(SignalKind::from_raw(rustix::process::Signal::XFSZ.as_raw()));
     }
 }
 
@@ -192,7 +225,11 @@ impl Signals {
         tokio::signal::windows::ctrl_c().map(Self)
     }
 
-    async fn next(&mut self) -> Option<()> {
-        self.0.recv().await
+    async fn next(&mut self) -> u8 {
+        match self.0.recv().await {
+            Some(()) => 1,
+            // The system has no more of them.
+            None => std::future::pending().await,
+        }
     }
 }

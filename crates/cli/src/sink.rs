@@ -43,6 +43,9 @@ impl Foreknowledge {
     }
 }
 
+/// Told once when the seal has to wait.
+pub(crate) const HELD_OPEN: &str = "note: another program has the session open; waiting for it, to seal the session (60 s at most)";
+
 /// Writes every record to the session file and shows it.
 pub struct SessionSink {
     writer: SessionWriter,
@@ -115,7 +118,7 @@ impl SessionSink {
     pub fn seal(mut self) -> Result<Sealed, RecorderError> {
         self.view.finish();
         self.saboteur.before_the_seal()?;
-        self.writer.finish()
+        self.writer.finish_or_tell(|| errln!("{HELD_OPEN}"))
     }
 }
 

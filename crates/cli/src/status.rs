@@ -33,7 +33,7 @@ pub fn status(args: &StatusArgs, as_json: bool) -> Outcome {
     let filed = match filed(&session) {
         Ok(filed) => filed,
         // The first records of a run are not yet on the disk.
-        Err(RecorderError::NotThere { .. }) if writer.is_some() => json!({}),
+        Err(RecorderError::Empty { .. }) if writer.is_some() => json!({}),
         Err(e) => return Err(Failure::input(e)),
     };
     let mut d = json!({

@@ -150,7 +150,7 @@ fn session(path: &Path, json: bool) -> Outcome {
     if json {
         crate::print_json(&serde_json::json!({
             "session": path, "sound": report.is_sound(), "sealed": report.sealed,
-            "problems": report.problems, "more_problems": report.more_problems,
+            "problems": report.problems, "more_problems": report.more_problems, "remarks": report.remarks,
             "totals": report.totals,
         }));
     } else {
@@ -163,6 +163,9 @@ fn session(path: &Path, json: bool) -> Outcome {
         }
         if report.more_problems > 0 {
             outln!("{name}: and {} more", report.more_problems);
+        }
+        for remark in &report.remarks {
+            outln!("{name}: note: {remark}");
         }
         if let (true, Some(t)) = (report.is_sound(), report.totals) {
             outln!(

@@ -64,6 +64,8 @@ pub enum SessionState {
         /// The counts of its seal; `None` for one that is not sealed, of which the whole file would have to be read.
         totals: Option<Box<SessionTotals>>,
     },
+    /// It has no record at all: its run ended before it wrote the header, or something emptied the file.
+    Empty,
     /// It cannot.
     Broken {
         /// Why.
@@ -71,7 +73,7 @@ pub enum SessionState {
     },
 }
 
-/// The session files of `folder` (names that end in [`SESSION_SUFFIX`]), oldest start first, broken ones last;
+/// The session files of `folder` (names that end in [`SESSION_SUFFIX`]), oldest start first, empty and broken ones last;
 /// by name where that is equal.
 ///
 /// # Errors
@@ -91,8 +93,11 @@ pub fn list(folder: impl AsRef<Path>) -> Result<Vec<SessionSummary>, RecorderErr
             .is_some_and(|n| n.to_string_lossy().ends_with(SESSION_SUFFIX));
         if named {
             let size_bytes = std::fs::metadata(&path).map_or(0, |m| m.len());
-            let state = summarise(&path).unwrap_or_else(|e| SessionState::Broken {
-                reason: e.to_string(),
+            let state = summarise(&path).unwrap_or_else(|e| match e {
+                RecorderError::Empty { .. } => SessionState::Empty,
+                e => SessionState::Broken {
+                    reason: e.to_string(),
+                },
             });
             sessions.push(SessionSummary {
                 path,
@@ -111,7 +116,7 @@ impl SessionSummary {
     pub fn prototype(&self) -> Option<&str> {
         match &self.state {
             SessionState::Readable { prototype, .. } => Some(prototype),
-            SessionState::Broken { .. } => None,
+            SessionState::Empty | SessionState::Broken { .. } => None,
         }
     }
 
@@ -125,7 +130,7 @@ impl SessionSummary {
 fn key(summary: &SessionSummary) -> (bool, &str, &Path) {
     match &summary.state {
         SessionState::Readable { started_at, .. } => (false, started_at, &summary.path),
-        SessionState::Broken { .. } => (true, "", &summary.path),
+        SessionState::Empty | SessionState::Broken { .. } => (true, "", &summary.path),
     }
 }
 

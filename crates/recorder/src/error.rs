@@ -46,6 +46,24 @@ pub enum RecorderError {
         /// What it is.
         found: String,
     },
+    /// There is a file, at most with tables, and no row in them: its run ended before anything was recorded.
+    #[error("{}: expected a session, found a file without a record in it: its run ended before it wrote the header, or something \
+        emptied the file; there is nothing to go on with: remove it, and begin with `skinrig run`", path.display())]
+    Empty {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A session was to go on that is not what was recorded. Nothing in it was changed.
+    #[error("{}: expected a sound session to go on with, found {} problem(s): {}; nothing was changed: `skinrig salvage` copies what \
+        is whole into a new session", path.display(), problems.len() as u64 + more_problems, problems.join("; "))]
+    Unsound {
+        /// The session file.
+        path: PathBuf,
+        /// What is wrong, in words.
+        problems: Vec<String>,
+        /// Problems found beyond these.
+        more_problems: u64,
+    },
     /// Written by a newer skinrig.
     #[error("{}: expected schema version up to {supported}, found {found}; read it with a newer skinrig", path.display())]
     NewerSchema {
@@ -83,6 +101,17 @@ pub enum RecorderError {
     /// An earlier write failed; the session takes nothing more.
     #[error("the session is no longer written: {0}")]
     Failed(String),
+    /// Another program kept the session open for so long that it could not be sealed. It is complete.
+    #[error("{}: complete, but not sealed: expected every other program to close it, found it open in one for {} s ({found}); \
+        close that program, and `skinrig resume` seals it", path.display(), waited.as_secs())]
+    HeldOpen {
+        /// The session file.
+        path: PathBuf,
+        /// How long was waited for it.
+        waited: std::time::Duration,
+        /// SQLite's answer.
+        found: String,
+    },
     /// The session cannot be sealed in its present state.
     #[error("{}: cannot seal: expected {expected}, found {found}; the session stays readable, and `skinrig resume` finishes it", path.display())]
     Unsealable {

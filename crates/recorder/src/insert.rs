@@ -26,6 +26,8 @@ const BLOCK_SAMPLES: usize = 4096;
 pub struct Journal {
     pub path: PathBuf,
     pub conn: SqliteConnection,
+    /// The leg that is written.
+    leg: u32,
     poses: Vec<u8>,
     pose_span: Option<(HostTime, HostTime)>,
     opened: Option<Instant>,
@@ -34,10 +36,11 @@ pub struct Journal {
 }
 
 impl Journal {
-    pub fn new(path: PathBuf, conn: SqliteConnection) -> Self {
+    pub fn new(path: PathBuf, conn: SqliteConnection, leg: u32) -> Self {
         Self {
             path,
             conn,
+            leg,
             poses: Vec::new(),
             pose_span: None,
             opened: None,
@@ -119,12 +122,13 @@ impl Journal {
             Record::Resumed(_) => Err(Fault::bad("record", "one of a leg", "the leg's header")),
             Record::Intent { attempt, t } => {
                 sqlx::query(
-                    "INSERT INTO attempt (press, number, previous, intent_ns) VALUES (?, ?, ?, ?)",
+                    "INSERT INTO attempt (press, number, previous, intent_ns, leg) VALUES (?, ?, ?, ?, ?)",
                 )
                 .bind(attempt.press.index())
                 .bind(attempt.number)
                 .bind(previous(attempt.number))
                 .bind(t.0)
+                .bind(self.leg)
                 .execute(&mut self.conn)
                 .await?;
                 Ok(())
@@ -172,13 +176,14 @@ impl Journal {
             Record::Outcome(outcome) => self.outcome(&outcome).await,
             Record::Missed(attempt, reason) => {
                 sqlx::query(
-                    "INSERT INTO attempt (press, number, previous, verdict, reason, scheduled)
-                     VALUES (?, ?, ?, 'missed', ?, 0)",
+                    "INSERT INTO attempt (press, number, previous, verdict, reason, scheduled, leg)
+                     VALUES (?, ?, ?, 'missed', ?, 0, ?)",
                 )
                 .bind(attempt.press.index())
                 .bind(attempt.number)
                 .bind(previous(attempt.number))
                 .bind(reason)
+                .bind(self.leg)
                 .execute(&mut self.conn)
                 .await?;
                 Ok(())

@@ -12,6 +12,7 @@
 
 mod box_row;
 pub mod catalogue;
+mod chain;
 pub mod codec;
 pub mod error;
 pub mod reader;
@@ -20,6 +21,7 @@ pub mod tags;
 pub mod verify;
 pub mod writer;
 
+mod digest;
 mod from_row;
 mod insert;
 mod leg;

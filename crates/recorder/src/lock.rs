@@ -4,7 +4,7 @@
 //! session file, and some systems let the two interfere.
 
 use std::fs::{File, OpenOptions, TryLockError};
-use std::io::{Read, Write};
+use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -15,11 +15,14 @@ const LOOKED_WITHIN: Duration = Duration::from_millis(500);
 /// Between two tries.
 const TRY_AGAIN: Duration = Duration::from_millis(2);
 
+/// What a holder that seals its session adds to its own words.
+const SEALING: &str = ", which seals it";
+
 /// Held by whoever writes a session, for as long as it does. The file goes away with it.
 #[derive(Debug)]
 pub struct WriterLock {
     path: PathBuf,
-    _file: File,
+    file: File,
 }
 
 impl WriterLock {
@@ -61,10 +64,30 @@ impl WriterLock {
             if is_still_at(&file, &path).map_err(io)? {
                 file.set_len(0).map_err(io)?;
                 write!(file, "process {}", std::process::id()).map_err(io)?;
-                return Ok(Self { path, _file: file });
+                return Ok(Self { path, file });
             }
         }
     }
+}
+
+impl WriterLock {
+    /// Announces that the session is being sealed, for which it must be open nowhere else: whoever wants to read it waits.
+    pub fn announce_sealing(&mut self) {
+        // At the end of what the holder wrote about itself. Unannounced, sealing takes its chance among the readers.
+        let _ = write!(self.file, "{SEALING}");
+    }
+
+    /// Readers need not wait any longer.
+    pub fn withdraw_sealing(&mut self) {
+        let _ = self.file.set_len(0);
+        let _ = self.file.seek(SeekFrom::Start(0));
+        let _ = write!(self.file, "process {}", std::process::id());
+    }
+}
+
+/// Whether the session at `session` is being sealed now.
+pub fn is_being_sealed(session: &Path) -> bool {
+    writer_of(session).is_some_and(|by| by.ends_with(SEALING))
 }
 
 impl Drop for WriterLock {

@@ -15,6 +15,9 @@ const QUEUE_BYTES: usize = 64 << 20;
 /// Longest time for which a caller waits for the disk.
 const PATIENCE: Duration = Duration::from_secs(30);
 
+/// How long sealing waits for other programs that have the session open, unless told otherwise.
+const SEAL_PATIENCE: Duration = Duration::from_secs(60);
+
 /// A record that can be written, or why it cannot. It keeps its place in the order either way.
 pub type Prepared = Result<Ready, Fault>;
 
@@ -52,6 +55,9 @@ struct Queue {
     durable: u64,
     failed: Option<String>,
     closed: Option<Close>,
+    /// Another program keeps the session from being sealed.
+    held_open: bool,
+    seal_patience: Option<Duration>,
 }
 
 /// How full the queue of records has been.
@@ -236,6 +242,26 @@ impl Shared {
     /// Why nothing is written any more.
     pub fn failure(&self) -> Option<String> {
         self.lock().failed.clone()
+    }
+
+    /// How long sealing waits for other programs.
+    pub fn seal_patience(&self) -> Duration {
+        self.lock().seal_patience.unwrap_or(SEAL_PATIENCE)
+    }
+
+    /// Sets that time.
+    pub fn set_seal_patience(&self, patience: Duration) {
+        self.lock().seal_patience = Some(patience);
+    }
+
+    /// Another program keeps the session from being sealed; that is waited for.
+    pub fn held_open(&self) {
+        self.lock().held_open = true;
+    }
+
+    /// Whether one does.
+    pub fn is_held_open(&self) -> bool {
+        self.lock().held_open
     }
 
     /// No record follows.

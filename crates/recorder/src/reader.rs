@@ -12,6 +12,7 @@ use crate::from_row::{header_from, planned_from};
 use crate::query::{self, Fault, each_row, int, named, real, sha, text};
 use crate::rows::{DeviceRow, PressTally, Seal, SessionTotals};
 use crate::schema;
+use crate::seal::placeholder_of;
 
 mod journal;
 mod legs;
@@ -136,9 +137,14 @@ impl SessionReader {
     }
 
     fn no_header(&self) -> RecorderError {
-        RecorderError::NotThere {
-            path: self.path.clone(),
-            wanted: "the run's header".into(),
+        match self.ask("reading its header", async |conn| {
+            schema::is_blank(conn).await
+        }) {
+            Ok(true) => RecorderError::Empty {
+                path: self.path.clone(),
+            },
+            Ok(false) => self.damaged("session".into(), "the run's header", "none".into()),
+            Err(e) => e,
         }
     }
 
@@ -175,11 +181,17 @@ impl SessionReader {
         Ok(header)
     }
 
-    /// The seal, or `None` for a session that was never sealed.
+    /// The seal, or `None` for a session that is not sealed, or whose sealing was cut off before the last step.
     ///
     /// # Errors
     /// When the file is damaged.
     pub fn seal(&self) -> Result<Option<Seal>, RecorderError> {
+        let is_stamped = |seal: &Seal| seal.file_sha256 != placeholder_of(&seal.tree_sha256);
+        Ok(self.seal_row()?.filter(is_stamped))
+    }
+
+    /// The row of the seal, also one without its file hash.
+    pub(crate) fn seal_row(&self) -> Result<Option<Seal>, RecorderError> {
         let seals = self.all("reading its seal", "SELECT * FROM seal", |row| {
             let mut totals = SessionTotals {
                 presses: query::tally(row, "")?,

@@ -9,42 +9,66 @@ use sqlx::{Connection, Sqlite, Transaction};
 use crate::error::RecorderError;
 use crate::leg::{Joint, next_second};
 use crate::lock::WriterLock;
-use crate::query::{Fault, blob, int, opt_int, opt_text, text};
+use crate::query::{Fault, blob, int, opt_int, opt_text, schema_version, text};
 use crate::reader::SessionReader;
-use crate::{schema, seal};
+use crate::verify::{ChunkScanner, VerifyReport, verify};
+use crate::{chain, schema};
 
 /// What the writer of a leg needs to know.
 pub struct Begun {
+    /// Which leg it is.
+    pub number: u32,
     pub joint: Joint,
     pub formats: [StreamFormat; 2],
 }
 
-/// Locks a session that can go on, and looks whether it can; nothing changes.
-pub fn lock_unfinished(path: &Path) -> Result<WriterLock, RecorderError> {
-    let (lock, reader) = lock(path)?;
-    match reader.end()? {
-        Some((_, RunEnd::Completed)) => Err(RecorderError::Completed {
+/// Locks a session that can go on, and checks all of it: what is not what was recorded is never sealed anew. Nothing changes.
+pub fn lock_unfinished(
+    path: &Path,
+    scanner: &mut dyn ChunkScanner,
+) -> Result<WriterLock, RecorderError> {
+    let lock = lock(path)?;
+    let end = SessionReader::open(path).and_then(|reader| reader.end());
+    if let Ok(Some((_, RunEnd::Completed))) = end {
+        return Err(RecorderError::Completed {
             path: path.to_owned(),
-        }),
-        _ => Ok(lock),
+        });
     }
+    check(path, scanner)?;
+    Ok(lock)
 }
 
-/// Locks a session that has its end and no seal, or half a one; nothing changes.
-pub fn lock_unsealed(path: &Path) -> Result<WriterLock, RecorderError> {
-    let (lock, reader) = lock(path)?;
-    let path = path.to_owned();
-    let seal = reader.seal()?;
-    if seal.is_some_and(|seal| seal.file_sha256 != seal::placeholder_of(&seal.tree_sha256)) {
-        return Err(RecorderError::Completed { path });
-    }
-    match reader.end()? {
-        Some(_) => Ok(lock),
-        None => Err(RecorderError::NotThere {
-            path,
+/// Locks a session that has its end and no seal, or half a one, and checks all of it; nothing changes.
+pub fn lock_unsealed(
+    path: &Path,
+    scanner: &mut dyn ChunkScanner,
+) -> Result<WriterLock, RecorderError> {
+    let lock = lock(path)?;
+    let end = SessionReader::open(path).and_then(|reader| reader.end());
+    if let Ok(None) = end {
+        return Err(RecorderError::NotThere {
+            path: path.to_owned(),
             wanted: "the end of its run".into(),
-        }),
+        });
     }
+    if check(path, scanner)?.sealed {
+        return Err(RecorderError::Completed {
+            path: path.to_owned(),
+        });
+    }
+    Ok(lock)
+}
+
+fn check(path: &Path, scanner: &mut dyn ChunkScanner) -> Result<VerifyReport, RecorderError> {
+    let report = verify(path, scanner)?;
+    if report.is_sound() {
+        return Ok(report);
+    }
+    Err(RecorderError::Unsound {
+        path: path.to_owned(),
+        problems: report.problems,
+        more_problems: report.more_problems,
+    })
 }
 
 /// Opens an unsealed session for writing.
@@ -65,13 +89,15 @@ async fn clear_seal(conn: &mut SqliteConnection) -> Result<(), Fault> {
     Ok(all.commit().await?)
 }
 
-fn lock(path: &Path) -> Result<(WriterLock, SessionReader), RecorderError> {
+fn lock(path: &Path) -> Result<WriterLock, RecorderError> {
     // Before the lock: it would lie beside a file that is no session, and a write that was cut off is undone only without one.
-    SessionReader::open(path)?;
-    let lock = WriterLock::take(path)?;
-    let reader = SessionReader::open(path)?;
-    reader.header()?;
-    Ok((lock, reader))
+    match SessionReader::open(path).and_then(|reader| reader.session_id()) {
+        // What is wrong, and what to do about it, is for the check to tell.
+        Ok(_) | Err(RecorderError::Damaged { .. } | RecorderError::Sql { .. }) => {
+            WriterLock::take(path)
+        }
+        Err(e) => Err(e),
+    }
 }
 
 /// Begins the leg: durable on return, all of it or nothing.
@@ -92,9 +118,11 @@ pub async fn begin(
 async fn write(conn: &mut SqliteConnection, header: &ResumeHeader) -> Result<Begun, Fault> {
     // A sealed session is still in rollback mode: killed at any instant in here, it is rolled back to the sealed bytes.
     let mut all = conn.begin_with("BEGIN IMMEDIATE").await?;
+    let schema = schema_version(&mut all).await?;
     schema::migrate(&mut all).await?;
     let (joint, formats) = joint(&mut all).await?;
     let number = insert_leg(&mut all, header, &joint).await?;
+    chain::keep(&mut all, number, schema).await?;
     sqlx::query(
         "UPDATE attempt SET verdict = 'invalid', reason = ?, scheduled = 0, faults = ? WHERE verdict IS NULL",
     )
@@ -115,7 +143,11 @@ async fn write(conn: &mut SqliteConnection, header: &ResumeHeader) -> Result<Beg
         sqlx::query(delete).execute(&mut *all).await?;
     }
     all.commit().await?;
-    Ok(Begun { joint, formats })
+    Ok(Begun {
+        number,
+        joint,
+        formats,
+    })
 }
 
 async fn joint(conn: &mut Transaction<'_, Sqlite>) -> Result<(Joint, [StreamFormat; 2]), Fault> {

@@ -3,7 +3,7 @@
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use sqlx::migrate::Migrator;
 use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection, SqliteJournalMode, SqliteSynchronous};
@@ -50,15 +50,28 @@ pub async fn create(path: &Path) -> Result<SqliteConnection, RecorderError> {
         }
     }
     let fault = |e: sqlx::Error| Fault::from(e).at(path, "creating the schema");
-    let mut conn = writable(path)
+    let mut conn = new_file(path).await.map_err(fault)?;
+    MIGRATOR.run(&mut conn).await.map_err(|e| fault(e.into()))?;
+    Ok(conn)
+}
+
+async fn new_file(path: &Path) -> sqlx::Result<SqliteConnection> {
+    writable(path)
         .page_size(PAGE_BYTES)
         .journal_mode(SqliteJournalMode::Wal)
         // Feasibility measurement: after a power cut NORMAL lost acknowledged rows, FULL none.
         .synchronous(SqliteSynchronous::Full)
         .connect()
         .await
-        .map_err(fault)?;
-    MIGRATOR.run(&mut conn).await.map_err(|e| fault(e.into()))?;
+}
+
+/// A new file with the schema of an older version of skinrig.
+#[cfg(test)]
+pub async fn create_version(path: &Path, version: u32) -> sqlx::Result<SqliteConnection> {
+    File::create_new(path)?;
+    let mut conn = new_file(path).await?;
+    let first = MIGRATOR.iter().take(version as usize).cloned().collect();
+    Migrator::with_migrations(first).run(&mut conn).await?;
     Ok(conn)
 }
 
@@ -134,16 +147,27 @@ async fn roll_back(path: &Path) -> Result<(), RecorderError> {
     conn.close().await.map_err(fault)
 }
 
+/// How long a reader stays away from a session that is being sealed: a bit longer than its writer waits for those before it.
+const SEALED_WITHIN: Duration = Duration::from_secs(90);
+/// Between two looks whether it is.
+const LOOK_AGAIN: Duration = Duration::from_millis(10);
+
 /// Opens a session file for reading, after a look at its first page.
 pub async fn open(path: &Path) -> Result<SqliteConnection, RecorderError> {
+    let from = Instant::now();
+    while crate::lock::is_being_sealed(path) && from.elapsed() < SEALED_WITHIN {
+        std::thread::sleep(LOOK_AGAIN);
+    }
     refuse_links(path)?;
     refuse_super_journal(path)?;
-    let rollback = check_first_page(path)?;
-    if rollback && beside(path, "-journal").exists() && crate::lock::writer_of(path).is_none() {
+    let mut mode = check_first_page(path)?;
+    // Also of a change into or out of the log, whose first page may already say the other mode.
+    if beside(path, "-journal").exists() && crate::lock::writer_of(path).is_none() {
         roll_back(path).await?;
+        mode = check_first_page(path)?;
     }
     // A sealed file is in rollback mode, has nothing beside it and does not change; one that is being sealed still does.
-    let immutable = rollback
+    let immutable = mode == Mode::Rollback
         && crate::lock::writer_of(path).is_none()
         && !["-wal", "-journal"]
             .iter()
@@ -159,13 +183,36 @@ pub async fn open(path: &Path) -> Result<SqliteConnection, RecorderError> {
         .await
         .map_err(|e| Fault::from(e).at(path, "opening it"))?;
     let schema = check_schema(&mut conn).await;
-    schema.map_err(|fault| fault.at(path, "reading its schema"))?;
-    Ok(conn)
+    let made = schema.map_err(|fault| fault.at(path, "reading its schema"))?;
+    if made { Ok(conn) } else { Err(empty(path)) }
 }
 
-async fn check_schema(conn: &mut SqliteConnection) -> Result<(), Fault> {
+fn empty(path: &Path) -> RecorderError {
+    RecorderError::Empty {
+        path: path.to_owned(),
+    }
+}
+
+/// Whether the schema was made: a writer that ends before that leaves a file without any table of a session.
+async fn check_schema(conn: &mut SqliteConnection) -> Result<bool, Fault> {
     check_schema_text(conn).await?;
-    check_schema_is_data(conn).await
+    check_schema_is_data(conn).await?;
+    let sql = "SELECT EXISTS (SELECT 1 FROM sqlite_schema WHERE type = 'table' AND name <> '_sqlx_migrations')";
+    Ok(sqlx::query_scalar(sql).fetch_one(conn).await?)
+}
+
+/// Whether no row was ever written: nothing but the schema is there.
+pub async fn is_blank(conn: &mut SqliteConnection) -> Result<bool, Fault> {
+    let sql =
+        "SELECT NOT EXISTS (SELECT 1 FROM session) AND NOT EXISTS (SELECT 1 FROM robot_from_skin)
+           AND NOT EXISTS (SELECT 1 FROM press) AND NOT EXISTS (SELECT 1 FROM attempt)
+           AND NOT EXISTS (SELECT 1 FROM device) AND NOT EXISTS (SELECT 1 FROM command)
+           AND NOT EXISTS (SELECT 1 FROM pose_block) AND NOT EXISTS (SELECT 1 FROM mark)
+           AND NOT EXISTS (SELECT 1 FROM chunk) AND NOT EXISTS (SELECT 1 FROM trigger_edge)
+           AND NOT EXISTS (SELECT 1 FROM interruption) AND NOT EXISTS (SELECT 1 FROM note)
+           AND NOT EXISTS (SELECT 1 FROM run_end) AND NOT EXISTS (SELECT 1 FROM table_digest)
+           AND NOT EXISTS (SELECT 1 FROM seal)";
+    Ok(sqlx::query_scalar(sql).fetch_one(conn).await?)
 }
 
 /// The schema of a damaged file may hold names that are no text, over which the SQLite client would panic.
@@ -272,8 +319,15 @@ fn refuse_super_journal(path: &Path) -> Result<(), RecorderError> {
     Ok(())
 }
 
-/// True when the file is in rollback mode. Layout: sqlite.org/fileformat.html section 1.3.
-fn check_first_page(path: &Path) -> Result<bool, RecorderError> {
+/// The journal mode that the first page says.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Mode {
+    Rollback,
+    Log,
+}
+
+/// Layout: sqlite.org/fileformat.html sections 1.3 and 1.6.
+fn check_first_page(path: &Path) -> Result<Mode, RecorderError> {
     let io = |source: std::io::Error| {
         if source.kind() == std::io::ErrorKind::NotFound {
             RecorderError::Missing {
@@ -294,13 +348,18 @@ fn check_first_page(path: &Path) -> Result<bool, RecorderError> {
         })
     };
     let mut file = File::open(path).map_err(io)?;
-    if file.metadata().map_err(io)?.is_dir() {
+    let metadata = file.metadata().map_err(io)?;
+    if metadata.is_dir() {
         return not("a folder");
     }
-    let mut page = [0u8; 100];
+    // A writer makes the file first; what it then writes may still be in the log or the journal beside it.
+    if metadata.len() == 0 {
+        return Err(empty(path));
+    }
+    let mut page = [0u8; 108];
     if let Err(e) = file.read_exact(&mut page) {
         return match e.kind() {
-            std::io::ErrorKind::UnexpectedEof => not("a file of less than 100 bytes"),
+            std::io::ErrorKind::UnexpectedEof => not("a file of less than 108 bytes"),
             _ => Err(io(e)),
         };
     }
@@ -312,6 +371,10 @@ fn check_first_page(path: &Path) -> Result<bool, RecorderError> {
         |at: usize| u32::from_be_bytes([page[at], page[at + 1], page[at + 2], page[at + 3]]);
     let (version, application) = (number(60), number(68));
     if application != APPLICATION_ID && !(application == 0 && beside(path, "-wal").exists()) {
+        // A leaf of the tree of tables that has no cell: there is no table.
+        if application == 0 && page[100] == 0x0d && page[103..105] == [0, 0] {
+            return Err(empty(path));
+        }
         return not("another program's SQLite file");
     }
     if version > SCHEMA_VERSION {
@@ -321,12 +384,29 @@ fn check_first_page(path: &Path) -> Result<bool, RecorderError> {
             supported: SCHEMA_VERSION,
         });
     }
-    Ok(page[18] == 1 && page[19] == 1)
+    Ok(match (page[18], page[19]) {
+        (1, 1) => Mode::Rollback,
+        _ => Mode::Log,
+    })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    struct NoBytes;
+    impl crate::ChunkScanner for NoBytes {
+        fn restart(&mut self, _: skinrig_model::CameraId, _: skinrig_model::StreamFormat, _: u64) {}
+        fn lost(&mut self, _: skinrig_model::CameraId, _: skinrig_model::StreamFormat, _: u64) {}
+        fn scan(
+            &mut self,
+            _: skinrig_model::CameraId,
+            _: skinrig_model::StreamFormat,
+            _: &[u8],
+        ) -> (skinrig_model::ChunkFacts, Vec<skinrig_model::TriggerEdge>) {
+            Default::default()
+        }
+    }
 
     #[test]
     fn the_version_counts_the_migrations() {
@@ -336,27 +416,6 @@ mod tests {
     /// A sealed session of schema 1 is read and verified as before: the tables that came later are no part of it.
     #[test]
     fn sessions_of_the_first_schema_stay_sound() {
-        struct NoBytes;
-        impl crate::ChunkScanner for NoBytes {
-            fn restart(
-                &mut self,
-                _: skinrig_model::CameraId,
-                _: skinrig_model::StreamFormat,
-                _: u64,
-            ) {
-            }
-            fn lost(&mut self, _: skinrig_model::CameraId, _: skinrig_model::StreamFormat, _: u64) {
-            }
-            fn scan(
-                &mut self,
-                _: skinrig_model::CameraId,
-                _: skinrig_model::StreamFormat,
-                _: &[u8],
-            ) -> (skinrig_model::ChunkFacts, Vec<skinrig_model::TriggerEdge>) {
-                Default::default()
-            }
-        }
-
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("old.session.sqlite");
         let runtime = tokio::runtime::Builder::new_current_thread()
@@ -369,6 +428,9 @@ mod tests {
                 "DROP TABLE preflight",
                 "DROP TABLE leg",
                 "DROP TABLE gap",
+                "DROP TABLE previous_table_digest",
+                "DROP TABLE previous_seal",
+                "ALTER TABLE attempt DROP COLUMN leg",
                 "ALTER TABLE attempt DROP COLUMN touched_mm",
                 "ALTER TABLE attempt DROP COLUMN faults",
                 "DELETE FROM _sqlx_migrations WHERE version > 20261121000000",
@@ -377,7 +439,7 @@ mod tests {
             ] {
                 sqlx::query(undo).execute(&mut conn).await.unwrap();
             }
-            crate::seal::digest_tables(&mut conn).await.unwrap()
+            crate::digest::digest_tables(&mut conn).await.unwrap()
         });
         let later = ["box_report", "preflight", "leg", "gap"];
         assert!(digests.iter().all(|d| !later.contains(&d.name.as_str())));
@@ -385,10 +447,12 @@ mod tests {
         let reader = crate::SessionReader::open(&path).unwrap();
         assert_eq!(reader.box_reports().unwrap(), []);
         assert_eq!(reader.preflight().unwrap(), []);
-        let problems = crate::verify(&path, &mut NoBytes).unwrap().problems;
-        // Nothing but the header, which nobody wrote.
-        assert_eq!(problems.len(), 1, "{problems:?}");
-        assert!(problems[0].contains("the run's header"), "{problems:?}");
+        // Nobody wrote a header.
+        let empty = crate::verify(&path, &mut NoBytes);
+        assert!(
+            matches!(empty, Err(RecorderError::Empty { .. })),
+            "{empty:?}"
+        );
     }
 
     #[cfg(unix)]
@@ -407,8 +471,8 @@ mod tests {
             std::os::unix::fs::symlink(&victim, &link).unwrap();
             for refused in [
                 crate::SessionReader::open(&path).map(drop),
-                crate::SessionWriter::resume(&path).map(drop),
-                crate::SessionWriter::ended(&path).map(drop),
+                crate::SessionWriter::resume(&path, &mut NoBytes).map(drop),
+                crate::SessionWriter::ended(&path, &mut NoBytes).map(drop),
             ] {
                 let refused = refused.unwrap_err().to_string();
                 assert!(refused.contains("a link beside it"), "{refused}");
@@ -467,8 +531,8 @@ mod tests {
             forge();
             for refused in [
                 crate::SessionReader::open(&path).map(drop),
-                crate::SessionWriter::resume(&path).map(drop),
-                crate::SessionWriter::ended(&path).map(drop),
+                crate::SessionWriter::resume(&path, &mut NoBytes).map(drop),
+                crate::SessionWriter::ended(&path, &mut NoBytes).map(drop),
                 runtime.block_on(open_again(&path)).map(drop),
             ] {
                 let refused = refused.unwrap_err().to_string();

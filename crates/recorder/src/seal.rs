@@ -9,121 +9,11 @@ use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::Path;
 
 use sha2::{Digest, Sha256};
-use sqlx::sqlite::{SqliteConnection, SqliteRow};
-use sqlx::{Row, TypeInfo, ValueRef};
+use sqlx::sqlite::SqliteConnection;
 
-use crate::query::{Fault, each_row, has_table};
+use crate::digest::{digest_tables, tree_of};
+use crate::query::Fault;
 use crate::rows::SessionTotals;
-
-/// The tables that the tree hash covers, in its order, each with the rows and columns that count. Blobs of
-/// camera bytes and poses are covered by the SHA-256 beside them.
-const TABLES: [(&str, &str); 19] = [
-    ("session", "SELECT * FROM session ORDER BY id"),
-    ("leg", "SELECT * FROM leg ORDER BY number"),
-    ("robot_from_skin", "SELECT * FROM robot_from_skin ORDER BY axis"),
-    ("device", "SELECT * FROM device ORDER BY id"),
-    ("setting", "SELECT * FROM setting ORDER BY device, position"),
-    ("preflight", "SELECT * FROM preflight ORDER BY id"),
-    ("press", "SELECT * FROM press ORDER BY id"),
-    ("attempt", "SELECT * FROM attempt ORDER BY press, number"),
-    ("command", "SELECT * FROM command ORDER BY id"),
-    ("pose_block", "SELECT id, first_ns, last_ns, samples, sha256 FROM pose_block ORDER BY id"),
-    ("mark", "SELECT * FROM mark ORDER BY id"),
-    ("box_report", "SELECT * FROM box_report ORDER BY id"),
-    (
-        "chunk",
-        "SELECT camera, seq, host_ns, lost_before, codec, raw_bytes, raw_crc32, stored_sha256, first_us,
-         last_us, cd_events, on_events, trigger_edges FROM chunk ORDER BY camera, seq",
-    ),
-    ("gap", "SELECT camera, seq, from_us, to_us FROM gap ORDER BY camera, seq"),
-    (
-        "trigger_edge",
-        "SELECT camera, seq, position, t_us, channel, rising FROM trigger_edge
-         ORDER BY camera, seq, position",
-    ),
-    ("interruption", "SELECT * FROM interruption ORDER BY id"),
-    ("note", "SELECT * FROM note ORDER BY id"),
-    ("run_end", "SELECT * FROM run_end ORDER BY id"),
-    // Which migrations made the schema: name and content, not when or how fast they ran.
-    ("_sqlx_migrations", "SELECT version, checksum FROM _sqlx_migrations ORDER BY version"),
-];
-
-/// The digest of one table.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct TableDigest {
-    pub name: String,
-    pub rows: i64,
-    pub sha256: [u8; 32],
-}
-
-/// The digests of all tables that the file's schema has. A value is hashed as one type byte (0 null, 1 integer, 2 real, 3 text, 4 blob)
-/// and its eight little-endian bytes, or its length in eight such bytes and its content.
-pub async fn digest_tables(conn: &mut SqliteConnection) -> Result<Vec<TableDigest>, Fault> {
-    let mut digests = Vec::with_capacity(TABLES.len());
-    for (name, sql) in TABLES {
-        // A table that is missing from a sealed file is missed in the tree hash.
-        if !has_table(conn, name).await? {
-            continue;
-        }
-        let (mut hash, mut rows, mut bytes) = (Sha256::new(), 0, Vec::new());
-        each_row(sqlx::query(sql), conn, |row| {
-            rows += 1;
-            bytes.clear();
-            encode_row(row, &mut bytes)?;
-            hash.update(&bytes);
-            Ok(())
-        })
-        .await?;
-        digests.push(TableDigest {
-            name: name.to_owned(),
-            rows,
-            sha256: hash.finalize().into(),
-        });
-    }
-    Ok(digests)
-}
-
-fn encode_row(row: &SqliteRow, bytes: &mut Vec<u8>) -> Result<(), Fault> {
-    for i in 0..row.len() {
-        let value = row.try_get_raw(i)?;
-        if value.is_null() {
-            bytes.push(0);
-            continue;
-        }
-        let kind = value.type_info().name().to_owned();
-        let mut push = |tag: u8, head: [u8; 8], content: &[u8]| {
-            bytes.push(tag);
-            bytes.extend_from_slice(&head);
-            bytes.extend_from_slice(content);
-        };
-        let length = |content: &[u8]| (content.len() as u64).to_le_bytes();
-        match kind.as_str() {
-            "INTEGER" => push(1, row.try_get_unchecked::<i64, _>(i)?.to_le_bytes(), &[]),
-            "REAL" => push(2, row.try_get_unchecked::<f64, _>(i)?.to_le_bytes(), &[]),
-            "TEXT" => {
-                let text = row.try_get_unchecked::<String, _>(i)?;
-                push(3, length(text.as_bytes()), text.as_bytes());
-            }
-            _ => {
-                let blob = row.try_get_unchecked::<Vec<u8>, _>(i)?;
-                push(4, length(&blob), &blob);
-            }
-        }
-    }
-    Ok(())
-}
-
-/// SHA-256 over, for each table, its name, a zero byte, its row count in eight little-endian bytes, its digest.
-pub fn tree_of(digests: &[TableDigest]) -> [u8; 32] {
-    let mut hash = Sha256::new();
-    for table in digests {
-        hash.update(table.name.as_bytes());
-        hash.update([0]);
-        hash.update(table.rows.to_le_bytes());
-        hash.update(table.sha256);
-    }
-    hash.finalize().into()
-}
 
 /// Writes the rows of the seal, with a placeholder for the file hash, in one transaction.
 /// Returns (tree hash, placeholder).
@@ -204,14 +94,40 @@ pub fn stamp(path: &Path, page: u32, placeholder: &[u8; 32]) -> std::io::Result<
     Ok(digest)
 }
 
-/// The hash of a sealed file whose seal, on page `page`, says `recorded`; `None` when that page does not
-/// hold `recorded` exactly once.
-pub fn file_hash(path: &Path, page: u32, recorded: &[u8; 32]) -> std::io::Result<Option<[u8; 32]>> {
+/// How far the file hash was written that covers every byte of the file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stamp {
+    /// All of it, and the file is what it covers.
+    Whole,
+    /// Sealing was cut off before or while it was written: the placeholder, or the first bytes of the hash and then those of the
+    /// placeholder.
+    CutOff,
+    /// The file is not what it covers: this is the hash of the file.
+    Wrong([u8; 32]),
+    /// The recorded hash does not lie exactly once on the page of the seal.
+    Misplaced,
+}
+
+/// Holds the file hash `recorded` on page `page` against the file, whose tree hash is recorded as `tree`.
+pub fn check_stamp(
+    path: &Path,
+    page: u32,
+    recorded: &[u8; 32],
+    tree: &[u8; 32],
+) -> std::io::Result<Stamp> {
     let mut file = File::open(path)?;
-    match locate(&mut file, page, recorded)? {
-        Some(at) => hash_around(&mut file, at).map(Some),
-        None => Ok(None),
-    }
+    let Some(at) = locate(&mut file, page, recorded)? else {
+        return Ok(Stamp::Misplaced);
+    };
+    let found = hash_around(&mut file, at)?;
+    let placeholder = placeholder_of(tree);
+    let written =
+        (0..32).find(|n| recorded[..*n] == found[..*n] && recorded[*n..] == placeholder[*n..]);
+    Ok(match written {
+        _ if found == *recorded => Stamp::Whole,
+        Some(_) => Stamp::CutOff,
+        None => Stamp::Wrong(found),
+    })
 }
 
 /// Where in the file `needle` lies on page `page`, when it lies there exactly once.

@@ -8,14 +8,15 @@ use skinrig_model::{
     RunEnd, RunHeader, StreamFormat, TriggerEdge, press::PressRole,
 };
 
+mod chain;
 mod gaps;
 mod legs;
+mod seal;
 
 use crate::error::RecorderError;
-use crate::query::{each_row, int, num, sha, text};
+use crate::query::{each_row, sha, text};
 use crate::reader::SessionReader;
 use crate::rows::{AttemptRow, SessionTotals};
-use crate::seal::{self, TableDigest};
 use crate::writer::hex;
 
 /// Problems that are told in full; more are only counted.
@@ -50,6 +51,8 @@ pub struct VerifyReport {
     pub problems: Vec<String>,
     /// Problems found beyond those told in `problems`.
     pub more_problems: u64,
+    /// What is worth knowing and no problem, in words.
+    pub remarks: Vec<String>,
     /// Counts and sizes, from the rows; `None` when they cannot be read.
     pub totals: Option<SessionTotals>,
 }
@@ -86,8 +89,8 @@ impl VerifyReport {
 /// tree hash and the hash of the whole file.
 ///
 /// # Errors
-/// [`RecorderError::Missing`] and [`RecorderError::Io`] when there is no file to read. Everything that is wrong
-/// inside the file is a problem in the report.
+/// [`RecorderError::Missing`] and [`RecorderError::Io`] when there is no file to read, [`RecorderError::Empty`] when nothing was ever
+/// recorded in it. Everything that is wrong inside the file is a problem in the report.
 pub fn verify(
     path: impl AsRef<Path>,
     scanner: &mut dyn ChunkScanner,
@@ -96,12 +99,19 @@ pub fn verify(
     let mut report = VerifyReport::default();
     let reader = match SessionReader::open(path) {
         Ok(reader) => reader,
-        Err(e @ (RecorderError::Missing { .. } | RecorderError::Io { .. })) => return Err(e),
+        Err(
+            e @ (RecorderError::Missing { .. }
+            | RecorderError::Io { .. }
+            | RecorderError::Empty { .. }),
+        ) => return Err(e),
         Err(e) => {
             report.add(e);
             return Ok(report);
         }
     };
+    if let Err(e @ RecorderError::Empty { .. }) = reader.session_id() {
+        return Err(e);
+    }
     check_sqlite(&reader, &mut report);
     let formats = check_header(&reader, &mut report);
     for camera in CameraId::ALL {
@@ -116,7 +126,12 @@ pub fn verify(
     check_journal(&reader, &mut report);
     legs::check(&reader, &mut report);
     report.totals = report.take_totals(&reader);
-    check_seal(&reader, &mut report);
+    seal::check(&reader, &mut report);
+    chain::check(&reader, &mut report);
+    drop(reader);
+    if report.sealed && report.is_sound() {
+        seal::protect(path, &mut report);
+    }
     Ok(report)
 }
 
@@ -367,71 +382,5 @@ fn check_box_reports(reader: &SessionReader, report: &mut VerifyReport) {
             ));
         }
         last[like] = at;
-    }
-}
-
-fn check_seal(reader: &SessionReader, report: &mut VerifyReport) {
-    let Some(Some(seal)) = report.take(reader.seal()) else {
-        return;
-    };
-    report.sealed = true;
-    if let Some(totals) = report.totals {
-        report.equal("seal: counts", &totals, &seal.totals);
-    }
-    let read = reader.ask("checking the seal", async |conn| {
-        let mut recorded = Vec::new();
-        let query = sqlx::query("SELECT name, rows, sha256 FROM table_digest");
-        each_row(query, conn, |row| {
-            recorded.push(TableDigest {
-                name: text(row, "name")?,
-                rows: int(row, "rows")?,
-                sha256: sha(row, "sha256")?,
-            });
-            Ok(())
-        })
-        .await?;
-        Ok((
-            recorded,
-            seal::digest_tables(conn).await?,
-            seal::seal_page(conn).await?,
-        ))
-    });
-    let Some((recorded, computed, page)) = report.take(read) else {
-        return;
-    };
-    for table in &computed {
-        if !recorded.contains(table) {
-            report.add(format!(
-                "{}: rows are not those that were sealed",
-                table.name
-            ));
-        }
-    }
-    report.equal("seal: tables", &computed.len(), &recorded.len());
-    report.equal(
-        "seal: tree hash",
-        &hex(&seal::tree_of(&computed)),
-        &hex(&seal.tree_sha256),
-    );
-    match seal::file_hash(reader.path(), page, &seal.file_sha256) {
-        Err(e) => report.add(format!("seal: file hash: {e}")),
-        Ok(Some(found)) => {
-            report.equal("seal: file hash", &hex(&seal.file_sha256), &hex(&found));
-        }
-        Ok(None) => {
-            report.add("seal: file hash: expected once on the seal's page, found otherwise")
-        }
-    }
-    if seal.file_sha256 == seal::placeholder_of(&seal.tree_sha256) {
-        report.add("seal: sealing was broken off before the file hash was written; `skinrig resume` finishes it");
-    }
-    let ends = reader.ask("counting ends", async |conn| {
-        let row = sqlx::query("SELECT count(*) AS n FROM run_end")
-            .fetch_one(conn)
-            .await?;
-        num::<u64>(&row, "n")
-    });
-    if report.take(ends) == Some(0) {
-        report.add("seal: expected the run's end in a sealed session, found none");
     }
 }

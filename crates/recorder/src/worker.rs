@@ -17,8 +17,6 @@ use crate::writer::Sealed;
 
 /// What is not committed by a durable record or by its size is committed after this time.
 const COMMIT_AFTER: Duration = Duration::from_millis(500);
-/// How long other programs may keep a session from being sealed.
-const SEAL_PATIENCE: Duration = Duration::from_secs(3);
 const SEAL_AGAIN: Duration = Duration::from_millis(20);
 
 /// Writes prepared records into the session file.
@@ -79,10 +77,12 @@ impl Worker {
         }
         let failed = self.shared.failure().is_some();
         let Self {
-            runtime, journal, ..
+            runtime,
+            journal,
+            shared,
         } = self;
         let result = if close == Close::Seal && !failed {
-            Some(runtime.block_on(seal_session(journal)))
+            Some(runtime.block_on(seal_session(journal, &shared)))
         } else {
             // Nothing can be done about a failing close: what was committed is safe.
             let _ = runtime.block_on(journal.conn.close());
@@ -135,7 +135,14 @@ impl Worker {
     }
 }
 
-async fn seal_session(mut journal: Journal) -> Result<Sealed, RecorderError> {
+/// Whether SQLite refuses because another program has the file open: `SQLITE_BUSY` or `SQLITE_LOCKED`.
+fn is_held(error: &sqlx::Error) -> bool {
+    let code = error.as_database_error().and_then(|e| e.code());
+    let code = code.and_then(|code| code.parse::<u32>().ok());
+    code.is_some_and(|code| matches!(code & 0xFF, 5 | 6))
+}
+
+async fn seal_session(mut journal: Journal, shared: &Shared) -> Result<Sealed, RecorderError> {
     let path = journal.path.clone();
     let sql = |fault: Fault| fault.at(&path, "sealing");
     let totals = match journal.sealable().await.map_err(sql)? {
@@ -151,26 +158,32 @@ async fn seal_session(mut journal: Journal) -> Result<Sealed, RecorderError> {
     };
     let mut conn = journal.conn;
     // Out of the log first, while no seal exists: should this fail, the session is plainly unsealed.
-    let unsealable = |found: String| RecorderError::Unsealable {
-        path: path.clone(),
-        expected: "that no other program has the session open".into(),
-        found,
-    };
     conn.clear_cached_statements()
         .await
         .map_err(|e| sql(e.into()))?;
     // Whoever just looks is gone in a moment; SQLite itself does not wait here.
-    let patience = Instant::now() + SEAL_PATIENCE;
+    let patience = shared.seal_patience();
+    let from = Instant::now();
     let mode: String = loop {
         let asked = sqlx::query_scalar("PRAGMA journal_mode = DELETE");
         match asked.fetch_one(&mut conn).await {
             Ok(mode) => break mode,
-            Err(_) if Instant::now() < patience => std::thread::sleep(SEAL_AGAIN),
-            Err(e) => return Err(unsealable(e.to_string())),
+            Err(e) if !is_held(&e) => return Err(sql(e.into())),
+            Err(_) if from.elapsed() < patience => {
+                shared.held_open();
+                std::thread::sleep(SEAL_AGAIN);
+            }
+            Err(e) => {
+                return Err(RecorderError::HeldOpen {
+                    path: path.clone(),
+                    waited: patience,
+                    found: e.to_string(),
+                });
+            }
         }
     };
     if mode != "delete" {
-        return Err(unsealable(format!("journal mode {mode}")));
+        return Err(sql(Fault::bad("journal mode", "delete", mode)));
     }
     let (tree_sha256, placeholder) = seal::write_rows(&mut conn, &totals).await.map_err(sql)?;
     let page = seal::seal_page(&mut conn).await.map_err(sql)?;

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::thread::JoinHandle;
+use std::time::Duration;
 
 use sha2::{Digest, Sha256};
 use skinrig_model::{Record, ResumeHeader, RunHeader};
@@ -16,6 +17,7 @@ use crate::lock::WriterLock;
 use crate::prepare::Preparer;
 use crate::queue::{Close, QueueLoad, Shared};
 use crate::rows::SessionTotals;
+use crate::verify::ChunkScanner;
 use crate::worker::Worker;
 use crate::{prepare, resume, schema};
 
@@ -48,9 +50,11 @@ pub struct SessionWriter {
     /// Of a further leg; nothing moves in the first.
     joint: Joint,
     /// Given back when everything else is done: fields are dropped in their order, after `drop`.
-    #[expect(dead_code, reason = "held, not used")]
     lock: WriterLock,
 }
+
+/// Between two looks whether the session is sealed.
+const LOOK_AGAIN: Duration = Duration::from_millis(5);
 
 type Written = JoinHandle<Option<Result<Sealed, RecorderError>>>;
 
@@ -90,21 +94,25 @@ impl SessionWriter {
             phase: Phase::New,
             joint: Joint::default(),
         };
-        writer.start(runtime, conn, Preparer::default())?;
+        writer.start(runtime, conn, Preparer::default(), 1)?;
         Ok(writer)
     }
 
     /// Opens a session that was cut off, stopped or broken off by a fault, to go on with it in a further leg. Nothing in the file
     /// changes before the first record, which is [`Record::Resumed`]: with it, in one durable step, the seal is taken off, attempts
     /// that were cut off get their verdict, and the schema becomes the newest. All times and chunk numbers of the leg may begin
-    /// anew: they are joined to those before.
+    /// anew: they are joined to those before. The whole session is checked first, as by [`verify`](crate::verify()).
     ///
     /// # Errors
     /// [`RecorderError::InUse`] while another process writes the session; [`RecorderError::Completed`] when there is nothing to
-    /// resume; or why it cannot be read.
-    pub fn resume(path: impl AsRef<Path>) -> Result<Self, RecorderError> {
+    /// resume; [`RecorderError::Unsound`] when [`verify`](crate::verify()) finds anything wrong; [`RecorderError::Empty`] without a
+    /// header; or why it cannot be read.
+    pub fn resume(
+        path: impl AsRef<Path>,
+        scanner: &mut dyn ChunkScanner,
+    ) -> Result<Self, RecorderError> {
         let path = path.as_ref().to_owned();
-        let lock = resume::lock_unfinished(&path)?;
+        let lock = resume::lock_unfinished(&path, scanner)?;
         Ok(Self {
             lock,
             path,
@@ -119,10 +127,14 @@ impl SessionWriter {
     ///
     /// # Errors
     /// [`RecorderError::InUse`] while another process writes the session; [`RecorderError::Completed`] when it is sealed;
-    /// [`RecorderError::NotThere`] without an end; or why it cannot be read.
-    pub fn ended(path: impl AsRef<Path>) -> Result<Self, RecorderError> {
+    /// [`RecorderError::NotThere`] without an end; [`RecorderError::Unsound`] when [`verify`](crate::verify()) finds anything wrong;
+    /// or why it cannot be read.
+    pub fn ended(
+        path: impl AsRef<Path>,
+        scanner: &mut dyn ChunkScanner,
+    ) -> Result<Self, RecorderError> {
         let path = path.as_ref().to_owned();
-        let lock = resume::lock_unsealed(&path)?;
+        let lock = resume::lock_unsealed(&path, scanner)?;
         let runtime = runtime(&path)?;
         let conn = runtime.block_on(resume::open_again(&path))?;
         let mut writer = Self {
@@ -133,7 +145,7 @@ impl SessionWriter {
             phase: Phase::Ended,
             joint: Joint::default(),
         };
-        writer.start(runtime, conn, Preparer::default())?;
+        writer.start(runtime, conn, Preparer::default(), 1)?;
         Ok(writer)
     }
 
@@ -143,10 +155,11 @@ impl SessionWriter {
         runtime: Runtime,
         conn: SqliteConnection,
         preparer: Preparer,
+        leg: u32,
     ) -> Result<(), RecorderError> {
         let worker = Worker {
             runtime,
-            journal: Journal::new(self.path.clone(), conn),
+            journal: Journal::new(self.path.clone(), conn, leg),
             shared: Arc::clone(&self.shared),
         };
         let io = |e| starting(&self.path, e);
@@ -169,7 +182,7 @@ impl SessionWriter {
         let (conn, leg) = runtime.block_on(resume::begin(&self.path, header))?;
         self.joint = leg.joint;
         let preparer = Preparer::resuming(leg.formats, leg.joint.first_seq);
-        self.start(runtime, conn, preparer)
+        self.start(runtime, conn, preparer, leg.number)
     }
 
     /// The session file.
@@ -230,13 +243,27 @@ impl SessionWriter {
         }
     }
 
+    /// How long [`finish`](Self::finish) waits for other programs that have the session open; 60 s unless it is set here. New readers of
+    /// this version stay away meanwhile.
+    pub fn seal_within(&mut self, patience: Duration) {
+        self.shared.set_seal_patience(patience);
+    }
+
     /// Commits, writes the seal (final counts, tree hash, file hash), leaves one file and makes it read-only.
     ///
     /// # Errors
-    /// [`RecorderError::Unsealable`] before `Ended`, while a planned press has no verdict, or while another
-    /// program has the session open; [`RecorderError::Failed`] after a failed write. The session then stays
+    /// [`RecorderError::Unsealable`] before `Ended` and while a planned press has no verdict; [`RecorderError::HeldOpen`] when another
+    /// program had the session open for too long; [`RecorderError::Failed`] after a failed write. The session then stays
     /// readable and unsealed.
-    pub fn finish(mut self) -> Result<Sealed, RecorderError> {
+    pub fn finish(self) -> Result<Sealed, RecorderError> {
+        self.finish_or_tell(|| {})
+    }
+
+    /// As [`finish`](Self::finish); calls `tell` once when it has to wait for another program that has the session open.
+    ///
+    /// # Errors
+    /// As [`finish`](Self::finish).
+    pub fn finish_or_tell(mut self, tell: impl FnOnce()) -> Result<Sealed, RecorderError> {
         if let Some(detail) = self.shared.failure() {
             return Err(RecorderError::Failed(detail));
         }
@@ -248,10 +275,23 @@ impl SessionWriter {
             });
         }
         let ended = || "the recorder thread ended".to_owned();
-        self.close(Close::Seal).unwrap_or_else(|| {
+        self.lock.announce_sealing();
+        self.shared.close(Close::Seal);
+        let mut tell = Some(tell);
+        while self.threads.as_ref().is_some_and(|(_, w)| !w.is_finished()) {
+            if self.shared.is_held_open()
+                && let Some(tell) = tell.take()
+            {
+                tell();
+            }
+            std::thread::sleep(LOOK_AGAIN);
+        }
+        let sealed = self.close(Close::Seal).unwrap_or_else(|| {
             let detail = self.shared.failure().unwrap_or_else(ended);
             Err(RecorderError::Failed(detail))
-        })
+        });
+        self.lock.withdraw_sealing();
+        sealed
     }
 
     fn close(&mut self, how: Close) -> Option<Result<Sealed, RecorderError>> {

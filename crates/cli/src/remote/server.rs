@@ -1,20 +1,22 @@
-//! The thread that listens for other terminals, one after the other, each for a short time.
+//! The thread that listens for other terminals, and one for each that asks, for a short time: none waits for another.
 
 use std::fs;
 use std::io::{self, Read, Write};
 use std::os::unix::fs::{FileTypeExt, MetadataExt, PermissionsExt};
 use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use super::place;
 use super::wire::{MOST_REQUEST_BYTES, Reply, Request};
 
-/// Who asks must have asked within this time: the next one waits.
+/// Who asks must have asked within this time.
 const ASK_WITHIN: Duration = Duration::from_millis(300);
+/// So many may ask at once; beyond, the next one waits for the last of them.
+const MOST_AT_ONCE: usize = 256;
 /// Between two tries to take in a caller when the system refuses (no free file descriptor).
 const TRY_AGAIN: Duration = Duration::from_millis(100);
 
@@ -35,8 +37,9 @@ impl Server {
     /// Why no place of a socket can be used.
     pub fn open(
         session: &Path,
-        mut answer: impl FnMut(Request) -> Reply + Send + 'static,
+        answer: impl FnMut(Request) -> Reply + Send + 'static,
     ) -> Result<Self, String> {
+        let answer = Arc::new(Mutex::new(answer));
         let [beside, own] = place::places(session).map_err(|e| e.to_string())?;
         let (listener, path) = match bind(&beside) {
             Ok(listener) => (listener, beside),
@@ -60,7 +63,7 @@ impl Server {
                     }
                     match caller {
                         // A caller that goes away or says nonsense is none of the run's business.
-                        Ok(stream) => drop(serve(stream, &mut answer)),
+                        Ok(stream) => hand_over(stream, &answer),
                         Err(_) => std::thread::sleep(TRY_AGAIN),
                     }
                 }
@@ -92,6 +95,20 @@ impl Drop for Server {
     }
 }
 
+/// Serves a caller on a thread of its own, so that one that is slow or says nothing keeps nobody waiting.
+fn hand_over<A>(stream: UnixStream, answer: &Arc<Mutex<A>>)
+where
+    A: FnMut(Request) -> Reply + Send + 'static,
+{
+    if Arc::strong_count(answer) > MOST_AT_ONCE {
+        return drop(serve(stream, answer));
+    }
+    let answer = Arc::clone(answer);
+    let serving = std::thread::Builder::new().name("control-caller".to_owned());
+    // Refused by the system: the caller hears nothing, and may ask again.
+    let _ = serving.spawn(move || drop(serve(stream, &answer)));
+}
+
 /// A socket at `path` that only this user can connect to.
 fn bind(path: &Path) -> io::Result<UnixListener> {
     match fs::symlink_metadata(path) {
@@ -109,12 +126,15 @@ fn identity(path: &Path) -> io::Result<(u64, u64)> {
 }
 
 /// Hears one request and answers it.
-fn serve(mut stream: UnixStream, answer: &mut impl FnMut(Request) -> Reply) -> io::Result<()> {
+fn serve(mut stream: UnixStream, answer: &Mutex<impl FnMut(Request) -> Reply>) -> io::Result<()> {
     let reply = match place::check_peer(&stream, place::may_ask) {
         Err(refused) => Reply::Refused(refused),
         Ok(()) => match hear(&mut stream)? {
             Err(refused) => Reply::Refused(refused),
-            Ok(request) => answer(request),
+            Ok(request) => {
+                let mut answer = answer.lock().unwrap_or_else(PoisonError::into_inner);
+                (*answer)(request)
+            }
         },
     };
     let mut line = serde_json::to_vec(&reply)?;
@@ -237,8 +257,10 @@ mod tests {
         assert!(call(b"").contains("without an end"));
         assert!(call(&[b'x'; 500]).contains("without an end"));
         call(&vec![b'['; 50 * MOST_REQUEST_BYTES]);
-        // One that says nothing, and one that is gone at once.
-        let silent = UnixStream::connect(place).unwrap();
+        // Forty that say nothing, for each of which the others would wait 300 ms, and one that is gone at once.
+        let silent: Vec<_> = (0..40)
+            .map(|_| UnixStream::connect(place).unwrap())
+            .collect();
         drop(UnixStream::connect(place).unwrap());
         assert_eq!(ask(&session, &PAUSE), Ok(Reply::Handed(7)));
         drop((silent, running));

@@ -91,7 +91,7 @@ fn look(follower: &mut Follower, once: bool) -> Result<Option<Frame>, Failure> {
     let writer = writer_of(follower.session());
     match follower.look(writer.as_deref(), !once) {
         Ok(frame) => Ok(frame),
-        Err(RecorderError::NotThere { .. } | RecorderError::NotASession { .. })
+        Err(RecorderError::Empty { .. } | RecorderError::NotASession { .. })
             if writer.is_some() =>
         {
             Ok(None)

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use serde_json::Value;
+use skinrig::source::Rescan;
 use skinrig_model::{Record, RunHeader};
 use skinrig_recorder::{SessionReader, SessionWriter};
 
@@ -121,7 +122,7 @@ fn what_cannot_go_on_is_refused_and_left_as_it_is() {
             .code(2)
             .complains(parts);
     };
-    let writer = SessionWriter::resume(&session).unwrap();
+    let writer = SessionWriter::resume(&session, &mut Rescan::default()).unwrap();
     refused(&session, &["process "]);
     drop(writer);
     assert_eq!(show(&session)["legs"].as_array().unwrap().len(), 1);
@@ -154,8 +155,14 @@ fn what_cannot_go_on_is_refused_and_left_as_it_is() {
         let mut bytes = before.clone();
         bytes[at.unwrap()] ^= 1;
         let path = lab.path(&format!("{what}.session.sqlite"));
-        std::fs::write(&path, bytes).unwrap();
-        let expected = format!("expected a {what} with SHA-256");
-        refused(&path, &[&expected, "skinrig verify"]);
+        std::fs::write(&path, &bytes).unwrap();
+        let problem = format!("{what}_sha256: expected");
+        skinrig(&["resume", &text(&path)]).code(4).complains(&[
+            "expected a sound session",
+            &problem,
+            "nothing was changed",
+            "skinrig salvage",
+        ]);
+        assert_eq!(std::fs::read(&path).unwrap(), bytes);
     }
 }

@@ -91,6 +91,7 @@ impl Filling<'_> {
         }
         self.drop_gaps_of_holes().await?;
         self.compare_with_seal().await?;
+        self.drop_broken_links().await?;
         self.compare_with_each_other().await?;
         self.note(name).await?;
         sqlx::query("COMMIT").execute(&mut *self.conn).await?;
@@ -118,11 +119,13 @@ impl Filling<'_> {
                 table.missing += 1;
             }
         }
-        // Ids count without gaps.
-        if let (Some([Part::Int(first)]), Some([Part::Int(last)])) = (
-            rows.rows.keys().next().map(Vec::as_slice),
-            rows.rows.keys().next_back().map(Vec::as_slice),
-        ) {
+        // Ids count without gaps, but for the legs that took a seal off.
+        if shape.kind.name != "previous_seal"
+            && let (Some([Part::Int(first)]), Some([Part::Int(last)])) = (
+                rows.rows.keys().next().map(Vec::as_slice),
+                rows.rows.keys().next_back().map(Vec::as_slice),
+            )
+        {
             let begin = match shape.kind.name {
                 "press" | "robot_from_skin" => 0,
                 "leg" => 2,

@@ -4,7 +4,8 @@ use super::cells::Value;
 use super::fill::{Failed, Filling};
 use super::gather::Found;
 use super::shapes::Part;
-use crate::seal;
+use crate::chain::{self, Link};
+use crate::digest;
 
 impl Filling<'_> {
     /// Compares each table with the digest that it was sealed with, when that came back.
@@ -17,7 +18,7 @@ impl Filling<'_> {
         let Some((_, sealed)) = sealed.filter(|(_, rows)| !rows.rows.is_empty()) else {
             return Ok(());
         };
-        for digest in seal::digest_tables(self.conn).await? {
+        for digest in digest::digest_tables(self.conn).await? {
             let key = vec![Part::Text(digest.name.clone())];
             let Some(Found::Row(row)) = sealed.rows.get(&key) else {
                 continue;
@@ -32,6 +33,24 @@ impl Filling<'_> {
             self.report.findings.push(format!(
                 "table {}: expected the {rows} rows that were sealed, found {} rows or other values",
                 digest.name, digest.rows
+            ));
+        }
+        Ok(())
+    }
+
+    /// A seal before a leg whose rows did not all come back proves nothing any more, and is left out.
+    pub(super) async fn drop_broken_links(&mut self) -> Result<(), Failed> {
+        for (leg, link) in chain::check(self.conn).await? {
+            let Link::Broken(_) = link else { continue };
+            for drop in [
+                "DELETE FROM previous_table_digest WHERE leg = ?",
+                "DELETE FROM previous_seal WHERE leg = ?",
+                "UPDATE leg SET previous_tree_sha256 = NULL WHERE number = ?",
+            ] {
+                sqlx::query(drop).bind(leg).execute(&mut *self.conn).await?;
+            }
+            self.report.findings.push(format!(
+                "leg {leg}: expected the rows that the seal before it covers, found others; that seal was left out"
             ));
         }
         Ok(())

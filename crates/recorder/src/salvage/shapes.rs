@@ -29,7 +29,7 @@ const fn kind(name: &'static str, least: usize, insert: &'static str) -> Kind {
 }
 
 /// In the order in which rows refer to one another.
-pub const KINDS: [Kind; 19] = [
+pub const KINDS: [Kind; 21] = [
     kind(
         "session",
         20,
@@ -56,7 +56,7 @@ pub const KINDS: [Kind; 19] = [
     kind(
         "attempt",
         17,
-        "INSERT INTO attempt VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+        "INSERT INTO attempt VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
     ),
     kind(
         "command",
@@ -102,6 +102,16 @@ pub const KINDS: [Kind; 19] = [
     ),
     kind("note", 3, "INSERT INTO note VALUES (?, ?, ?)"),
     kind("table_digest", 3, ""),
+    kind(
+        "previous_seal",
+        21,
+        "INSERT INTO previous_seal VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+    ),
+    kind(
+        "previous_table_digest",
+        4,
+        "INSERT INTO previous_table_digest VALUES (?, ?, ?, ?)",
+    ),
 ];
 
 /// One column.

@@ -155,7 +155,7 @@ fn a_killed_writer_leaves_what_it_acknowledged() {
         }
         let known = reader.history().unwrap();
         drop(reader);
-        let mut writer = SessionWriter::resume(&path).unwrap();
+        let mut writer = SessionWriter::resume(&path, &mut Evt2::default()).unwrap();
         for record in further_leg(&known) {
             writer.accept(record).unwrap();
         }

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use crate::common::{Evt2, header, outcome, sealed, sha};
 use skinrig_model::{AttemptId, CameraId, HostTime, PressId, PressVerdict, Record};
-use skinrig_recorder::{SessionReader, SessionWriter, list, verify};
+use skinrig_recorder::{RecorderError, SessionReader, SessionWriter, list, verify};
 
 /// Bytes of a page of a session file.
 const PAGE: usize = 65536;
@@ -142,7 +142,14 @@ fn cut_and_extended_files_are_found() {
     sealed(&path, 3);
     let original = std::fs::read(&path).unwrap();
     let changed = folder.path().join("x.session.sqlite");
-    for keep in [0, 50, 100, PAGE, original.len() / 2, original.len() - 1] {
+    // A file that is cut to nothing is like one into which nothing was written: no session, and not sound either.
+    std::fs::write(&changed, "").unwrap();
+    let empty = verify(&changed, &mut Evt2::default());
+    assert!(
+        matches!(empty, Err(RecorderError::Empty { .. })),
+        "{empty:?}"
+    );
+    for keep in [50, 100, PAGE, original.len() / 2, original.len() - 1] {
         std::fs::write(&changed, &original[..keep]).unwrap();
         assert!(
             !verify(&changed, &mut Evt2::default()).unwrap().is_sound(),

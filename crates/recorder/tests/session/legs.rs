@@ -20,7 +20,7 @@ fn sound(path: &std::path::Path, sealed: bool) {
 fn go_on(path: &std::path::Path) -> Vec<Record> {
     let known = SessionReader::open(path).unwrap().history().unwrap();
     let leg = further_leg(&known);
-    let mut writer = SessionWriter::resume(path).unwrap();
+    let mut writer = SessionWriter::resume(path, &mut Evt2::default()).unwrap();
     for record in &leg {
         writer.accept(record.clone()).unwrap();
     }
@@ -134,7 +134,7 @@ fn a_stopped_and_sealed_session_goes_on() {
         ]
     );
     // Opened and left again: still the sealed session.
-    drop(SessionWriter::resume(&path).unwrap());
+    drop(SessionWriter::resume(&path, &mut Evt2::default()).unwrap());
     sound(&path, true);
 
     let second = go_on(&path);
@@ -172,7 +172,7 @@ fn a_stopped_and_sealed_session_goes_on() {
                     }
         });
     assert!(resets.count() >= 1);
-    match SessionWriter::resume(&path) {
+    match SessionWriter::resume(&path, &mut Evt2::default()) {
         Err(RecorderError::Completed { .. }) => {}
         other => panic!("{other:?}"),
     }
@@ -182,7 +182,7 @@ fn a_stopped_and_sealed_session_goes_on() {
 fn one_writer_at_a_time_and_the_header_of_a_leg_first() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.session.sqlite");
-    match SessionWriter::resume(&path) {
+    match SessionWriter::resume(&path, &mut Evt2::default()) {
         Err(RecorderError::Missing { .. }) => {}
         other => panic!("{other:?}"),
     }
@@ -191,14 +191,14 @@ fn one_writer_at_a_time_and_the_header_of_a_leg_first() {
     for record in records(PRESSES).into_iter().take(9) {
         writer.accept(record).unwrap();
     }
-    match SessionWriter::resume(&path) {
+    match SessionWriter::resume(&path, &mut Evt2::default()) {
         Err(RecorderError::InUse { by, .. }) => assert!(by.starts_with("process "), "{by}"),
         other => panic!("{other:?}"),
     }
     drop(writer);
-    let mut writer = SessionWriter::resume(&path).unwrap();
+    let mut writer = SessionWriter::resume(&path, &mut Evt2::default()).unwrap();
     assert!(matches!(
-        SessionWriter::resume(&path),
+        SessionWriter::resume(&path, &mut Evt2::default()),
         Err(RecorderError::InUse { .. })
     ));
     let note = Record::Note {
@@ -246,15 +246,18 @@ fn a_session_that_ended_without_its_seal_is_sealed() {
         writer.accept(record).unwrap();
     }
     assert!(matches!(
-        SessionWriter::ended(&path),
+        SessionWriter::ended(&path, &mut Evt2::default()),
         Err(RecorderError::InUse { .. })
     ));
     drop(writer);
     sound(&path, false);
-    SessionWriter::ended(&path).unwrap().finish().unwrap();
+    SessionWriter::ended(&path, &mut Evt2::default())
+        .unwrap()
+        .finish()
+        .unwrap();
     sound(&path, true);
     assert!(matches!(
-        SessionWriter::ended(&path),
+        SessionWriter::ended(&path, &mut Evt2::default()),
         Err(RecorderError::Completed { .. })
     ));
 }
@@ -277,14 +280,18 @@ fn a_seal_that_is_half_written_is_found_and_written_again() {
     std::fs::remove_file(&path).unwrap();
     std::fs::write(&path, &bytes).unwrap();
     let report = verify(&path, &mut Evt2::default()).unwrap();
+    assert!(report.is_sound() && !report.sealed, "{report:?}");
     assert!(
         report
-            .problems
+            .remarks
             .iter()
-            .any(|p| p.contains("sealing was broken off")),
+            .any(|r| r.contains("sealing was cut off")),
         "{report:?}"
     );
-    SessionWriter::ended(&path).unwrap().finish().unwrap();
+    SessionWriter::ended(&path, &mut Evt2::default())
+        .unwrap()
+        .finish()
+        .unwrap();
     sound(&path, true);
     let seal = SessionReader::open(&path).unwrap().seal().unwrap().unwrap();
     assert_eq!(
@@ -333,10 +340,17 @@ fn a_leg_that_was_half_begun_is_undone() {
 
 #[test]
 fn a_session_of_an_older_schema_goes_on() {
+    for was_sealed in [false, true] {
+        older_schema_goes_on(was_sealed);
+    }
+}
+
+fn older_schema_goes_on(was_sealed: bool) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.session.sqlite");
     let mut writer = SessionWriter::create(&path).unwrap();
-    for record in records(PRESSES).into_iter().take(20) {
+    let first = if was_sealed { usize::MAX } else { 20 };
+    for record in records(PRESSES).into_iter().take(first) {
         writer.accept(record).unwrap();
     }
     drop(writer);
@@ -345,9 +359,12 @@ fn a_session_of_an_older_schema_goes_on() {
         execute(
             conn,
             &[
+                "DROP TABLE previous_table_digest",
+                "DROP TABLE previous_seal",
                 "DROP TABLE preflight",
                 "DROP TABLE leg",
                 "DROP TABLE gap",
+                "ALTER TABLE attempt DROP COLUMN leg",
                 "ALTER TABLE attempt DROP COLUMN touched_mm",
                 "ALTER TABLE attempt DROP COLUMN faults",
                 "DELETE FROM _sqlx_migrations WHERE version > 20261121120000",
@@ -356,13 +373,22 @@ fn a_session_of_an_older_schema_goes_on() {
         )
         .await;
     });
-    sound(&path, false);
+    if was_sealed {
+        let ended = SessionWriter::ended(&path, &mut Evt2::default()).unwrap();
+        ended.finish().unwrap();
+    }
+    sound(&path, was_sealed);
     assert_eq!(SessionReader::open(&path).unwrap().legs().unwrap().len(), 1);
     go_on(&path);
     sound(&path, true);
     let reader = SessionReader::open(&path).unwrap();
-    assert_eq!(reader.legs().unwrap().len(), 2);
+    let legs = reader.legs().unwrap();
+    assert_eq!(legs.len(), 2);
+    assert_eq!(legs[0].tree_sha256.is_some(), was_sealed);
     assert_eq!(reader.header().unwrap(), header(PRESSES));
+    // The seal of the old schema is proven from the rows of the new one.
+    let report = verify(&path, &mut Evt2::default()).unwrap();
+    assert_eq!(report.remarks, [""; 0]);
 }
 
 proptest! {
@@ -393,7 +419,7 @@ proptest! {
         let leg = further_leg(&reader.history().unwrap());
         drop(reader);
         let second = second.min(leg.len() - 1);
-        let mut writer = SessionWriter::resume(&path).unwrap();
+        let mut writer = SessionWriter::resume(&path, &mut Evt2::default()).unwrap();
         for record in &leg[..second] {
             writer.accept(record.clone()).unwrap();
         }

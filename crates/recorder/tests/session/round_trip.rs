@@ -411,7 +411,7 @@ fn a_folder_is_listed_with_its_broken_files() {
     assert_eq!((*sealed, end, presses.open()), (false, &None, 2));
     assert_eq!(*totals, None, "nobody counted the rows of the whole file");
     assert!(
-        matches!(&sessions[2].state, SessionState::Broken { reason } if reason.contains("less than 100"))
+        matches!(&sessions[2].state, SessionState::Broken { reason } if reason.contains("less than 108"))
     );
 }
 

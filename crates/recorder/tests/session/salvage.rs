@@ -497,7 +497,7 @@ fn missing_chunks_came_when_the_one_before_them_did_but_not_before_their_leg() {
     let [from, to] = ["from", "to"].map(|n| folder.path().join(n));
     sealed(&from, 5);
     let known = SessionReader::open(&from).unwrap().history().unwrap();
-    let mut writer = SessionWriter::resume(&from).unwrap();
+    let mut writer = SessionWriter::resume(&from, &mut Evt2::default()).unwrap();
     for record in further_leg(&known) {
         writer.accept(record).unwrap();
     }

@@ -109,7 +109,8 @@ fn read(path: &Path) -> Result<(), RecorderError> {
 
 /// Begins a further leg, and leaves it.
 fn go_on(path: &Path) -> Result<(), RecorderError> {
-    let mut writer = SessionWriter::resume(path)?;
+    let rescan = [StreamFormat::Evt2; 2].map(Scanner::new);
+    let mut writer = SessionWriter::resume(path, &mut Rescan(rescan))?;
     writer.accept(Record::Resumed(Box::new(ResumeHeader {
         operator: "stranger".into(),
         started_at: "2026-01-03T03:04:05Z".into(),
