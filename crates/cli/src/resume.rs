@@ -46,14 +46,11 @@ struct Unfinished {
 pub fn resume(args: &ResumeArgs, command_line: &str, json: bool) -> Outcome {
     let operator = Operator::listen().map_err(Failure::internal)?;
     let session = &args.session;
-    // What cannot be read is for the check of the whole file to tell.
-    let is_completed =
-        |reader: SessionReader| matches!(reader.end(), Ok(Some((_, RunEnd::Completed))));
-    if SessionReader::open(session).is_ok_and(is_completed) {
-        return only_seal(session);
-    }
     // From here on nobody else writes it, and it is what was recorded.
-    let writer = SessionWriter::resume(session, &mut Rescan::default()).map_err(refusal)?;
+    let writer = match SessionWriter::resume(session, &mut Rescan::default()) {
+        Err(RecorderError::Completed { .. }) => return only_seal(session),
+        opened => opened.map_err(refusal)?,
+    };
     let found = read(session)?;
     let wanted = found.plan.wanted(&found.histories);
     if let (Some(end), false) = (&found.end, wanted.contains(&true)) {

@@ -69,7 +69,13 @@ const TABLES: [Table; 21] = [
                 8,
                 "SELECT press, number, previous, intent_ns, verdict, reason, approach_ns, contact_ns, at_depth_ns,
                  retract_ns, release_ns, clear_ns, measured_x_mm, measured_y_mm, measured_depth_mm, peak_force_n, scheduled,
-                 touched_mm, leg FROM attempt WHERE coalesce(leg, 1) < ?2 ORDER BY press, number",
+                 touched_mm, faults FROM attempt WHERE coalesce(leg, 1) < ?2 ORDER BY press, number",
+            ),
+            (
+                9,
+                "SELECT press, number, previous, intent_ns, verdict, reason, approach_ns, contact_ns, at_depth_ns,
+                 retract_ns, release_ns, clear_ns, measured_x_mm, measured_y_mm, measured_depth_mm, peak_force_n, scheduled,
+                 touched_mm, faults, leg FROM attempt WHERE coalesce(leg, 1) < ?2 ORDER BY press, number",
             ),
         ],
     },
@@ -129,12 +135,12 @@ const TABLES: [Table; 21] = [
     ),
     table(
         "previous_seal",
-        8,
+        9,
         "SELECT * FROM previous_seal ORDER BY leg LIMIT ?1",
     ),
     table(
         "previous_table_digest",
-        8,
+        9,
         "SELECT * FROM previous_table_digest ORDER BY leg, name LIMIT ?1",
     ),
 ];

@@ -1,5 +1,5 @@
 -- The seals that further legs took off: what each of them covered can be proven from the rows that belonged to it.
-PRAGMA user_version = 8;
+PRAGMA user_version = 9;
 
 -- The leg that tried it. Null in a session of an older schema: one of the legs before the session was brought up to this one.
 ALTER TABLE attempt ADD COLUMN leg INTEGER CHECK (leg >= 1);
