@@ -25,13 +25,13 @@ fn presses(n: usize) -> Plan {
         .filter(|s| !matches!(s, Step::Pause { .. } | Step::Begin { .. }))
         .collect();
     plan.steps.push(Step::Begin {
-        repetition: Some(0),
+        repetition: Some(skinrig_model::RepetitionId::from_index(0)),
     });
     for i in 0..n {
         let from = 2 * (i % 2) * 2;
         let mut pair: Vec<Step> = block[from..from + 2].to_vec();
         let mut planned = listed[2 * (i % 2)];
-        planned.id = PressId(i as u32);
+        planned.id = PressId::from_index(i as u32);
         if let Some(Step::Press(p)) = pair.last_mut() {
             (p.press, p.start_after_begin) = (planned.id, None);
             p.hold = HostDuration::from_millis(5);
