@@ -25,7 +25,7 @@ fn presses(n: usize) -> Plan {
         .filter(|s| !matches!(s, Step::Pause { .. } | Step::Begin { .. }))
         .collect();
     plan.steps.push(Step::Begin {
-        repetition: Some(skinrig_model::RepetitionId::from_index(0)),
+        repetition: Some(RepetitionId::from_index(0)),
     });
     for i in 0..n {
         let from = 2 * (i % 2) * 2;
