@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use skinrig_analysis::clock::{Line, Pair, fit_line};
+use skinrig_analysis::distributions::student_quantile;
 use skinrig_model::pulse::decode_marks;
 use skinrig_model::{BoxReport, CameraId, HostDuration, Label, RawChunk, TriggerEdge};
 use skinrig_nightly::{Evidence, EvidenceKind};
@@ -118,7 +119,7 @@ fn one_clock(
     let Some(line) = fit_line(&pairs, FLOOR_US) else {
         return nothing(subject, told.len(), n, found);
     };
-    let half_ppm = 1.96 * line.drift_se * 1e6;
+    let half_ppm = student_quantile(0.975, line.n() as f64 - 2.0) * line.drift_se * 1e6;
     let drift_ppm = line.drift * 1e6;
     let drift = found.value(subject, "drift", drift_ppm).of(n, LEAST_TRAINS);
     drift.interval = Some([drift_ppm - half_ppm, drift_ppm + half_ppm]);

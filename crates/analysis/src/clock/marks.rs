@@ -8,6 +8,7 @@ use skinrig_model::{Mark, SentMark, TriggerEdge};
 use super::line::{self, Pair};
 use super::{NO_CLOCK_DRIFT, NO_TIME_US};
 use crate::result::{ClockFit, ClockMethod};
+use crate::timebase::{Point, STEP_US, Smooth};
 
 /// Residuals are never judged finer than this, µs: the camera's clock ticks in µs.
 const FLOOR_US: f64 = 1.0;
@@ -104,7 +105,7 @@ pub fn fit_marks(edges: &[TriggerEdge], channel: u8, sent: &[SentMark]) -> Optio
         method: ClockMethod::TriggerMarks,
         offset_us: reference as f64 + line.offset_us,
         drift_ppm: line.drift * 1e6,
-        drift_se_ppm: line.drift_se * 1e6,
+        drift_se_ppm: drift_se(&pairs).unwrap_or(line.drift_se) * 1e6,
         residual_rms_us: line.rms_us,
         residual_max_us: line.max_us,
         n: line.n() as u32,
@@ -145,4 +146,18 @@ pub fn fit_marks(edges: &[TriggerEdge], channel: u8, sent: &[SentMark]) -> Optio
         warnings,
         seen_us,
     })
+}
+
+/// Standard error of the mean rate, with what the clocks wander and what the host's estimates of the marks wander.
+fn drift_se(pairs: &[Pair]) -> Option<f64> {
+    let mut points: Vec<Point> = pairs
+        .iter()
+        .map(|p| Point {
+            from_us: p.host_us,
+            to_us: p.camera_us,
+        })
+        .collect();
+    points.sort_by(|a, b| a.from_us.total_cmp(&b.from_us));
+    let fit = Smooth::fit(&points, STEP_US, FLOOR_US)?;
+    Some(fit.drift.stated_se())
 }

@@ -239,13 +239,18 @@ fn decision_delay_ms(detector: &Detector) -> f64 {
 /// Standard uncertainty of a camera's time of a host time, ms, without what cannot be known from the clocks.
 fn from_clocks_ms(analysis: &Analysis, clocks: &[ClockFit; 2]) -> f64 {
     let certificate = &analysis.alignment;
-    let cameras = [MapName::Camera1FromBox, MapName::Camera2FromBox]
-        .map(|name| certificate.interval_us(name));
-    if let ([Some(one), Some(two)], Some(host_us)) =
-        (cameras, certificate.interval_us(MapName::HostFromBox))
-    {
-        // A 95 % interval of the cameras; the host lies anywhere within bounds.
-        return 1e-3 * libm::hypot(one.max(two) / 1.96, uniform(2.0 * host_us));
+    // A 95 % interval by the noise, and anywhere within bounds besides.
+    let of = |name: MapName| -> Option<f64> {
+        let (noise_us, bound_us) = (certificate.interval_us(name)?, certificate.bound_us(name)?);
+        Some(libm::hypot(noise_us / 1.96, uniform(2.0 * bound_us)))
+    };
+    let maps = [
+        MapName::Camera1FromBox,
+        MapName::Camera2FromBox,
+        MapName::HostFromBox,
+    ];
+    if let [Some(one), Some(two), Some(host_us)] = maps.map(of) {
+        return 1e-3 * libm::hypot(one.max(two), host_us);
     }
     let residual_us = clocks[0].residual_rms_us.max(clocks[1].residual_rms_us);
     let half_width_us = analysis.contact_timing.mark_half_width_us;
@@ -272,7 +277,7 @@ impl Uncertainty {
         if timing.scheduled || clocks.iter().any(|c| c.method == ClockMethod::EventRates) {
             return None;
         }
-        let stamped = analysis.alignment.interval_us(MapName::RobotFromHost);
+        let stamped = analysis.alignment.bound_us(MapName::RobotFromHost);
         let pose_us = libm::hypot(
             uniform(timing.pose_interval_us),
             uniform(stamped.unwrap_or(0.0)),

@@ -95,11 +95,18 @@ impl Alignment {
         off(a) + share * (off(b) - off(a))
     }
 
-    /// The largest half width stated for a map at the presses, µs.
+    /// The largest half width of the 95 % interval of a map at the presses, µs.
     #[must_use]
     pub fn interval_us(&self, name: MapName) -> Option<f64> {
         let map = self.maps.iter().find(|m| m.map == name)?;
         Some(map.interval_us?.1)
+    }
+
+    /// The most that comes on top of it, µs.
+    #[must_use]
+    pub fn bound_us(&self, name: MapName) -> Option<f64> {
+        let map = self.maps.iter().find(|m| m.map == name)?;
+        Some(map.bound_us?.1)
     }
 }
 
@@ -156,8 +163,14 @@ pub struct ClockMap {
     pub residual_rms_us: Option<f64>,
     /// Largest absolute residual, µs.
     pub residual_max_us: Option<f64>,
-    /// Half width of the stated 95 % interval at the presses (contacts and releases), median and largest, µs.
+    /// Half width of the 95 % interval at the presses (contacts and releases that are timed), median and largest, µs: what the noise
+    /// of its points leaves open. `None` for a map that is not fitted.
     pub interval_us: Option<(f64, f64)>,
+    /// What comes on top at the presses, at most, median and largest, µs: what no number of points averages out. Of host over box
+    /// time it is the bound that the exchanges give for certain; of camera over box time the unknown mean delay of an edge, the whole
+    /// µs of both clocks and what a rate may change by before the first train and after the last; of robot poses the stated delay.
+    #[serde(default)]
+    pub bound_us: Option<(f64, f64)>,
     /// Share of points, each held out of the fit with every second other, that lie in the interval stated for them.
     pub coverage: Option<f64>,
     /// Points behind that share.
@@ -177,6 +190,7 @@ impl ClockMap {
             residual_rms_us: Some(fit.residual_rms_us),
             residual_max_us: Some(fit.residual_max_us),
             interval_us: None,
+            bound_us: None,
             coverage: None,
             coverage_n: 0,
         }

@@ -11,7 +11,8 @@ use skinrig_model::TriggerEdge;
 use skinrig_model::pulse::{PulseTrain, ReadTrain, read_trains};
 
 use super::epochs::{Epoch, Sent};
-use super::piecewise::{Piecewise, Point, WANDER};
+use super::smooth::{Figure, Point, Smooth, WANDER};
+use super::{FLOOR_US, STEP_US};
 use crate::clock::line::median;
 use crate::result::LineCounts;
 
@@ -26,10 +27,6 @@ const NEAR_US: [f64; 2] = [60.0, 25.0];
 const DOUBLE_US: u64 = 20;
 /// A train with fewer rising edges than this gives no instant.
 const LEAST_RISES: usize = 4;
-/// Knots are at least this far apart, µs.
-const SPACING_US: f64 = 60e6;
-/// Instants of trains are never judged finer than this, µs: both clocks show whole µs.
-const FLOOR_US: f64 = 0.5;
 /// The first reading of a train may rest on an edge that is off by this, µs.
 const ANCHOR_FLOOR_US: f64 = 3.0;
 
@@ -37,7 +34,7 @@ const ANCHOR_FLOOR_US: f64 = 3.0;
 #[derive(Debug, Clone, PartialEq)]
 pub struct CameraFromBox {
     /// The map, from box time to camera time, both relative to their references.
-    pub map: Piecewise,
+    pub map: Smooth,
     /// Camera time to which the map is relative, µs.
     pub reference_us: u64,
     /// Box times of all trains that were sent, relative to the epoch's reference, µs.
@@ -65,15 +62,20 @@ impl CameraFromBox {
         distance_us(&self.ties_us, box_us)
     }
 
-    /// Half width of the 95 % interval of the map at a box time, µs: 1.96 standard errors, and what no number of edges
-    /// averages out: edges come late by an unknown mean, of the size of their scatter (less than 2 standard deviations for
-    /// any delay that is spread evenly or dies away), and the box shows whole µs. Before the first train and after the last the
-    /// rate may have changed by [`WANDER`].
-    pub fn interval_us(&self, box_us: f64) -> f64 {
-        1.96 * self.map.standard_error(box_us)
-            + 2.0 * self.edge_sigma_us
-            + 0.5
-            + WANDER * beyond_us(&self.ties_us, box_us)
+    /// The camera time of a box time, relative to the reference, µs.
+    pub fn at(&self, box_us: f64) -> Figure {
+        Figure {
+            value: self.map.value(box_us),
+            se: self.map.standard_error(box_us),
+            free: self.map.free,
+        }
+    }
+
+    /// What no number of edges averages out, µs: edges come late by an unknown mean, of the size of their scatter (less than 2
+    /// standard deviations for any delay that is spread evenly or dies away), both clocks show whole µs, and before the first train
+    /// and after the last the rate may have changed by [`WANDER`].
+    pub fn bound_us(&self, box_us: f64) -> f64 {
+        2.0 * self.edge_sigma_us + 1.0 + WANDER * beyond_us(&self.ties_us, box_us)
     }
 }
 
@@ -133,8 +135,8 @@ impl Edges {
                 to_us: relative(*t_us, reference_us),
             })
             .collect();
-        let mut map = Piecewise::fit(&points, SPACING_US, ANCHOR_FLOOR_US)
-            .filter(|map| map.drift.abs() <= crate::clock::NO_CLOCK_DRIFT)
+        let mut map = Smooth::fit(&points, STEP_US, ANCHOR_FLOOR_US)
+            .filter(|map| map.drift.value.abs() <= crate::clock::NO_CLOCK_DRIFT)
             .ok_or_else(|| {
                 format!(
                     "{} of {} trains sent are certain, and they are on no clock's line",
@@ -160,7 +162,7 @@ impl Edges {
                     })
                 })
                 .collect();
-            map = Piecewise::fit(&seen, SPACING_US, FLOOR_US)
+            map = Smooth::fit(&seen, STEP_US, FLOOR_US)
                 .ok_or_else(|| format!("only {} trains were seen", seen.len()))?;
             seen_us = seen.iter().map(|p| p.from_us).collect();
         }
@@ -189,13 +191,7 @@ impl Edges {
     }
 
     /// Looks for every edge that was sent where the map puts it.
-    fn look(
-        &self,
-        sent: &[Sent],
-        map: &Piecewise,
-        reference_us: u64,
-        near_us: f64,
-    ) -> Vec<Matched> {
+    fn look(&self, sent: &[Sent], map: &Smooth, reference_us: u64, near_us: f64) -> Vec<Matched> {
         sent.iter()
             .map(|train| {
                 let start = map.value(train.box_us);

@@ -1,18 +1,21 @@
 //! One time base: host, trigger box, both cameras and the robot on one another, and the certificate of it.
 //!
 //! `host` bounds the host's clock by the exchanges with the box, `edges` finds the trains that the box sent among what
-//! each camera saw, `piecewise` fits both. Camera time over host time is the two together. `docs/time-base.md` has the
+//! each camera saw, `smooth` fits both. Camera time over host time is the two together. `docs/time-base.md` has the
 //! formulae and the limits.
 
 mod edges;
 mod epochs;
 mod held_out;
 mod host;
-mod piecewise;
+mod reading;
 mod residuals;
+mod smooth;
 mod wire;
 
 pub(crate) use self::edges::distance_us;
+pub use self::reading::Reading;
+pub(crate) use self::smooth::{Point, Smooth};
 pub use self::wire::{Wire, WireTrain, wire};
 
 use skinrig_model::{AlignmentSettings, BoxReport, HostTime, TriggerEdge};
@@ -21,7 +24,7 @@ use self::edges::{CameraFromBox, Edges};
 use self::epochs::{Epoch, epochs};
 use self::held_out::coverage;
 use self::host::HostFromBox;
-use self::piecewise::{Piecewise, Point};
+use self::smooth::Figure;
 use crate::clock::line::{self, Pair};
 use crate::legs::{LegLine, LegStart, edges_of, leg_at, recorded_of};
 use crate::metrics::quantile;
@@ -29,8 +32,8 @@ use crate::result::{
     Alignment, AlignmentStatus, ClockFit, ClockMap, ClockMethod, Knot, LineCounts, MapName,
 };
 
-/// Knots of maps of trains are at least this far apart, µs.
-const SPACING_US: f64 = 60e6;
+/// Steps of maps are at least this long, µs: a rate that changes by 6 ppm per hour bends a clock by 0.02 µs in it.
+pub(crate) const STEP_US: f64 = 10e6;
 /// Instants of trains are never judged finer than this, µs.
 const FLOOR_US: f64 = 0.5;
 /// Coverage is judged from this many held-out points on: of fewer, two misses are no evidence.
@@ -82,17 +85,57 @@ struct Piece {
     span_us: (f64, f64),
     host: HostFromBox,
     cameras: [Option<CameraFromBox>; 2],
+    /// Camera 2's clock over camera 1's, both relative to their references.
+    between: Option<Smooth>,
 }
 
 impl Piece {
-    /// Camera time of a host time, and the 95 % half width, µs.
-    fn camera_us(&self, k: usize, host_us: f64) -> Option<(f64, f64)> {
+    /// An instant on the box's clock, relative to its reference, µs.
+    fn relative(&self, box_us: u64) -> f64 {
+        box_us.wrapping_sub(self.reference_us) as i64 as f64
+    }
+
+    /// Camera time of a host time.
+    fn camera_us(&self, k: usize, host_us: f64) -> Option<Reading> {
         let camera = self.cameras[k].as_ref()?;
         let box_us = self.host.box_us(host_us);
-        Some((
-            camera.reference_us as f64 + camera.map.value(box_us),
-            self.host.half_width_us(box_us) + camera.interval_us(box_us),
-        ))
+        let (seen, host) = (camera.at(box_us), self.host.at(box_us));
+        let both = seen.less(host);
+        Some(Reading {
+            us: camera.reference_us as f64 + seen.value,
+            se_us: both.se,
+            free: both.free,
+            bound_us: self.host.bound_us(box_us) + camera.bound_us(box_us),
+        })
+    }
+
+    /// Camera time of a box time.
+    fn camera_us_of_box(&self, k: usize, box_us: f64) -> Option<Reading> {
+        let camera = self.cameras[k].as_ref()?;
+        let at = camera.at(box_us);
+        let bound_us = camera.bound_us(box_us);
+        Some(Reading::new(at, bound_us).later(camera.reference_us))
+    }
+
+    /// Host time of a box time.
+    fn host_us_of_box(&self, box_us: f64) -> Reading {
+        Reading::new(self.host.at(box_us), self.host.bound_us(box_us))
+    }
+
+    /// Camera 2's time of a camera 1's, relative to its reference: what the box shows cancels, each camera's own delay does not.
+    fn camera_2_of_camera_1(&self, at: f64) -> Option<Reading> {
+        let ([Some(one), Some(two)], Some(between)) = (&self.cameras, &self.between) else {
+            return None;
+        };
+        // For a bound the deviation is nearly the same at both times.
+        let box_us = at - (one.map.value(at) - at);
+        let figure = Figure {
+            value: between.value(at),
+            se: between.standard_error(at),
+            free: between.free,
+        };
+        let bound_us = one.bound_us(box_us).max(two.bound_us(box_us));
+        Some(Reading::new(figure, bound_us).later(two.reference_us))
     }
 }
 
@@ -181,10 +224,9 @@ impl TimeBase {
         Some(base)
     }
 
-    /// Camera time of a host time, and the half width of its 95 % interval, both µs; `None` when that camera's clock is not
-    /// known then.
+    /// Camera time of a host time; `None` when that camera's clock is not known then.
     #[must_use]
-    pub fn camera_us(&self, camera: usize, host_us: f64) -> Option<(f64, f64)> {
+    pub fn camera_us(&self, camera: usize, host_us: f64) -> Option<Reading> {
         self.at(host_us)?.camera_us(camera, host_us)
     }
 
@@ -208,23 +250,27 @@ impl TimeBase {
         clock(self.pieces.iter().filter(|p| p.leg == leg), camera)
     }
 
-    /// Camera time of an instant on the box's clock in its first epoch, and the half width of its 95 % interval, µs.
+    /// Camera time of an instant on the box's clock in its first epoch.
     #[must_use]
-    pub fn camera_us_of_box(&self, camera: usize, box_us: u64) -> Option<(f64, f64)> {
+    pub fn camera_us_of_box(&self, camera: usize, box_us: u64) -> Option<Reading> {
         let piece = self.pieces.first()?;
-        let found = piece.cameras[camera].as_ref()?;
-        let at = box_us.wrapping_sub(piece.reference_us) as i64 as f64;
-        let camera_us = found.reference_us as f64 + found.map.value(at);
-        Some((camera_us, found.interval_us(at)))
+        piece.camera_us_of_box(camera, piece.relative(box_us))
     }
 
-    /// Host time of an instant on the box's clock in its first epoch, and the half width of the interval that certainly
-    /// holds it, µs.
+    /// Host time of an instant on the box's clock in its first epoch. It certainly lies within the bound; the 95 % interval takes both
+    /// ways of an exchange to last equally long on average.
     #[must_use]
-    pub fn host_us_of_box(&self, box_us: u64) -> Option<(f64, f64)> {
+    pub fn host_us_of_box(&self, box_us: u64) -> Option<Reading> {
         let piece = self.pieces.first()?;
-        let at = box_us.wrapping_sub(piece.reference_us) as i64 as f64;
-        Some((piece.host.host_us(at), piece.host.half_width_us(at)))
+        Some(piece.host_us_of_box(piece.relative(box_us)))
+    }
+
+    /// Camera 2's time of a camera 1's in the box's first epoch, µs.
+    #[must_use]
+    pub fn camera_2_of_camera_1(&self, camera_1_us: f64) -> Option<Reading> {
+        let piece = self.pieces.first()?;
+        let reference_us = piece.cameras[0].as_ref()?.reference_us as f64;
+        piece.camera_2_of_camera_1(camera_1_us - reference_us)
     }
 
     /// Instants on camera 2's and on camera 1's clock of all trains that both saw, µs: (camera 1, camera 2).
@@ -267,7 +313,7 @@ impl TimeBase {
         let is_recorded = |host_us: f64| {
             let leg = leg_at(ties.legs, HostTime((host_us * 1e3) as i64));
             let spans = recorded_of(ties.recorded[k], ties.legs, leg, k);
-            let at = self.camera_us(k, host_us).map_or(f64::NAN, |(at, _)| at);
+            let at = self.camera_us(k, host_us).map_or(f64::NAN, |r| r.us);
             let holds = |(from, to): &(u64, u64)| (*from as f64..=*to as f64).contains(&at);
             ties.recorded[k].is_empty() || spans.iter().any(holds)
         };
@@ -316,7 +362,7 @@ impl TimeBase {
                 continue;
             };
             let mut at: Vec<f64> = piece.host.knots.iter().map(|k| k.0).collect();
-            at.extend_from_slice(camera.map.knots());
+            at.extend(camera.map.knots());
             at.sort_by(f64::total_cmp);
             at.dedup();
             out.extend(at.into_iter().map(|box_us| Knot {
@@ -332,20 +378,27 @@ impl TimeBase {
         if self.pieces.is_empty() {
             return maps;
         }
-        let interval = |of: &dyn Fn(&Piece, f64) -> Option<f64>| {
+        let read = |map: ClockMap, of: &dyn Fn(&Piece, f64) -> Option<Reading>| {
             let each = used_at_us.iter();
-            let mut widths: Vec<f64> = each.filter_map(|at| of(self.at(*at)?, *at)).collect();
-            let largest = widths.iter().copied().reduce(f64::max)?;
-            Some((quantile(&mut widths, 0.5)?, largest))
+            let all: Vec<Reading> = each.filter_map(|at| of(self.at(*at)?, *at)).collect();
+            let usual = |of: &dyn Fn(&Reading) -> f64| {
+                let mut widths: Vec<f64> = all.iter().map(of).collect();
+                let largest = widths.iter().copied().reduce(f64::max)?;
+                Some((quantile(&mut widths, 0.5)?, largest))
+            };
+            ClockMap {
+                interval_us: usual(&|r| r.half_width_us(0.95)),
+                bound_us: usual(&|r| r.bound_us),
+                ..map
+            }
         };
-        let fits: Vec<&Piecewise> = self.pieces.iter().map(|p| &p.host.fit).collect();
-        maps.push(ClockMap {
-            interval_us: interval(&|p, at| Some(p.host.half_width_us(p.host.box_us(at)))),
-            ..summary(MapName::HostFromBox, &fits)
-        });
+        let fits: Vec<&Smooth> = self.pieces.iter().map(|p| &p.host.fit).collect();
+        maps.push(read(summary(MapName::HostFromBox, &fits), &|p, at| {
+            Some(p.host_us_of_box(p.host.box_us(at)))
+        }));
         for (k, name) in [(0, MapName::Camera1FromBox), (1, MapName::Camera2FromBox)] {
             let cameras = self.pieces.iter().filter_map(|p| p.cameras[k].as_ref());
-            let fits: Vec<&Piecewise> = cameras.map(|c| &c.map).collect();
+            let fits: Vec<&Smooth> = cameras.map(|c| &c.map).collect();
             if fits.is_empty() {
                 continue;
             }
@@ -354,43 +407,32 @@ impl TimeBase {
                 .iter()
                 .filter_map(|p| coverage(&trains(p, k)?))
                 .collect();
-            maps.push(ClockMap {
-                interval_us: interval(&|p, at| {
-                    Some(p.cameras[k].as_ref()?.interval_us(p.host.box_us(at)))
-                }),
-                ..covered(summary(name, &fits), &held_out)
-            });
+            let map = covered(summary(name, &fits), &held_out);
+            maps.push(read(map, &|p, at| p.camera_us_of_box(k, p.host.box_us(at))));
         }
-        let both: Vec<Vec<Point>> = self.pieces.iter().map(pairs).collect();
-        let fits: Vec<Piecewise> = both
-            .iter()
-            .filter_map(|p| Piecewise::fit(p, SPACING_US, FLOOR_US))
-            .collect();
+        let between = self.pieces.iter().filter_map(|p| p.between.as_ref());
+        let fits: Vec<&Smooth> = between.collect();
         if !fits.is_empty() {
-            let held_out: Vec<(u32, u32)> = both.iter().filter_map(|p| coverage(p)).collect();
-            let fits: Vec<&Piecewise> = fits.iter().collect();
-            maps.push(ClockMap {
-                interval_us: interval(&|p, at| {
-                    // The same edges: what the box shows cancels; each camera's own delay does not.
-                    let at = p.host.box_us(at);
-                    let [one, two] = &p.cameras;
-                    Some(one.as_ref()?.interval_us(at) + two.as_ref()?.interval_us(at) - 1.0)
-                }),
-                ..covered(summary(MapName::Camera2FromCamera1, &fits), &held_out)
-            });
+            let pairs = self.pieces.iter().map(|p| pairs(&p.cameras));
+            let held_out: Vec<(u32, u32)> = pairs.filter_map(|p| coverage(&p)).collect();
+            let map = covered(summary(MapName::Camera2FromCamera1, &fits), &held_out);
+            maps.push(read(map, &|p, at| {
+                let one = p.cameras[0].as_ref()?;
+                p.camera_2_of_camera_1(one.map.value(p.host.box_us(at)))
+            }));
         }
         maps.push(ClockMap {
-            interval_us: (!used_at_us.is_empty())
+            bound_us: (!used_at_us.is_empty())
                 .then_some((limits.robot_delay_us, limits.robot_delay_us)),
             ..summary(MapName::RobotFromHost, &[])
         });
         for (k, name) in [(0, MapName::Camera1FromHost), (1, MapName::Camera2FromHost)] {
             let Some(fit) = self.clocks[k] else { continue };
-            maps.push(ClockMap {
+            let map = ClockMap {
                 pieces: (self.knots(k).len().max(2) - 1) as u32,
-                interval_us: interval(&|p, at| Some(p.camera_us(k, at)?.1)),
                 ..ClockMap::of_line(name, &fit)
-            });
+            };
+            maps.push(read(map, &|p, at| p.camera_us(k, at)));
         }
         maps
     }
@@ -423,16 +465,19 @@ fn piece(epoch: &Epoch, lines: &mut [Line; 2], violations: &mut Vec<String>) -> 
             })
             .ok()
     });
+    let between = Smooth::fit(&pairs(&cameras), STEP_US, FLOOR_US);
     Some(Piece {
         leg: epoch.leg,
         reference_us: epoch.reference_us,
         span_us: (first.sent_us, last.received_us),
         host,
         cameras,
+        between,
     })
 }
 
-/// One line through camera over host time at all trains.
+/// One line through camera over host time at all trains. Its slope is the mean rate from the first train to the last, of the leg in which
+/// it is known best.
 fn clock<'a>(pieces: impl Iterator<Item = &'a Piece> + Clone, k: usize) -> Option<LegLine> {
     let reference_us = pieces
         .clone()
@@ -440,10 +485,15 @@ fn clock<'a>(pieces: impl Iterator<Item = &'a Piece> + Clone, k: usize) -> Optio
         .reference_us;
     let mut trains = Vec::new();
     let mut contradicted = 0;
+    let mut legs: Vec<Vec<&Piece>> = Vec::new();
     for piece in pieces {
         let Some(camera) = &piece.cameras[k] else {
             continue;
         };
+        match legs.last_mut().filter(|of| of[0].leg == piece.leg) {
+            Some(of) => of.push(piece),
+            None => legs.push(vec![piece]),
+        }
         contradicted += camera.contradicted;
         let ahead = camera.reference_us.wrapping_sub(reference_us) as i64 as f64;
         for (box_us, at) in camera.sent_us.iter().zip(&camera.instants) {
@@ -456,13 +506,20 @@ fn clock<'a>(pieces: impl Iterator<Item = &'a Piece> + Clone, k: usize) -> Optio
         }
     }
     let line = line::fit(&trains, 1.0)?;
+    let drifts = legs.iter().filter_map(|leg| drift(leg, k));
+    let drift = drifts.min_by(|a, b| a.stated_se().total_cmp(&b.stated_se()))?;
+    let off = |t: &Pair| t.camera_us - t.host_us - drift.value * t.host_us;
+    let used = || trains.iter().zip(&line.used).filter(|(_, used)| **used);
+    let n = line.n() as f64;
+    let offset_us = used().map(|(t, _)| off(t)).sum::<f64>() / n;
+    let residuals = || used().map(|(t, _)| off(t) - offset_us);
     let fit = ClockFit {
         method: ClockMethod::TimeBase,
-        offset_us: reference_us as f64 + line.offset_us,
-        drift_ppm: line.drift * 1e6,
-        drift_se_ppm: line.drift_se * 1e6,
-        residual_rms_us: line.rms_us,
-        residual_max_us: line.max_us,
+        offset_us: reference_us as f64 + offset_us,
+        drift_ppm: drift.value * 1e6,
+        drift_se_ppm: drift.stated_se() * 1e6,
+        residual_rms_us: (residuals().map(|r| r * r).sum::<f64>() / n).sqrt(),
+        residual_max_us: residuals().fold(0.0, |m, r| r.abs().max(m)),
         n: line.n() as u32,
         rejected: (trains.len() - line.n()) as u32 + contradicted,
     };
@@ -471,6 +528,33 @@ fn clock<'a>(pieces: impl Iterator<Item = &'a Piece> + Clone, k: usize) -> Optio
         fit,
         middle_us: sum / trains.len() as f64,
     })
+}
+
+/// Mean rate of camera over host time in a leg, from the first train to the last. What the host's slope may be wrong by is most of it; a
+/// delay that is longer one way than the other shifts both ends alike.
+fn drift(leg: &[&Piece], k: usize) -> Option<Figure> {
+    let (first, last) = (leg.first()?, leg.last()?);
+    let (from, to) = (first.cameras[k].as_ref()?, last.cameras[k].as_ref()?);
+    let (x0, x1) = (from.map.span_us().0, to.map.span_us().1);
+    let ahead = to.reference_us.wrapping_sub(from.reference_us) as i64 as f64;
+    let camera_us = ahead + to.map.value(x1) - from.map.value(x0);
+    let host_us = last.host.host_us(x1) - first.host.host_us(x0);
+    let value = (camera_us - host_us) / host_us;
+    if !(host_us > 0.0) {
+        return None;
+    }
+    let both = if leg.len() == 1 {
+        from.map.drift.less(first.host.fit.drift)
+    } else {
+        // Each end errs by itself.
+        let ends = from.at(x0).less(first.host.at(x0));
+        let ends = ends.less(to.at(x1).less(last.host.at(x1)));
+        Figure {
+            se: ends.se / host_us,
+            ..ends
+        }
+    };
+    Some(Figure { value, ..both })
 }
 
 /// The instants of the trains that a camera saw over those on the box.
@@ -489,8 +573,8 @@ fn trains(piece: &Piece, k: usize) -> Option<Vec<Point>> {
 }
 
 /// The instants of the trains that both cameras saw, relative to each camera's reference.
-fn pairs(piece: &Piece) -> Vec<Point> {
-    let [Some(one), Some(two)] = &piece.cameras else {
+fn pairs(cameras: &[Option<CameraFromBox>; 2]) -> Vec<Point> {
+    let [Some(one), Some(two)] = cameras else {
         return Vec::new();
     };
     let each = one.instants.iter().zip(&two.instants);
@@ -508,7 +592,7 @@ fn shared(piece: &Piece) -> Vec<(f64, f64)> {
         let camera = piece.cameras[k].as_ref();
         camera.map_or(0.0, |c| c.reference_us as f64)
     });
-    let each = pairs(piece).into_iter();
+    let each = pairs(&piece.cameras).into_iter();
     each.map(|p| (references[0] + p.from_us, references[1] + p.to_us))
         .collect()
 }
@@ -522,7 +606,7 @@ fn covered(map: ClockMap, held_out: &[(u32, u32)]) -> ClockMap {
     }
 }
 
-fn summary(map: MapName, fits: &[&Piecewise]) -> ClockMap {
+fn summary(map: MapName, fits: &[&Smooth]) -> ClockMap {
     let n: usize = fits.iter().map(|f| f.n()).sum();
     let all: usize = fits.iter().map(|f| f.used.len()).sum();
     let squares: f64 = fits
@@ -540,10 +624,14 @@ fn summary(map: MapName, fits: &[&Piecewise]) -> ClockMap {
         n: n as u32,
         rejected: (all - n) as u32,
         // Of the epoch with the most points.
-        drift_ppm: fits.iter().max_by_key(|f| f.n()).map(|f| f.drift * 1e6),
+        drift_ppm: fits
+            .iter()
+            .max_by_key(|f| f.n())
+            .map(|f| f.drift.value * 1e6),
         residual_rms_us: largest.map(|_| (squares / n as f64).sqrt()),
         residual_max_us: largest,
         interval_us: None,
+        bound_us: None,
         coverage: None,
         coverage_n: 0,
     }
@@ -575,11 +663,11 @@ fn beyond(alignment: &Alignment, limits: &AlignmentSettings) -> Vec<String> {
                     "µs",
                 );
             }
-            if let Some((_, largest)) = map.interval_us {
+            if let (Some((_, noise)), Some((_, bound))) = (map.interval_us, map.bound_us) {
                 judge(
-                    format!("{name}, 95 % interval at the presses"),
+                    format!("{name}, 95 % interval at the presses and the bound on top of it"),
                     limits.max_camera_interval_us,
-                    largest,
+                    noise + bound,
                     "µs",
                 );
             }
@@ -596,10 +684,10 @@ fn beyond(alignment: &Alignment, limits: &AlignmentSettings) -> Vec<String> {
             }
         }
         if map.map == MapName::HostFromBox
-            && let Some((_, largest)) = map.interval_us
+            && let Some((_, largest)) = map.bound_us
         {
             judge(
-                format!("{name}, interval at the presses"),
+                format!("{name}, bound at the presses"),
                 limits.max_host_interval_us,
                 largest,
                 "µs",

@@ -1,8 +1,8 @@
 //! What each map leaves of its points, thinned so that it can be drawn.
 
-use super::{FLOOR_US, Piece, SPACING_US, TimeBase, pairs};
+use super::{Piece, TimeBase};
 use crate::result::{ClockResidual, ClockResiduals, MapName};
-use crate::timebase::piecewise::Piecewise;
+use crate::timebase::smooth::Smooth;
 
 /// Points of one map, at most.
 const MOST: usize = 600;
@@ -62,7 +62,7 @@ impl TimeBase {
 }
 
 /// The residuals of a fit over box time; `box_us` finds it from the fit's own clock.
-fn left(piece: &Piece, fit: &Piecewise, box_us: impl Fn(f64) -> f64) -> Vec<ClockResidual> {
+fn left(piece: &Piece, fit: &Smooth, box_us: impl Fn(f64) -> f64) -> Vec<ClockResidual> {
     let points = fit.residuals.iter().zip(&fit.used);
     points
         .map(|((at, residual_us), used)| ClockResidual {
@@ -75,14 +75,11 @@ fn left(piece: &Piece, fit: &Piecewise, box_us: impl Fn(f64) -> f64) -> Vec<Cloc
 
 /// Camera 2 over camera 1 at the trains that both saw.
 fn of_cameras(piece: &Piece) -> Vec<ClockResidual> {
-    let Some(fit) = Piecewise::fit(&pairs(piece), SPACING_US, FLOOR_US) else {
-        return Vec::new();
-    };
-    let Some(one) = &piece.cameras[0] else {
+    let (Some(fit), Some(one)) = (&piece.between, &piece.cameras[0]) else {
         return Vec::new();
     };
     // To the accuracy of a drawing: the deviation is nearly the same at both times.
-    left(piece, &fit, |at| at - (one.map.value(at) - at))
+    left(piece, fit, |at| at - (one.map.value(at) - at))
 }
 
 /// Every n-th of the points used with the largest of them, and every n-th of those left out, in order of time.

@@ -20,6 +20,7 @@ pub(super) fn maps(a: &Analysis) -> Option<Grid> {
             "#residual, rms (µs)",
             "#largest (µs)",
             "#95 % interval at presses (µs)",
+            "#bound on top (µs)",
             "#held-out coverage (%)",
             "#points (left out)",
             "#pieces",
@@ -33,13 +34,8 @@ pub(super) fn maps(a: &Analysis) -> Option<Grid> {
             or_none(map.drift_ppm, 3),
             or_none(map.residual_rms_us, 2),
             or_none(map.residual_max_us, 2),
-            map.interval_us.map_or(NONE.to_owned(), |(usual, largest)| {
-                format!(
-                    "± {} (largest {})",
-                    number(Some(usual), 1),
-                    number(Some(largest), 1)
-                )
-            }),
+            half_widths(map.interval_us, 2),
+            half_widths(map.bound_us, 1),
             or_none(map.coverage.map(|share| 100.0 * share), 1),
             format!("{} ({})", map.n, map.rejected),
             map.pieces.to_string(),
@@ -53,11 +49,23 @@ pub(super) fn maps(a: &Analysis) -> Option<Grid> {
         grid.note(sentence(warning));
     }
     grid.note(
-        "The interval of host from box holds for certain: the box's clock was read between two instants of the host. Robot \
-         from host is the identity with a stated delay. A constant delay of the trigger inputs cannot be seen here beyond \
-         what the interval allows for.",
+        "The 95 % interval is what the noise of trains and exchanges leaves open, with both ways of an exchange taking equally long on \
+         average. The bound comes on top: of host from box it is certain, whatever share of a delay is on the way there or back, since the box's clock was read between \
+         two instants of the host; of the cameras it is the unknown mean delay of an edge, the whole µs of both clocks and what a rate \
+         may change by beyond the trains. Robot from host is the identity with a stated delay. A constant delay of the trigger \
+         inputs cannot be seen here.",
     );
     Some(grid)
+}
+
+fn half_widths(of: Option<(f64, f64)>, digits: usize) -> String {
+    of.map_or(NONE.to_owned(), |(usual, largest)| {
+        format!(
+            "± {} (largest {})",
+            number(Some(usual), digits),
+            number(Some(largest), digits)
+        )
+    })
 }
 
 /// One row per camera: what became of the edges.

@@ -410,11 +410,21 @@ fn alignment_lines(certificate: &Alignment) -> String {
     for (name, what) in [
         (MapName::Camera1FromBox, "camera 1"),
         (MapName::Camera2FromBox, "camera 2"),
-        (MapName::HostFromBox, "host"),
     ] {
-        if let Some(half_us) = certificate.interval_us(name) {
-            parts.push(format!("{what} ± {} µs", number(Some(half_us), 1)));
+        let both = (certificate.interval_us(name), certificate.bound_us(name));
+        if let (Some(noise_us), Some(bound_us)) = both {
+            parts.push(format!(
+                "{what} ± {} µs (95 %) and at most {} µs besides",
+                number(Some(noise_us), 2),
+                number(Some(bound_us), 1)
+            ));
         }
+    }
+    if let Some(bound_us) = certificate.bound_us(MapName::HostFromBox) {
+        parts.push(format!(
+            "host within {} µs for certain",
+            number(Some(bound_us), 1)
+        ));
     }
     for (k, line) in certificate.lines.iter().enumerate() {
         let extra = line.doubled + line.spurious;

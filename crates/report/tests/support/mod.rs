@@ -197,7 +197,8 @@ fn alignment() -> Alignment {
         drift_ppm: Some(-211.37),
         residual_rms_us: Some(rms),
         residual_max_us: Some(4.0 * rms),
-        interval_us: Some((half_us, 1.2 * half_us)),
+        interval_us: Some((0.25, 0.5)),
+        bound_us: Some((half_us, 1.2 * half_us)),
         coverage: Some(0.951),
         coverage_n: 9_700,
     };

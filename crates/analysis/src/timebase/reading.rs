@@ -1,0 +1,53 @@
+//! What one clock showed when another showed something, and how surely.
+
+use super::smooth::Figure;
+use crate::distributions::{student_cdf, student_quantile};
+
+/// A time on one clock, read off another.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reading {
+    /// The time, µs.
+    pub us: f64,
+    /// Its standard error by the noise of what ties the clocks, µs.
+    pub se_us: f64,
+    /// Degrees of freedom of that error.
+    pub free: f64,
+    /// What comes on top, at most, µs: what no number of ties averages out.
+    pub bound_us: f64,
+}
+
+impl Reading {
+    pub(super) const fn new(figure: Figure, bound_us: f64) -> Self {
+        Self {
+            us: figure.value,
+            se_us: figure.se,
+            free: figure.free,
+            bound_us,
+        }
+    }
+
+    pub(super) fn later(self, by_us: u64) -> Self {
+        Self {
+            us: self.us + by_us as f64,
+            ..self
+        }
+    }
+
+    /// Half width of the interval by the noise alone that holds with this probability (0..1), µs.
+    #[must_use]
+    pub fn half_width_us(&self, level: f64) -> f64 {
+        self.se_us * student_quantile(0.5 * (1.0 + level), self.free)
+    }
+
+    /// How large an error by the noise this reading takes to be how rare: the probability of a smaller one, 0.5 for none.
+    #[must_use]
+    pub fn rank(&self, error_us: f64) -> f64 {
+        student_cdf(error_us / self.se_us, self.free)
+    }
+
+    /// Half width of everything together, µs: the 95 % interval and the bound on top of it.
+    #[must_use]
+    pub fn within_us(&self) -> f64 {
+        self.half_width_us(0.95) + self.bound_us
+    }
+}
