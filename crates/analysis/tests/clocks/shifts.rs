@@ -322,5 +322,5 @@ fn no_alignment_with_good_odds_is_wrong() {
 fn no_alignment_with_good_odds_is_wrong_in_many_recordings() {
     let each = std::env::var("RECORDINGS").ok();
     let each = each.and_then(|n| n.parse().ok()).unwrap_or(20);
-    judge(&battery(each, |seed| 30 + (seed * 37 % 260) as usize), 0.05);
+    judge(&battery(each, |seed| 30 + (seed * 37 % 260) as usize), 0.1);
 }
