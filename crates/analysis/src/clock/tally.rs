@@ -195,9 +195,9 @@ impl<'a> Counter<'a> {
         }
         let ends = [self.plan.contacts.first(), self.plan.contacts.last()];
         let [from, to] = ends.map(|c| c.map_or(0.0, |c| c.0));
-        for k in 0..2 {
+        for (k, shift_us) in shift_us.into_iter().enumerate() {
             let within = |at: &f64| (from..=to + self.plan.span_us).contains(at);
-            let rest = self.rest(k, shift_us[k], None);
+            let rest = self.rest(k, shift_us, None);
             tally.strays[k] = rest.filter(|(at, _)| within(at)).count() as u32;
         }
         tally.log_likelihood = path.log_likelihood(PATH_PRIOR)
