@@ -26,8 +26,6 @@ mod sample;
 mod scores;
 mod spread;
 
-use skinrig_analysis::distributions;
-
 pub use compare::{compare, estimate};
 pub use comparison::{
     Comparison, Components, Design, Enough, Interval, Needed, Note, Tost, Verdict,
