@@ -902,7 +902,12 @@ fn doubles(t: &mut Table) {
                 b.table.rotate_left(1);
             })
         },
-        &[Named(CamerasSwapped), Named(IndexShifted), Refused],
+        &[
+            Named(CamerasSwapped),
+            Named(IndexShifted),
+            Named(OrderOfPresses),
+            Refused,
+        ],
     );
     t.case(
         "axes exchanged and metres",
