@@ -121,6 +121,7 @@ const HARNESSES: &[&str] = &[
     "skinrig-browser",
     "skinrig-fuzz",
     "skinrig-planted",
+    "skinrig-wrong-inputs",
     "skinrig-emulated-libdrd",
     "skinrig-emulated-bench",
     "skinrig-emulated-camera",

@@ -67,7 +67,10 @@ fn remove_left_over(path: &Path) {
         if !is_copy || entry.file_type().is_ok_and(|t| !t.is_file()) {
             continue;
         }
-        if File::open(entry.path()).is_ok_and(|file| file.try_lock().is_ok()) {
+        // Held until it is removed: its writer, if it is about to lock it, then sees that it is gone.
+        if let Ok(file) = File::open(entry.path())
+            && file.try_lock().is_ok()
+        {
             let _ = fs::remove_file(entry.path());
         }
     }

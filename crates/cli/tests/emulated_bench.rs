@@ -146,10 +146,11 @@ fn the_quick_check_on_the_emulated_bench_agrees_with_the_simulated_one() {
                 .as_f64()
                 .unwrap_or_else(|| panic!("{metric}: no {what}"))
         };
-        let (found, low, high) = (of(&bench, "value"), of(&sim, "low"), of(&sim, "high"));
+        // Either has its own contacts, drawn from its own seed: their intervals meet.
+        let [bench, sim] = [&bench, &sim].map(|r| (of(r, "low"), of(r, "high")));
         assert!(
-            (low..=high).contains(&found),
-            "{metric}: expected {low} to {high} as on the simulated bench, found {found}"
+            bench.0 <= sim.1 && sim.0 <= bench.1,
+            "{metric}: expected {sim:?} as on the simulated bench, found {bench:?}"
         );
     }
     let session = the_only(&emulated, ".session.sqlite");

@@ -106,8 +106,8 @@ fn ordered(result: &Tradeoff) -> Vec<&Row> {
 pub fn terminal_table(result: &Tradeoff, rig: &str, color: bool) -> String {
     let (used, of) = result.scored;
     let mut out = format!(
-        "{}\n{} choices tried on {used} of {of} attempted scoring presses (n: those that count), each calibrated (model {}) \
-         on {} of {} others.\n\
+        "{}\n{} choices tried on {used} of {of} attempted scoring presses (n: those that count),\n\
+         each calibrated (model {}) on {} of {} others.\n\
          A choice competes when it locates at least {} % of the presses; others are in brackets.\n\
          Front: c CPU time, b bytes, d delay. CPU: median of {} runs over {} presses, both cameras.\n\n",
         crate::terminal::plain(rig),

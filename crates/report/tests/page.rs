@@ -94,7 +94,7 @@ fn hostile_text_stays_text() {
         .next()
         .unwrap();
     let data: serde_json::Value = serde_json::from_str(data).unwrap();
-    assert_eq!(data["session"], HOSTILE);
+    assert_eq!(data["session"], *skinrig_model::text::visible(HOSTILE));
     for figure in skinrig_report::figures::all(&input) {
         assert!(
             !figure.svg.contains("<img") && !figure.svg.contains("<script"),

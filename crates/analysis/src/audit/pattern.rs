@@ -22,9 +22,9 @@ pub fn findings(touches: &[Touch<'_>], contacts_s: [&[f64]; 2]) -> Vec<Finding> 
     let contact = |t: &&Touch<'_>| Some(t.timing?.contact.as_secs_f64());
     let listed: Vec<f64> = scheduled.iter().filter_map(contact).collect();
     let sync = scheduled.iter().filter(|t| t.role == PressRole::Sync);
-    let sync: Vec<f64> = sync.filter_map(|t| contact(&t)).collect();
+    let sync: Vec<f64> = sync.filter_map(contact).collect();
     let path = scheduled.iter().filter(|t| t.role != PressRole::Sync);
-    let Some(first) = path.filter_map(|t| contact(&t)).min_by(f64::total_cmp) else {
+    let Some(first) = path.filter_map(contact).min_by(f64::total_cmp) else {
         return Vec::new();
     };
     let near = |at: f64, all: &[f64], within: f64| all.iter().any(|l| (l - at).abs() <= within);

@@ -158,7 +158,12 @@ impl<'a> Path<'a> {
         for frame in Frame::all(&self.rig.outline) {
             all.push(self.in_frame(&frame));
         }
-        for by in (1..=MOST_SHIFT).flat_map(|k| [k, -k]) {
+        // On one straight line a shift of the list moves all places alike, as cameras that stand elsewhere do.
+        let bends = self
+            .repetitions()
+            .into_iter()
+            .any(|r| self.lines(r).len() > 1);
+        for by in (1..=MOST_SHIFT).flat_map(|k| [k, -k]).filter(|_| bends) {
             let at = (0..self.touches.len()).map(|i| self.shifted(i, by));
             all.push(Reading {
                 fault: Some(Fault::IndexShifted),

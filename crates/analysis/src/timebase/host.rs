@@ -177,10 +177,8 @@ impl Bounds {
         let before = swept(&mut each.iter().copied());
         let mut after = swept(&mut each.iter().rev().copied());
         after.reverse();
-        let both = before.iter().zip(&after);
-        let agree = both
-            .map(|(a, b)| a.low.max(b.low) <= a.high.min(b.high))
-            .all(|a| a);
+        let mut both = before.iter().zip(&after);
+        let agree = both.all(|(a, b)| a.low.max(b.low) <= a.high.min(b.high));
         let bounds = Self {
             before,
             after,

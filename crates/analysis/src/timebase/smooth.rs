@@ -250,7 +250,7 @@ fn factor(a: &Band) -> Option<Band> {
     let mut l = a.clone();
     for i in 0..n {
         let pivot = l[i][0];
-        if !(pivot > 1e-14 * a[i][0]) {
+        if pivot.is_nan() || pivot <= 1e-14 * a[i][0] {
             return None;
         }
         let root = pivot.sqrt();
@@ -294,15 +294,15 @@ fn inverse_band(l: &Band) -> Band {
         let last = 4.min(n - i);
         for k in (1..last).rev() {
             let mut sum = 0.0;
-            for m in 1..last {
+            for (m, factor) in l[i].iter().enumerate().take(last).skip(1) {
                 let (a, b) = (i + k.min(m), k.abs_diff(m));
-                sum += l[i][m] * z[a][b];
+                sum += factor * z[a][b];
             }
             z[i][k] = -sum / l[i][0];
         }
         let mut sum = 1.0 / l[i][0];
-        for m in 1..last {
-            sum -= l[i][m] * z[i][m];
+        for (factor, inverse) in l[i].iter().zip(&z[i]).take(last).skip(1) {
+            sum -= factor * inverse;
         }
         z[i][0] = sum / l[i][0];
     }

@@ -11,6 +11,7 @@ use std::io::Read;
 use std::path::Path;
 
 use sha2::{Digest, Sha256};
+use skinrig_controller::ControllerError;
 use skinrig_device::{CameraSettings, Rig};
 use skinrig_formats::Geometry;
 use skinrig_formats::hdf5::Container;
@@ -38,7 +39,8 @@ const SMALLEST_PATH_MM: f64 = 1.0;
 /// Imports a dataset.
 ///
 /// # Errors
-/// [`Failure::input`] for files that are not what they should be, [`Failure::rig`] when a file breaks off inside.
+/// [`Failure::input`] for files that are not what they should be, also when one breaks off inside: what was read up to there is
+/// kept. [`Failure::rig`] when the session cannot be written.
 pub fn import(args: &ImportArgs, command_line: &str, json: bool) -> Outcome {
     let name = args.schedule.to_string_lossy();
     for file in [&args.camera1, &args.camera2, &args.presses] {
@@ -113,7 +115,18 @@ pub fn import(args: &ImportArgs, command_line: &str, json: bool) -> Outcome {
     };
     let operator = Operator::listen().map_err(Failure::internal)?;
     let (session, report) = record(&intent, &plan, rig, &args.sessions, None, &operator)?;
-    conclude(&session, &report, args.no_analysis, None, json)
+    let unreadable = report
+        .causes
+        .iter()
+        .any(|c| matches!(c, ControllerError::Device(_)));
+    conclude(&session, &report, args.no_analysis, None, json).map_err(|failure| {
+        // No rig took part: what a camera did not deliver is missing or broken in its file.
+        if unreadable {
+            Failure::input(failure.message)
+        } else {
+            failure
+        }
+    })
 }
 
 fn read_positions(path: &Path, schedule: &Schedule) -> Result<Vec<Point2>, Failure> {

@@ -1,5 +1,6 @@
 //! A frame as text: some 80 columns, no control characters.
 
+use skinrig_model::text::is_hidden;
 use skinrig_model::{HostDuration, PressRole};
 
 use super::frame::{Frame, Latest, Place};
@@ -55,7 +56,7 @@ pub fn text(frame: &Frame) -> String {
         lines.extend(faults.map(|f| format!("  {:>10.3} s  {}: {}", f.t_s, f.kind, f.reason)));
     }
     // What stands in files from strangers moves no cursor.
-    let plain = |line: String| line.replace(char::is_control, " ");
+    let plain = |line: String| line.replace(|c: char| c.is_control() || is_hidden(c), " ");
     lines.into_iter().map(plain).collect::<Vec<_>>().join("\n")
 }
 

@@ -183,7 +183,8 @@ fn a_session_whose_clocks_are_beyond_a_limit_is_invalid_everywhere() {
         shown.contains("RMSE                     INVALID"),
         "{shown}"
     );
-    let page = std::fs::read_to_string(only(&lab.path("s"), ".report.html")).unwrap();
+    let variant = ".analysis-alignment.max_camera_interval=0.5us.report.html";
+    let page = std::fs::read_to_string(only(&lab.path("s"), variant)).unwrap();
     assert!(page.contains("data-testid=\"invalid\""));
     skinrig(&["tradeoff", &session, "--set", strict])
         .code(4)

@@ -44,7 +44,8 @@ fn a_variant_lies_beside_the_official_analysis_and_is_taken_only_when_asked_for(
         "all",
     ])
     .code(0);
-    skinrig(&["analyze", &s, "--reference-code"]).code(0);
+    // Eight presses are too few for the public code's calibration, and the nominal cameras are no result.
+    skinrig(&["analyze", &s, "--reference-code"]).code(4);
     let after = (
         std::fs::read(&official).unwrap(),
         std::fs::read(&report).unwrap(),
@@ -211,7 +212,7 @@ fn a_folder_is_no_session_to_tag() {
 fn text_that_acts_is_written_out() {
     let lab = Lab::new();
     let folder = lab.text("s");
-    let hostile = "prototype.id=\"=1+1 \\u202egpj \\e[8m\"";
+    let hostile = "prototype.id='=1+1 \u{202e}gpj \u{1b}[8m'";
     let said = skinrig(&["run", SMALL, "--sessions", &folder, "--set", hostile]).code(0);
     let session = text(&only(&lab.path("s"), ".session.sqlite"));
     let page = std::fs::read_to_string(only(&lab.path("s"), ".report.html")).unwrap();

@@ -162,7 +162,7 @@ fn values_that_are_none_make_no_sample() {
     let nan = Sample::mean([(3, f64::NAN)]).unwrap_err();
     assert_eq!(
         nan.to_string(),
-        "expected finite values, found NaN at location 3"
+        "expected finite values, found NaN at location 4"
     );
     let never = Count {
         events: 1,

@@ -293,10 +293,10 @@ fn a_plan_that_is_not_what_is_left_is_refused() {
         }
         assert!(!lock(&told.world).ever_armed);
     };
-    refused(&plan, &histories, "expected no step for press 0");
+    refused(&plan, &histories, "expected no step for press 1");
     refused(&rest, &[], "expected those of 3 presses, found 0");
     let mut less = rest.clone();
     less.steps
         .retain(|s| !matches!(s, Step::Press(p) if p.press == PressId::from_index(2)));
-    refused(&less, &histories, "expected a step for press 2");
+    refused(&less, &histories, "expected a step for press 3");
 }

@@ -238,7 +238,7 @@ fn wrong_order_is_refused_and_a_failed_write_stays_failed() {
     let orphan = Record::Outcome(crate::common::outcome(id, 0, PressVerdict::Valid));
     let failed = writer.accept(orphan).unwrap_err();
     assert!(
-        matches!(&failed, RecorderError::Failed(d) if d.contains("press 1 (attempt 1)") && !d.contains("damaged")),
+        matches!(&failed, RecorderError::Failed(d) if d.contains("press 2 (attempt 1)") && !d.contains("damaged")),
         "{failed}"
     );
     assert!(matches!(

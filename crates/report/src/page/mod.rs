@@ -384,8 +384,11 @@ mod tests {
     #[test]
     fn script_json_cannot_end_its_element() {
         let text = script_json(&"</script><!--\u{2028}&").unwrap();
-        assert_eq!(text, "\"\\u003c/script\\u003e\\u003c!--\\u2028\\u0026\"");
+        assert_eq!(
+            text,
+            "\"\\u003c/script\\u003e\\u003c!--\\\\u{2028}\\u0026\""
+        );
         let back: String = serde_json::from_str(&text).unwrap();
-        assert_eq!(back, "</script><!--\u{2028}&");
+        assert_eq!(back, "</script><!--\\u{2028}&");
     }
 }
