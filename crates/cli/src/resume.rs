@@ -106,7 +106,9 @@ fn refusal(error: RecorderError) -> Failure {
             );
             Failure::limit(words)
         }
-        RecorderError::Io { .. } | RecorderError::Sql { .. } => Failure::internal(error),
+        RecorderError::Io { .. } | RecorderError::Sql { .. } | RecorderError::Unread(_) => {
+            Failure::internal(error)
+        }
         other => Failure::input(other),
     }
 }

@@ -3,6 +3,7 @@
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// What lies between a file's name and the number of its unfinished copy.
 const PARTIAL: &str = ".partial-";
@@ -27,8 +28,11 @@ pub fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
 
 /// A new file beside `path`, locked for as long as it is open, that nobody else writes.
 fn own(path: &Path) -> io::Result<(PathBuf, File)> {
+    // Never the same name again: who is about to remove one copy must not meet the next one.
+    static COPIES: AtomicU64 = AtomicU64::new(0);
     let process = std::process::id();
-    for n in 0u32.. {
+    loop {
+        let n = COPIES.fetch_add(1, Ordering::Relaxed);
         let mut name = path.as_os_str().to_owned();
         name.push(format!("{PARTIAL}{process}-{n}"));
         let partial = PathBuf::from(name);
@@ -48,7 +52,6 @@ fn own(path: &Path) -> io::Result<(PathBuf, File)> {
             return Ok((partial, file));
         }
     }
-    Err(io::ErrorKind::AlreadyExists.into())
 }
 
 /// Removes what processes left that were ended while they wrote: their copies are locked no more.

@@ -146,7 +146,7 @@ impl<'a> Run<'a, Planned> {
     pub fn execute(self) -> RunReport {
         match self.arm() {
             Ok(run) => run.begin().run().report(),
-            Err(report) => report,
+            Err(report) => *report,
         }
     }
 
@@ -155,12 +155,12 @@ impl<'a> Run<'a, Planned> {
     ///
     /// # Errors
     /// The report of a run that ended here, the rig at rest.
-    pub fn arm(mut self) -> Result<Run<'a, Armed>, RunReport> {
+    pub fn arm(mut self) -> Result<Run<'a, Armed>, Box<RunReport>> {
         match self.core.shielded(Core::arm) {
             Ok(()) => Ok(self.become_()),
             Err(halt) => {
                 self.core.conclude(Err(halt));
-                Err(self.core.take_report())
+                Err(Box::new(self.core.take_report()))
             }
         }
     }

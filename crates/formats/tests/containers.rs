@@ -186,7 +186,8 @@ fn single_events_outside_the_sensor_are_delivered_and_counted() {
     (x[12], x[19_999], x[10_000]) = (640, -1, 65_536 * 3 + 5);
     let mut y = vec![2; n];
     y[1] = 480;
-    plain(&path, &ts, &x, &y, None);
+    let pol = vec![1; n];
+    plain(&path, &ts, &x, &y, Some(&pol));
     let container = Container::open(&path).unwrap();
     let mut reader = container.events(None, Geometry::EVK1).unwrap();
     let mut events = Vec::new();
@@ -203,7 +204,7 @@ fn single_events_outside_the_sensor_are_delivered_and_counted() {
     assert_eq!((at(19_999).0, at(10_000).0), (u16::MAX, u16::MAX));
     // Above one in a hundred it is another sensor's recording.
     x[..400].fill(700);
-    plain(&path, &ts, &x, &y, None);
+    plain(&path, &ts, &x, &y, Some(&pol));
     let found = failure(&path, None);
     assert!(
         found.contains("row 0: expected 0..=639 but for at most 1 %"),

@@ -98,6 +98,11 @@ pub enum RecorderError {
         /// The session file.
         path: PathBuf,
     },
+    /// The machine could not read all of a session; what is in it is not known.
+    #[error(
+        "{0}; this says nothing of what is in the session: mend the disk or free memory, and try again"
+    )]
+    Unread(String),
     /// An earlier write failed; the session takes nothing more.
     #[error("the session is no longer written: {0}")]
     Failed(String),
@@ -142,4 +147,19 @@ pub enum RecorderError {
         /// What was asked for.
         wanted: String,
     },
+}
+
+impl RecorderError {
+    /// True for what the machine did - no room, no memory, a disk that fails, a file that is locked - rather than the file. SQLite
+    /// result codes: <https://www.sqlite.org/rescode.html>; a read that ends early (522) is a file that was cut off.
+    pub(crate) fn is_of_the_machine(&self) -> bool {
+        let Self::Sql { source, .. } = self else {
+            return matches!(self, Self::Io { .. });
+        };
+        let sqlx::Error::Database(error) = &**source else {
+            return matches!(&**source, sqlx::Error::Io(_));
+        };
+        let code: i32 = error.code().and_then(|c| c.parse().ok()).unwrap_or(0);
+        matches!(code & 0xff, 5 | 6 | 7 | 10 | 13 | 14) && code != 522
+    }
 }

@@ -55,6 +55,8 @@ pub struct VerifyReport {
     pub remarks: Vec<String>,
     /// Counts and sizes, from the rows; `None` when they cannot be read.
     pub totals: Option<SessionTotals>,
+    /// The first thing that the machine, not the file, kept from being read.
+    unread: Option<String>,
 }
 
 impl VerifyReport {
@@ -74,7 +76,16 @@ impl VerifyReport {
 
     /// Keeps the value, or tells the error.
     fn take<T>(&mut self, result: Result<T, RecorderError>) -> Option<T> {
-        result.map_err(|e| self.add(e)).ok()
+        result.map_err(|e| self.add_error(e)).ok()
+    }
+
+    /// An error of the machine says nothing of the file.
+    fn add_error(&mut self, error: RecorderError) {
+        if error.is_of_the_machine() {
+            self.unread.get_or_insert(error.to_string());
+        } else {
+            self.add(error);
+        }
     }
 
     fn equal<T: PartialEq + std::fmt::Debug>(&mut self, what: &str, expected: &T, found: &T) {
@@ -90,7 +101,7 @@ impl VerifyReport {
 ///
 /// # Errors
 /// [`RecorderError::Missing`] and [`RecorderError::Io`] when there is no file to read, [`RecorderError::Empty`] when nothing was ever
-/// recorded in it. Everything that is wrong inside the file is a problem in the report.
+/// recorded in it, [`RecorderError::Unread`] when the machine could not read all of it. Everything that is wrong inside the file is a problem in the report.
 pub fn verify(
     path: impl AsRef<Path>,
     scanner: &mut dyn ChunkScanner,
@@ -104,6 +115,7 @@ pub fn verify(
             | RecorderError::Io { .. }
             | RecorderError::Empty { .. }),
         ) => return Err(e),
+        Err(e) if e.is_of_the_machine() => return Err(e),
         Err(e) => {
             report.add(e);
             return Ok(report);
@@ -117,11 +129,11 @@ pub fn verify(
     for camera in CameraId::ALL {
         let format = formats.map(|f| f[camera.index()]);
         if let Err(e) = check_chunks(&reader, camera, format, scanner, &mut report) {
-            report.add(e);
+            report.add_error(e);
         }
     }
     if let Err(e) = check_poses(&reader, &mut report) {
-        report.add(e);
+        report.add_error(e);
     }
     check_journal(&reader, &mut report);
     legs::check(&reader, &mut report);
@@ -129,6 +141,9 @@ pub fn verify(
     seal::check(&reader, &mut report);
     chain::check(&reader, &mut report);
     drop(reader);
+    if let Some(problem) = report.unread {
+        return Err(RecorderError::Unread(problem));
+    }
     if report.sealed && report.is_sound() {
         seal::protect(path, &mut report);
     }

@@ -1,5 +1,7 @@
 //! Every case of the battery, or a sample of the seeds: none ends valid with a wrong number.
 
+#![expect(clippy::print_stdout, reason = "the table of the documentation")]
+
 use rayon::prelude::*;
 use skinrig_wrong_inputs::cases::{Case, all};
 use skinrig_wrong_inputs::judge::{Allowed, Judged, Observed, judge};

@@ -540,7 +540,7 @@ fn drift(leg: &[&Piece], k: usize) -> Option<Figure> {
     let camera_us = ahead + to.map.value(x1) - from.map.value(x0);
     let host_us = last.host.host_us(x1) - first.host.host_us(x0);
     let value = (camera_us - host_us) / host_us;
-    if !(host_us > 0.0) {
+    if host_us.is_nan() || host_us <= 0.0 {
         return None;
     }
     let both = if leg.len() == 1 {

@@ -403,8 +403,8 @@ impl Posterior {
         for (x, y) in points {
             let y = rest(*x, *y) - grid.value(&parabola, *x);
             let (k, w) = grid.weights(*x);
-            for i in 0..4 {
-                data.right[k + i] += w[i] * y;
+            for (right, weight) in data.right[k..].iter_mut().zip(w) {
+                *right += weight * y;
             }
             data.squares += y * y;
         }
@@ -425,7 +425,7 @@ impl Posterior {
             .map(|c| libm::exp(c.log_likelihood - best))
             .collect();
         let all: f64 = weights.iter().sum();
-        if !(all > 0.0) {
+        if all.is_nan() || all <= 0.0 {
             return None;
         }
         let (mut mean, mut variance) = (vec![0.0; size], 0.0);
@@ -532,7 +532,7 @@ impl Data {
             }
             let solved = solve(&l, &sum);
             let left = 1.0 - share * dot(&solved, &sum);
-            if !(left > 1e-9) {
+            if left.is_nan() || left <= 1e-9 {
                 return None;
             }
             // The determinant of these penalties is that of the third differences over their number.

@@ -1,5 +1,6 @@
 //! Clock fits: from trigger marks with everything that happens to them, and from the presses themselves.
 
+#![expect(clippy::print_stdout, reason = "the table of the documentation")]
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 mod shifts;

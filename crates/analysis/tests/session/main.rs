@@ -408,7 +408,7 @@ fn contradictions_are_refused_with_their_place() {
     ];
     let wanted = [
         "expected one outcome slot per planned press (53), found 52",
-        "expected the outcome of press 4 in row 4 of the journal, found that of press 5",
+        "expected the outcome of press 5 in its row of the journal, found that of press 6",
         "`eps_px`, found NaN",
         "`min_samples`, found 0",
         "`crop_v`, found 300..=480",

@@ -107,7 +107,7 @@ fn no_tick_of_1_to_10_ms_breaks_a_press() {
         let header = sim_header(&plan, &config);
         let control = ControlHandle::new();
         let armed = Run::with_settings(&plan, header, rig, &control, &mut sink, settings).arm();
-        let report = armed.map_or_else(|report| report, |run| run.begin().run().report());
+        let report = armed.map_or_else(|report| *report, |run| run.begin().run().report());
         assert_eq!(
             (report.valid, &report.end),
             (3, &RunEnd::Completed),
