@@ -41,7 +41,7 @@ impl Folder {
     }
 
     /// Refuses when something else than a file is in the place of one of these: before anything is written. Whether a file that is
-    /// there is the very one that would be written, [`Folder::complete`] finds out.
+    /// there is the very one that would be written, `Folder::complete` finds out.
     ///
     /// # Errors
     /// [`ExportError::Exists`].

@@ -190,12 +190,16 @@ impl Differences {
             });
         };
         let first_cell = cell(first - high);
-        let cells = (cell(last - low) - first_cell + 1).max(0) as usize;
+        // Without any `earlier` the ends are infinite, and there are no cells.
+        let cells = cell(last - low)
+            .saturating_sub(first_cell)
+            .saturating_add(1)
+            .max(0) as usize;
         let (mut counts, mut sums_us) = (vec![0; cells], vec![0.0; cells]);
         for one in earlier {
             for other in later {
                 let difference_us = other - one;
-                let i = (cell(difference_us) - first_cell) as usize;
+                let i = cell(difference_us).saturating_sub(first_cell) as usize;
                 if let (Some(count), Some(sum)) = (counts.get_mut(i), sums_us.get_mut(i)) {
                     *count += 1;
                     *sum += difference_us;
@@ -218,7 +222,7 @@ impl Differences {
 
     /// How many pairs differ by about `us`.
     fn at(&self, us: f64) -> u32 {
-        let i = (us / CELL_US).floor() as i64 - self.first_cell;
+        let i = ((us / CELL_US).floor() as i64).saturating_sub(self.first_cell);
         match usize::try_from(i) {
             Ok(i) if i < self.counts.len() => self.about(i).0,
             _ => 0,

@@ -26,7 +26,7 @@ use skinrig_protocol::Schedule;
 use skinrig_sim::SimClock;
 
 use crate::args::ImportArgs;
-use crate::exit::{Failure, Outcome};
+use crate::exit::{Exit, Failure, Outcome};
 use crate::run::{Intent, conclude, record};
 use crate::signals::Operator;
 use crate::sink::Foreknowledge;
@@ -122,7 +122,10 @@ pub fn import(args: &ImportArgs, command_line: &str, json: bool) -> Outcome {
     conclude(&session, &report, args.no_analysis, None, json).map_err(|failure| {
         // No rig took part: what a camera did not deliver is missing or broken in its file.
         if unreadable {
-            Failure::input(failure.message)
+            Failure {
+                exit: Exit::Input,
+                ..failure
+            }
         } else {
             failure
         }

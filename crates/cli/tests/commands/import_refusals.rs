@@ -242,7 +242,7 @@ fn raw_files_that_are_cut_off_or_empty() {
     refused(
         &lab,
         &data,
-        3,
+        2,
         &[".camera2.raw", "found nothing after the header"],
     );
 }
