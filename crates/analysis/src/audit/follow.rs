@@ -175,6 +175,10 @@ fn does_not_follow(
     let Some(fit) = as_is.fits[k] else {
         return false;
     };
+    // Where most presses share one angle, as at one place pressed again and again, columns have no way to follow.
+    if as_is.ignorance_deg[k] < LEAST_SPREAD_DEG {
+        return false;
+    }
     let limit = FOLLOWS_NOT * as_is.ignorance_deg[k];
     let calibrated = spread_deg(&residuals(
         &analysis.geometry.cameras[k],
