@@ -204,6 +204,7 @@ fn single_events_outside_the_sensor_are_delivered_and_counted() {
     assert_eq!((at(19_999).0, at(10_000).0), (u16::MAX, u16::MAX));
     // Above one in a hundred it is another sensor's recording.
     x[..400].fill(700);
+    let path = dir.path().join("other.hdf5");
     plain(&path, &ts, &x, &y, Some(&pol));
     let found = failure(&path, None);
     assert!(
