@@ -14,7 +14,7 @@
 //!
 //! ```
 //! # use skinrig_controller::{Run, Planned, Finished, RunReport};
-//! fn in_order(run: Run<'_, Planned>) -> Result<Run<'_, Finished>, RunReport> {
+//! fn in_order(run: Run<'_, Planned>) -> Result<Run<'_, Finished>, Box<RunReport>> {
 //!     Ok(run.arm()?.begin().run())
 //! }
 //! ```
