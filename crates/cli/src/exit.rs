@@ -6,6 +6,7 @@ use std::process::{ExitCode, Termination};
 
 use skinrig_nightly::NightExit;
 use skinrig_protocol::Diagnostics;
+use skinrig_recorder::RecorderError;
 
 /// How the program ended. The numbers are part of the interface and do not change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -90,6 +91,15 @@ impl Failure {
     /// A fault of the program or the machine.
     pub fn internal(message: impl fmt::Display) -> Self {
         Self::new(Exit::Internal, message)
+    }
+
+    /// A session that could not be read: bad input, unless it was the machine that failed.
+    pub fn session(error: RecorderError) -> Self {
+        if error.is_of_the_machine() {
+            Self::internal(error)
+        } else {
+            Self::input(error)
+        }
     }
 
     /// A rig fault.

@@ -19,8 +19,8 @@ use crate::results::{self, Choices, Results};
 /// # Errors
 /// [`Failure::input`] for an unreadable session; [`Failure::internal`] when a file cannot be written.
 pub fn export(args: &ExportArgs, json: bool) -> Outcome {
-    let reader = SessionReader::open(&args.session).map_err(Failure::input)?;
-    let header = reader.header().map_err(Failure::input)?;
+    let reader = SessionReader::open(&args.session).map_err(Failure::session)?;
+    let header = reader.header().map_err(Failure::session)?;
     let is_bundle = args.kinds.contains(&ExportKind::Bundle);
     if is_bundle && (args.kinds.len() > 1 || !args.only.is_empty()) {
         return Err(Failure::input(
@@ -63,7 +63,7 @@ fn folder(args: &ExportArgs, ending: &str) -> Result<Folder, Failure> {
 
 fn refused(e: ExportError) -> Failure {
     match e {
-        ExportError::Session(e) => Failure::input(e),
+        ExportError::Session(e) => Failure::session(e),
         e => Failure::internal(e),
     }
 }
@@ -263,7 +263,7 @@ fn bundle(
     header: &RunHeader,
     folder: &Folder,
 ) -> Result<Vec<PathBuf>, Failure> {
-    if reader.seal().map_err(Failure::input)?.is_none() {
+    if reader.seal().map_err(Failure::session)?.is_none() {
         return Err(Failure::input(format!(
             "{}: expected a sealed session for a bundle, found one that is under way or was cut off\n  next: `skinrig resume` \
              goes on with it and seals it",
@@ -298,7 +298,7 @@ fn bundle(
         name.to_string_lossy().into_owned()
     };
     let names: Vec<String> = written.iter().map(name).collect();
-    let session_id = reader.session_id().map_err(Failure::input)?;
+    let session_id = reader.session_id().map_err(Failure::session)?;
     skinrig_export::seal_bundle(
         folder.path(),
         &session_id,

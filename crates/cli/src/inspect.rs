@@ -37,8 +37,8 @@ pub fn inspect(args: &InspectArgs, as_json: bool) -> Outcome {
 
 /// A session's camera streams, decoded from its chunks.
 fn inspect_session(path: &Path, gap_us: u64) -> Result<Inspection, Failure> {
-    let reader = SessionReader::open(path).map_err(Failure::input)?;
-    let header = reader.header().map_err(Failure::input)?;
+    let reader = SessionReader::open(path).map_err(Failure::session)?;
+    let header = reader.header().map_err(Failure::session)?;
     let mut streams = Vec::new();
     for camera in CameraId::ALL {
         let mut stream = StreamInspection::new(&camera.to_string(), gap_us);
@@ -51,7 +51,7 @@ fn inspect_session(path: &Path, gap_us: u64) -> Result<Inspection, Failure> {
                 decoder.lost(meta.lost_before);
                 decoder.push(bytes, &mut stream);
             })
-            .map_err(Failure::input)?;
+            .map_err(Failure::session)?;
         stream.finish(&decoder);
         streams.push(stream);
     }
@@ -59,7 +59,7 @@ fn inspect_session(path: &Path, gap_us: u64) -> Result<Inspection, Failure> {
     Ok(Inspection {
         kind: FileKind::Sqlite,
         header: vec![
-            entry("session", &reader.session_id().map_err(Failure::input)?),
+            entry("session", &reader.session_id().map_err(Failure::session)?),
             entry("started", &header.started_at),
             entry("prototype", &header.prototype),
             entry("protocol", &header.protocol_name),

@@ -60,7 +60,7 @@ struct Prototype {
 /// # Errors
 /// [`Failure::input`] when the folder cannot be read, or has no session of the prototype that was named.
 pub fn prototypes(args: &PrototypesArgs, json: bool) -> Outcome {
-    let mut sessions = list(&args.folder).map_err(Failure::input)?;
+    let mut sessions = list(&args.folder).map_err(Failure::session)?;
     if let Some(wanted) = &args.prototype {
         crate::sessions::of_prototype(&args.folder, wanted)?;
         sessions.retain(|s| s.prototype() == Some(wanted));

@@ -117,7 +117,7 @@ pub(crate) struct Opened {
 /// # Errors
 /// [`Failure::input`] for files that are no readable session or settings that do not parse.
 pub(crate) fn open(path: &Path, choices: Choices<'_>) -> Result<Opened, Failure> {
-    let unreadable = |e: RecorderError| Failure::input(e);
+    let unreadable = Failure::session;
     let reader = SessionReader::open(path).map_err(unreadable)?;
     let header = reader.header().map_err(unreadable)?;
     let document: RigDocument = serde_json::from_str(&header.rig_json).map_err(|e| {
@@ -170,9 +170,9 @@ pub fn analyze_session(path: &Path, choices: Choices<'_>) -> Result<Results, Fai
     analysis.reference = choices
         .reference_code
         .then(|| reference_code(input, &analysis, &kept));
-    analysis.motion = motion(&session.reader, &analysis).map_err(Failure::input)?;
+    analysis.motion = motion(&session.reader, &analysis).map_err(Failure::session)?;
     let mut provenance = crate::provenance::provenance(&session.reader, &session.header, &analysis)
-        .map_err(|e: RecorderError| Failure::input(e))?;
+        .map_err(Failure::session)?;
     provenance.variant = session.variant;
     Ok(Results {
         session: path.to_owned(),
@@ -401,7 +401,8 @@ pub fn analyze(args: &AnalyzeArgs, json: bool) -> Outcome {
     };
     let results = analyze_session(&args.session, choices)?;
     if let (Some(variant), Some(out)) = (&results.provenance.variant, &args.out) {
-        not_official(&args.session, out, variant)?;
+        let official = analyses::results_path(&args.session, None);
+        not_official(&official, out, variant)?;
     }
     let html = args.out.as_ref().map(|out| out.with_extension("html"));
     let older = replaced(&results, args.out.as_deref());
@@ -411,14 +412,13 @@ pub fn analyze(args: &AnalyzeArgs, json: bool) -> Outcome {
     check_limit(&results, args.max_rmse)
 }
 
-/// A variant in the place of the official results would be taken for them.
-fn not_official(session: &Path, out: &Path, variant: &Variant) -> Result<(), Failure> {
-    let official = analyses::results_path(session, None);
+/// A variant in the place of the `official` file would be taken for it.
+pub fn not_official(official: &Path, out: &Path, variant: &Variant) -> Result<(), Failure> {
     let place = |path: &Path| {
         let folder = crate::paths::folder_of(path).canonicalize().ok();
         (folder, path.file_name().map(std::ffi::OsStr::to_owned))
     };
-    if place(&official) != place(out) {
+    if place(official) != place(out) {
         return Ok(());
     }
     Err(Failure::input(format!(
@@ -451,8 +451,8 @@ pub fn report(args: &ReportArgs, json: bool) -> Outcome {
     let variant = match &args.analysis {
         None => None,
         Some(name) => {
-            let reader = SessionReader::open(&args.session).map_err(Failure::input)?;
-            let id = reader.session_id().map_err(Failure::input)?;
+            let reader = SessionReader::open(&args.session).map_err(Failure::session)?;
+            let id = reader.session_id().map_err(Failure::session)?;
             Some(analyses::variant(&args.session, &id, name)?)
         }
     };

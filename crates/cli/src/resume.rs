@@ -106,10 +106,7 @@ fn refusal(error: RecorderError) -> Failure {
             );
             Failure::limit(words)
         }
-        RecorderError::Io { .. } | RecorderError::Sql { .. } | RecorderError::Unread(_) => {
-            Failure::internal(error)
-        }
-        other => Failure::input(other),
+        other => Failure::session(other),
     }
 }
 
@@ -135,8 +132,8 @@ fn read(session: &Path) -> Result<Unfinished, Failure> {
             "{session}: expected {expected}, found {found}\n  next: {next}"
         ))
     };
-    let reader = SessionReader::open(session).map_err(Failure::input)?;
-    let header = reader.header().map_err(Failure::input)?;
+    let reader = SessionReader::open(session).map_err(Failure::session)?;
+    let header = reader.header().map_err(Failure::session)?;
     if matches!(header.rig_kind.as_str(), "imported" | "replayed") {
         return Err(refused(
             "a session that a rig recorded",
@@ -178,7 +175,7 @@ fn read(session: &Path) -> Result<Unfinished, Failure> {
             reader.legs()?.len(),
         ))
     };
-    let (histories, devices, end, legs) = all().map_err(Failure::input)?;
+    let (histories, devices, end, legs) = all().map_err(Failure::session)?;
     Ok(Unfinished {
         header,
         document,

@@ -422,10 +422,10 @@ fn replay(
     command_line: &str,
     operator: &Operator,
 ) -> Result<(PathBuf, RunReport), Failure> {
-    let reader = SessionReader::open(recording).map_err(Failure::input)?;
-    let header = reader.header().map_err(Failure::input)?;
+    let reader = SessionReader::open(recording).map_err(Failure::session)?;
+    let header = reader.header().map_err(Failure::session)?;
     // A replay repeats one run of the plan on the tape's own clocks; a further leg begins in the middle of the plan.
-    let legs = reader.legs().map_err(Failure::input)?.len();
+    let legs = reader.legs().map_err(Failure::session)?.len();
     if legs > 1 {
         return Err(Failure::input(format!(
             "{}: expected a session that was recorded in one go, found one in {legs} legs, which cannot be replayed\n  \
@@ -449,7 +449,7 @@ fn replay(
     let name = format!("replay-{}", name.trim_end_matches(".yaml"));
     let expected = reader
         .end()
-        .map_err(Failure::input)?
+        .map_err(Failure::session)?
         .map_or(HostDuration::ZERO, |(t, _)| HostDuration(t.0));
     let intent = Intent {
         text: &header.protocol_text,
@@ -463,7 +463,7 @@ fn replay(
         analysis: &document.analysis,
         command_line,
         expected,
-        known: foreknowledge(&reader).map_err(Failure::input)?,
+        known: foreknowledge(&reader).map_err(Failure::session)?,
         faults: &[],
     };
     let rig = rig::replayed(recording, &header, &document)?;

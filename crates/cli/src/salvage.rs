@@ -13,7 +13,7 @@ use crate::exit::{Exit, Failure, Outcome};
 /// [`Failure::input`] when nothing of a session is found or the new file exists; [`Failure::limit`] when something is lost.
 pub fn salvage(args: &SalvageArgs, json: bool) -> Outcome {
     let to = args.out.clone().unwrap_or_else(|| beside(&args.session));
-    let report = bring_back(&args.session, &to).map_err(Failure::input)?;
+    let report = bring_back(&args.session, &to).map_err(Failure::session)?;
     if json {
         let mut value = serde_json::to_value(&report).map_err(Failure::internal)?;
         value["whole"] = report.is_whole().into();

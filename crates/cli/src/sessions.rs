@@ -16,7 +16,7 @@ use crate::exit::{Exit, Failure, Outcome};
 /// # Errors
 /// [`Failure::input`] when the folder cannot be read.
 pub fn sessions(args: &SessionsArgs, json: bool) -> Outcome {
-    let mut found = list(&args.folder).map_err(Failure::input)?;
+    let mut found = list(&args.folder).map_err(Failure::session)?;
     if let Some(wanted) = &args.prototype {
         found.retain(|s| s.prototype() == Some(wanted));
     }
@@ -101,7 +101,7 @@ pub fn find_running(place: &Path) -> Result<PathBuf, Failure> {
 /// # Errors
 /// [`Failure::input`] when the folder cannot be read, or has none of them: then which prototypes there are.
 pub fn of_prototype(folder: &Path, prototype: &str) -> Result<Vec<PathBuf>, Failure> {
-    let all = list(folder).map_err(Failure::input)?;
+    let all = list(folder).map_err(Failure::session)?;
     let of = |s: &&SessionSummary| s.prototype() == Some(prototype);
     let found: Vec<PathBuf> = all.iter().filter(of).map(|s| s.path.clone()).collect();
     if !found.is_empty() {

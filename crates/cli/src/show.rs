@@ -13,7 +13,7 @@ use crate::rig::gates;
 /// # Errors
 /// [`Failure::input`] when the file is no readable session.
 pub fn show(args: &ShowArgs, json: bool) -> Outcome {
-    let document = describe(args).map_err(Failure::input)?;
+    let document = describe(args).map_err(Failure::session)?;
     if json {
         crate::print_json(&document);
     } else {

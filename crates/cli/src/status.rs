@@ -34,7 +34,7 @@ pub fn status(args: &StatusArgs, as_json: bool) -> Outcome {
         Ok(filed) => filed,
         // The first records of a run are not yet on the disk.
         Err(RecorderError::Empty { .. }) if writer.is_some() => json!({}),
-        Err(e) => return Err(Failure::input(e)),
+        Err(e) => return Err(Failure::session(e)),
     };
     let mut d = json!({
         "session": session, "writer": writer, "live": live, "silence": silence,

@@ -17,7 +17,7 @@ pub fn tag(args: &TagArgs, json: bool) -> Outcome {
     let session = args.session.clone();
     let session_id = SessionReader::open(&session)
         .and_then(|reader| reader.session_id())
-        .map_err(Failure::input)?;
+        .map_err(Failure::session)?;
     let (add, remove) = checked(&args.tags, &args.remove)?;
     let asked = !add.is_empty() || !remove.is_empty() || args.note.is_some();
     let all = if asked {
@@ -33,7 +33,7 @@ pub fn tag(args: &TagArgs, json: bool) -> Outcome {
     } else {
         sayings(&session, &session_id)
     };
-    let all = all.map_err(Failure::input)?;
+    let all = all.map_err(Failure::session)?;
     if json {
         crate::print_json(&serde_json::json!({
             "session": session, "tags": all.tags, "notes": all.notes,

@@ -28,7 +28,7 @@ fn bundle(folder: &Path, json: bool) -> Outcome {
     if report.problems.is_empty() {
         let inside = folder.join(&report.session);
         let id = SessionReader::open(&inside).and_then(|reader| reader.session_id());
-        let id = id.map_err(Failure::input)?;
+        let id = id.map_err(Failure::session)?;
         if id != report.session_id {
             let place = &report.session;
             let problem = format!(
@@ -37,7 +37,7 @@ fn bundle(folder: &Path, json: bool) -> Outcome {
             );
             report.problems.push(problem);
         }
-        let session = recheck(&inside, &mut Rescan::default()).map_err(Failure::input)?;
+        let session = recheck(&inside, &mut Rescan::default()).map_err(Failure::session)?;
         report.problems.extend(session.problems);
         // A manifest can be written anew, the session's seal not: everything else must follow from it.
         if report.problems.is_empty() {
@@ -90,8 +90,8 @@ fn held_against(
     place: &Path,
 ) -> Result<Vec<String>, Failure> {
     let inside = folder.join(&report.session);
-    let reader = SessionReader::open(&inside).map_err(Failure::input)?;
-    let header = reader.header().map_err(Failure::input)?;
+    let reader = SessionReader::open(&inside).map_err(Failure::session)?;
+    let header = reader.header().map_err(Failure::session)?;
     let stem = crate::paths::beside(&inside, "");
     let stem = stem.file_name().unwrap_or_default().to_string_lossy();
     let scratch = Folder::new(place, &stem, false).map_err(Failure::internal)?;
@@ -143,9 +143,9 @@ fn scratch() -> Result<PathBuf, Failure> {
 
 fn session(path: &Path, json: bool) -> Outcome {
     if let Err(e @ RecorderError::NotASession { .. }) = SessionReader::open(path) {
-        return Err(Failure::input(e));
+        return Err(Failure::session(e));
     }
-    let report = recheck(path, &mut Rescan::default()).map_err(Failure::input)?;
+    let report = recheck(path, &mut Rescan::default()).map_err(Failure::session)?;
     let name = path.display();
     if json {
         crate::print_json(&serde_json::json!({

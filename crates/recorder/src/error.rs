@@ -150,16 +150,17 @@ pub enum RecorderError {
 }
 
 impl RecorderError {
-    /// True for what the machine did - no room, no memory, a disk that fails, a file that is locked - rather than the file. SQLite
+    /// True for what the machine did - no room, no memory, a disk that fails, a file that is locked or may not be written - rather than the file. SQLite
     /// result codes: <https://www.sqlite.org/rescode.html>; a read that ends early (522) is a file that was cut off.
-    pub(crate) fn is_of_the_machine(&self) -> bool {
+    #[must_use]
+    pub fn is_of_the_machine(&self) -> bool {
         let Self::Sql { source, .. } = self else {
-            return matches!(self, Self::Io { .. });
+            return matches!(self, Self::Io { .. } | Self::Unread(_));
         };
         let sqlx::Error::Database(error) = &**source else {
             return matches!(&**source, sqlx::Error::Io(_));
         };
         let code: i32 = error.code().and_then(|c| c.parse().ok()).unwrap_or(0);
-        matches!(code & 0xff, 5 | 6 | 7 | 10 | 13 | 14) && code != 522
+        matches!(code & 0xff, 3 | 5 | 6 | 7 | 8 | 10 | 13 | 14) && code != 522
     }
 }

@@ -7,7 +7,7 @@ use serde_json::Value;
 use skinrig_compare::{Facts, flatten};
 use skinrig_model::{CameraId, DeviceRole, RunHeader};
 use skinrig_protocol::Protocol;
-use skinrig_recorder::{RecorderError, SessionReader};
+use skinrig_recorder::SessionReader;
 
 use crate::exit::Failure;
 use crate::results::RigDocument;
@@ -32,7 +32,7 @@ pub(super) fn facts(
     reader: &SessionReader,
     header: &RunHeader,
 ) -> Result<Facts, Failure> {
-    let unreadable = |e: RecorderError| Failure::input(e);
+    let unreadable = Failure::session;
     let mut values = BTreeMap::new();
     let mut add = |name: &str, value: String| {
         values.insert(name.to_owned(), value);

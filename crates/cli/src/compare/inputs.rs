@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use serde_json::{Value, json};
 use skinrig_analysis::{ANALYSIS_VERSION, Analysis};
 use skinrig_compare::{Session, Subject};
-use skinrig_recorder::{RecorderError, SessionReader, list};
+use skinrig_recorder::{SessionReader, list};
 
 use super::facts::facts;
 use crate::analyses;
@@ -85,7 +85,7 @@ fn one(text: &str, letter: char, folder: &Path, analysis: Option<&str>) -> Resul
 
 /// The sessions of a folder, of one prototype or all; a broken file there is an error, not skipped.
 fn readable(folder: &Path, prototype: Option<&str>) -> Result<Vec<PathBuf>, Failure> {
-    let all = list(folder).map_err(Failure::input)?;
+    let all = list(folder).map_err(Failure::session)?;
     let mut wanted = all;
     wanted.retain(|s| prototype.is_none() || s.prototype() == prototype);
     for copy in copies(&wanted) {
@@ -101,15 +101,15 @@ fn readable(folder: &Path, prototype: Option<&str>) -> Result<Vec<PathBuf>, Fail
 fn changes(paths: &[PathBuf], name: &str) -> Result<String, Failure> {
     let mut all = BTreeSet::new();
     for path in paths {
-        let reader = SessionReader::open(path).map_err(Failure::input)?;
-        let id = reader.session_id().map_err(Failure::input)?;
+        let reader = SessionReader::open(path).map_err(Failure::session)?;
+        let id = reader.session_id().map_err(Failure::session)?;
         all.insert(analyses::variant(path, &id, name)?.to_string());
     }
     Ok(all.into_iter().collect::<Vec<_>>().join("; "))
 }
 
 fn session(path: &Path, name: Option<&str>) -> Result<Session, Failure> {
-    let unreadable = |e: RecorderError| Failure::input(e);
+    let unreadable = Failure::session;
     let reader = SessionReader::open(path).map_err(unreadable)?;
     let header = reader.header().map_err(unreadable)?;
     let facts = facts(path, &reader, &header)?;

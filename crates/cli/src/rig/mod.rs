@@ -73,7 +73,7 @@ fn apply(settings: &mut CameraSettings, request: &CameraRequest) {
 /// # Errors
 /// [`Failure::input`] when the session cannot be read.
 pub fn replayed(path: &Path, header: &RunHeader, document: &RigDocument) -> Result<Rig, Failure> {
-    let recording = SessionRecording::open(path, header).map_err(Failure::input)?;
+    let recording = SessionRecording::open(path, header).map_err(Failure::session)?;
     let recorded = RecordedRig {
         name: header.rig_name.clone(),
         robot_from_skin: header.robot_from_skin,

@@ -96,7 +96,7 @@ fn look(follower: &mut Follower, once: bool) -> Result<Option<Frame>, Failure> {
         {
             Ok(None)
         }
-        Err(e) => Err(Failure::input(e)),
+        Err(e) => Err(Failure::session(e)),
     }
 }
 
