@@ -30,6 +30,11 @@ pub fn report_path(session: &Path, name: Option<&str>) -> PathBuf {
     path(session, name, ".report.html")
 }
 
+/// The page of what speed costs; its results have the same name with another ending.
+pub fn tradeoff_path(session: &Path, name: Option<&str>) -> PathBuf {
+    path(session, name, ".tradeoff.html")
+}
+
 fn path(session: &Path, name: Option<&str>, ending: &str) -> PathBuf {
     match name {
         None => beside(session, ending),

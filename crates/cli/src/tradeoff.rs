@@ -9,17 +9,17 @@ use skinrig_analysis::AnalysisError;
 use skinrig_analysis::tradeoff::{Cost, Plan, Row, Tradeoff, measure};
 use skinrig_report::tradeoff::{label, page, protocol_lines, terminal_table};
 
+use crate::analyses::tradeoff_path;
 use crate::args::{CostKind, TradeoffArgs};
 use crate::exit::{Exit, Failure, Outcome};
-use crate::paths::beside;
-use crate::results::{Choices, Opened, open, write};
+use crate::results::{Choices, Opened, not_official, open, write};
 
 /// Values of the document's `format` and `format_version`.
 const FORMAT: (&str, u32) = ("skinrig-tradeoff", 1);
 
 /// The tradeoff that an earlier `skinrig tradeoff` left beside a session: `None` where there is none, and why it cannot be read.
 pub(crate) fn beside_session(session: &Path) -> Option<Result<Tradeoff, String>> {
-    let path = beside(session, ".tradeoff.json");
+    let path = tradeoff_path(session, None).with_extension("json");
     let text = match std::fs::read_to_string(&path) {
         Ok(text) => text,
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => return None,
@@ -123,9 +123,19 @@ pub fn tradeoff(args: &TradeoffArgs, json: bool) -> Outcome {
         input,
         events,
         header,
+        variant,
         ..
     } = open(&args.session, choices)?;
-    let rig = rig_in_words(&header.rig_name);
+    if let (Some(variant), Some(out)) = (&variant, &args.out) {
+        not_official(&tradeoff_path(&args.session, None), out, variant)?;
+    }
+    let mut rig = rig_in_words(&header.rig_name);
+    if let Some(variant) = &variant {
+        rig += &format!(
+            " Not the session's own settings: {}.",
+            variant.changed.join(", ")
+        );
+    }
     let plan = Plan {
         full: args.full,
         repeats: args.repeats,
@@ -137,7 +147,7 @@ pub fn tradeoff(args: &TradeoffArgs, json: bool) -> Outcome {
         other => Failure::input(other),
     })?;
     let answers = answers(&result, args);
-    let mut document = serde_json::json!({ "format": FORMAT.0, "format_version": FORMAT.1, "rig": rig, "tradeoff": result });
+    let mut document = serde_json::json!({ "format": FORMAT.0, "format_version": FORMAT.1, "rig": rig, "variant": variant, "tradeoff": result });
     let found = answers.iter().map(|a| {
         serde_json::json!({
             "question": a.question,
@@ -150,7 +160,7 @@ pub fn tradeoff(args: &TradeoffArgs, json: bool) -> Outcome {
     let html_path = args
         .out
         .clone()
-        .unwrap_or_else(|| beside(&args.session, ".tradeoff.html"));
+        .unwrap_or_else(|| tradeoff_path(&args.session, variant.as_ref().map(|v| v.name.as_str())));
     let json_path = html_path.with_extension("json");
     let name = args
         .session
@@ -170,7 +180,10 @@ pub fn tradeoff(args: &TradeoffArgs, json: bool) -> Outcome {
             outln!("\n{}:", answer.question);
             match answer.row {
                 None => outln!("  none of the choices tried"),
-                Some(row) if row.overrides.is_empty() => outln!("  the session's own settings"),
+                Some(row) if row.overrides.is_empty() => match &variant {
+                    None => outln!("  the session's own settings"),
+                    Some(variant) => outln!("  {}", variant.changed.join(", ")),
+                },
                 Some(row) => {
                     outln!("  {}\n", label(&row.choice));
                     for line in protocol_lines(row).lines() {

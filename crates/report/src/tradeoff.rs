@@ -157,7 +157,7 @@ pub fn terminal_table(result: &Tradeoff, rig: &str, color: bool) -> String {
             writeln!(out, "{line}")
         };
         if i == 0 {
-            let _ = writeln!(out, "{:<4}^ the session's own settings", "");
+            let _ = writeln!(out, "{:<4}^ the settings that all others change", "");
         }
     }
     if result.rows.len() > MOST_ROWS {
@@ -243,7 +243,11 @@ pub fn page(result: &Tradeoff, session: &str, rig: &str) -> Result<String, Repor
 }
 
 fn line(row: &Row, is_own: bool) -> Line {
-    let own = if is_own { " (the session's own)" } else { "" };
+    let own = if is_own {
+        " (the settings that all others change)"
+    } else {
+        ""
+    };
     let names = row.fronts.iter().map(|c| figure::name(*c));
     let (low, high) = row.cpu_range_us;
     Line {

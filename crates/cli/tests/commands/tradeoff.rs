@@ -106,3 +106,32 @@ fn a_demand_that_nothing_meets_ends_with_code_4_and_a_table_fits_a_terminal() {
         .code(2)
         .complains(&["time"]);
 }
+
+#[test]
+fn a_trade_of_other_settings_leaves_that_of_the_session_alone() {
+    let lab = Lab::new();
+    let session = session(&lab);
+    let trade = |more: &[&str]| {
+        let common = ["--json", "tradeoff", &session, "--repeats", "1"];
+        skinrig(&[&common[..], more].concat())
+    };
+    let own = trade(&[]).code(0).json();
+    let page = own["files"]["page"].as_str().unwrap().to_owned();
+    let before = std::fs::read(&page).unwrap();
+    let set = ["--set", "analysis.estimator=column_median"];
+    let other = trade(&set).code(0).json();
+    assert_ne!(other["files"]["page"], own["files"]["page"]);
+    assert_eq!(
+        other["variant"]["changed"][0],
+        "analysis.estimator=column_median"
+    );
+    let said = std::fs::read_to_string(other["files"]["page"].as_str().unwrap()).unwrap();
+    assert!(
+        said.contains("Not the session&#x27;s own settings: analysis.estimator=column_median"),
+        "{said}"
+    );
+    trade(&[&set[..], &["--out", &page]].concat())
+        .code(2)
+        .complains(&["--out"]);
+    assert_eq!(std::fs::read(&page).unwrap(), before);
+}
