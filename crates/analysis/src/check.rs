@@ -222,6 +222,36 @@ pub fn settings(s: &AnalysisSettings) -> Result<(), AnalysisError> {
     number("cmre.cell_mm", limits::CMRE_CELL_MM, c.cell_mm)?;
     number("cmre.sigma_mm", limits::CMRE_WIDTH_MM, c.sigma_mm)?;
     number("cmre.sr_mm", limits::CMRE_WIDTH_MM, c.sr_mm)?;
+    let a = &s.alignment;
+    let time = limits::ALIGNMENT_TIME_US;
+    number("alignment.max_residual_us", time, a.max_residual_us)?;
+    number(
+        "alignment.max_camera_interval_us",
+        time,
+        a.max_camera_interval_us,
+    )?;
+    number(
+        "alignment.max_host_interval_us",
+        time,
+        a.max_host_interval_us,
+    )?;
+    let (distance, delay) = (limits::TIE_DISTANCE_US, limits::ROBOT_DELAY_US);
+    number(
+        "alignment.max_tie_distance_us",
+        distance,
+        a.max_tie_distance_us,
+    )?;
+    number("alignment.robot_delay_us", delay, a.robot_delay_us)?;
+    number(
+        "alignment.max_drift_ppm",
+        limits::DRIFT_PPM,
+        a.max_drift_ppm,
+    )?;
+    number("alignment.max_lost", limits::SHARE, a.max_lost)?;
+    number("alignment.max_spurious", limits::SHARE, a.max_spurious)?;
+    number("alignment.min_coverage", limits::SHARE, a.min_coverage)?;
+    number("alignment.min_explained", limits::SHARE, a.min_explained)?;
+    number("alignment.min_log_odds", limits::LOG_ODDS, a.min_log_odds)?;
     if !BIN_SIDES_PX.contains(&s.bin_px) {
         return Err(AnalysisError::Setting {
             name: "bin_px",

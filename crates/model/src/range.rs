@@ -82,10 +82,13 @@ impl ValueRange {
 pub mod analysis {
     use super::ValueRange;
 
+    /// Times are kept in whole nanoseconds: less than one is none.
+    const NANOSECOND_MS: f64 = 1e-6;
+
     /// `window_before_ms` and `window_after_ms`. A window of ten seconds is longer than any press.
     pub const WINDOW_MARGIN_MS: ValueRange = ValueRange::between(0.0, 10_000.0);
     /// `window_after_contact_ms`.
-    pub const WINDOW_AFTER_CONTACT_MS: ValueRange = ValueRange::above(0.0, 60_000.0);
+    pub const WINDOW_AFTER_CONTACT_MS: ValueRange = ValueRange::between(NANOSECOND_MS, 60_000.0);
     /// `eps_px`: the neighbourhood search is laid out for up to 50 px.
     pub const EPS_PX: ValueRange = ValueRange::above(0.0, 50.0);
     /// `min_samples`.
@@ -127,7 +130,17 @@ pub mod analysis {
     /// Thresholds of the latency study.
     pub const LATENCY_THRESHOLD: ValueRange = ValueRange::above(0.0, 1e6);
     /// `latency.window_ms`.
-    pub const LATENCY_WINDOW_MS: ValueRange = ValueRange::above(0.0, 10_000.0);
+    pub const LATENCY_WINDOW_MS: ValueRange = ValueRange::between(NANOSECOND_MS, 10_000.0);
+    /// Times of the alignment certificate that may not be zero: `max_residual_us`, `max_camera_interval_us`, `max_host_interval_us`.
+    pub const ALIGNMENT_TIME_US: ValueRange = ValueRange::between(1e-3, 1e6);
+    /// `alignment.max_tie_distance_us`, up to a day.
+    pub const TIE_DISTANCE_US: ValueRange = ValueRange::between(1e-3, 86_400e6);
+    /// `alignment.robot_delay_us`.
+    pub const ROBOT_DELAY_US: ValueRange = ValueRange::from_zero(1e6);
+    /// `alignment.max_drift_ppm`.
+    pub const DRIFT_PPM: ValueRange = ValueRange::above_zero(1e6);
+    /// `alignment.min_log_odds`.
+    pub const LOG_ODDS: ValueRange = ValueRange::from_zero(1000.0);
     /// Shares: target rates of the latency study, limits of the alignment certificate.
     pub const SHARE: ValueRange = ValueRange::between(0.0, 1.0);
     /// `cmre.cell_mm`.

@@ -17,4 +17,5 @@ mod same_bits;
 mod sums;
 #[path = "../../../crates/analysis/tests/session/support.rs"]
 mod support;
+mod taken;
 mod wild;

@@ -20,6 +20,11 @@ const fn milliseconds(range: Range) -> Shape {
     Shape::Quantity(&[Time], range.in_units_of(1e3))
 }
 
+/// A time in a range that the analysis declares in microseconds.
+const fn microseconds(range: Range) -> Shape {
+    Shape::Quantity(&[Time], range.in_units_of(1e6))
+}
+
 /// A length in a range that the analysis declares.
 const fn millimetres(range: Range) -> Shape {
     Shape::Quantity(&[Length], range)
@@ -495,25 +500,25 @@ pub(crate) static ALIGNMENT: Table = Table {
     keys: &[
         default(
             "max_residual",
-            Shape::Quantity(&[Time], Range::above_zero(1.0)),
+            microseconds(limits::ALIGNMENT_TIME_US),
             "10 us",
             "Largest RMS residual of sync trains and marks about a camera's clock.",
         ),
         default(
             "max_camera_interval",
-            Shape::Quantity(&[Time], Range::above_zero(1.0)),
+            microseconds(limits::ALIGNMENT_TIME_US),
             "50 us",
             "Largest half width of the 95 % interval of a camera's clock over the trigger box's, at a press.",
         ),
         default(
             "max_host_interval",
-            Shape::Quantity(&[Time], Range::above_zero(1.0)),
+            microseconds(limits::ALIGNMENT_TIME_US),
             "5 ms",
             "Largest half width of the certain interval of the host's clock over the trigger box's, at a press.",
         ),
         default(
             "max_drift",
-            Shape::Number(Range::above_zero(1e6)),
+            Shape::Number(limits::DRIFT_PPM),
             "10000",
             "Largest rate difference between two clocks, parts per million.",
         ),
@@ -537,13 +542,13 @@ pub(crate) static ALIGNMENT: Table = Table {
         ),
         default(
             "max_tie_distance",
-            Shape::Quantity(&[Time], Range::above_zero(86_400.0)),
+            microseconds(limits::TIE_DISTANCE_US),
             "2.5 s",
             "A press further than this from the nearest train or mark that a camera saw, or from the nearest exchange with the trigger box, is not timed and does not count.",
         ),
         default(
             "robot_delay",
-            Shape::Quantity(&[Time], Range::from_zero(1.0)),
+            microseconds(limits::ROBOT_DELAY_US),
             "1 ms",
             "The robot's poses are stamped late by at most this; stated, not measured.",
         ),
@@ -555,7 +560,7 @@ pub(crate) static ALIGNMENT: Table = Table {
         ),
         default(
             "min_log_odds",
-            Shape::Number(Range::from_zero(1000.0)),
+            Shape::Number(limits::LOG_ODDS),
             "7",
             "Least natural logarithm of the odds of an alignment by event rates against all others together; 7 is 1100 to 1.",
         ),
