@@ -1,0 +1,174 @@
+//! What a protocol takes, the analysis takes: every key of `analysis`, over its range and beyond.
+
+use std::sync::OnceLock;
+
+use proptest::prelude::*;
+use serde_json::Value;
+use skinrig_analysis::check;
+use skinrig_protocol::{Protocol, schema_json};
+
+const PROTOCOL: &[u8] = include_bytes!("../../../protocols/demo.yaml");
+
+/// Numbers about every limit that a setting may have, and far beyond.
+const LADDER: [&str; 30] = [
+    "-1",
+    "0",
+    "1e-300",
+    "1e-9",
+    "1e-6",
+    "0.001",
+    "0.01",
+    "0.1",
+    "0.5",
+    "0.85",
+    "0.999",
+    "1",
+    "1.01",
+    "2",
+    "3",
+    "8",
+    "16",
+    "20",
+    "50",
+    "479",
+    "480",
+    "1000",
+    "1024",
+    "100000",
+    "1000000",
+    "1048576",
+    "10000001",
+    "4294967296",
+    "1e15",
+    "1e300",
+];
+
+/// A key below `analysis` and values that it may or may not take, as `--set` has them.
+#[derive(Debug)]
+struct Key {
+    name: String,
+    values: Vec<String>,
+}
+
+fn keys() -> Vec<Key> {
+    let schema: Value = serde_json::from_str(&schema_json()).unwrap();
+    let mut found = Vec::new();
+    let analysis = &schema["properties"]["analysis"];
+    walk(&schema, analysis, "analysis", &mut found);
+    found
+}
+
+/// The keys at and below `node`, which stands at `name`.
+fn walk(schema: &Value, node: &Value, name: &str, found: &mut Vec<Key>) {
+    let node = match node["$ref"].as_str() {
+        Some(place) => schema.pointer(place.trim_start_matches('#')).unwrap(),
+        None => node,
+    };
+    if let Some(below) = node["properties"].as_object() {
+        for (key, node) in below {
+            walk(schema, node, &format!("{name}.{key}"), found);
+        }
+        return;
+    }
+    found.push(Key {
+        name: name.to_owned(),
+        values: values(node),
+    });
+}
+
+fn values(node: &Value) -> Vec<String> {
+    if let Some(words) = node["oneOf"].as_array() {
+        let words = words.iter().filter_map(|w| w["const"].as_str());
+        return words.map(str::to_owned).collect();
+    }
+    match node["type"].as_str() {
+        Some("boolean") => vec!["true".to_owned(), "false".to_owned()],
+        Some("array") => {
+            let each = values(&node["items"]);
+            let pairs = each
+                .iter()
+                .zip(each.iter().skip(1))
+                .chain(each.iter().zip(&each));
+            pairs.map(|(a, b)| format!("[{a}, {b}]")).collect()
+        }
+        Some("string") => {
+            let example = node["examples"][0].as_str().unwrap_or_default();
+            let unit = example.trim_start_matches(|c: char| !c.is_alphabetic());
+            LADDER.iter().map(|n| format!("{n} {unit}")).collect()
+        }
+        Some("number" | "integer") => LADDER.map(str::to_owned).to_vec(),
+        _ => Vec::new(),
+    }
+}
+
+/// Read as that of a recording, which takes keys of earlier versions besides. `Ok(false)` when the protocol is refused, `Ok(true)` when it is taken and the analysis takes its settings.
+fn taken(overrides: &[String]) -> Result<bool, String> {
+    let no_files =
+        |_: &std::path::Path| -> std::io::Result<Vec<u8>> { unreachable!("no file is named") };
+    let Ok(protocol) = Protocol::parse_recorded("demo.yaml", PROTOCOL, overrides, &no_files) else {
+        return Ok(false);
+    };
+    match check::settings(&protocol.analysis) {
+        Ok(()) => Ok(true),
+        Err(e) => Err(format!("{overrides:?} is taken, then refused: {e}")),
+    }
+}
+
+fn one(key: &Key, value: &str) -> String {
+    format!("{}={value}", key.name)
+}
+
+#[test]
+fn every_value_that_a_protocol_takes() {
+    let (mut takes, mut refuses, mut wrong) = (0, 0, Vec::new());
+    let keys = keys();
+    for key in &keys {
+        let before = takes;
+        for value in &key.values {
+            match taken(&[one(key, value)]) {
+                Ok(true) => takes += 1,
+                Ok(false) => refuses += 1,
+                Err(e) => wrong.push(e),
+            }
+        }
+        assert!(
+            takes > before,
+            "{}: no value is taken, so nothing was tried",
+            key.name
+        );
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    // The keys are all there, and the ladder leaves every range.
+    assert!(
+        keys.len() > 60 && refuses > 500,
+        "{} keys, {takes} taken, {refuses} refused",
+        keys.len()
+    );
+}
+
+/// The values of a key that are taken, as overrides.
+fn good(key: &Key) -> Vec<String> {
+    let all = key.values.iter().map(|v| one(key, v));
+    all.filter(|o| taken(std::slice::from_ref(o)) == Ok(true))
+        .collect()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// Two settings, or five, may contradict each other where each alone is fine.
+    #[test]
+    fn values_that_a_protocol_takes_together(
+        chosen in prop::collection::vec((any::<prop::sample::Index>(), any::<prop::sample::Index>()), 2..6),
+    ) {
+        static GOOD: OnceLock<Vec<Vec<String>>> = OnceLock::new();
+        let good = GOOD.get_or_init(|| keys().iter().map(good).collect());
+        let overrides: Vec<String> = chosen
+            .iter()
+            .map(|(key, value)| value.get::<String>(key.get::<Vec<String>>(good)).clone())
+            .collect();
+        if let Err(wrong) = taken(&overrides) {
+            return Err(TestCaseError::fail(wrong));
+        }
+    }
+}
