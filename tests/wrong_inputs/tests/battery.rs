@@ -66,7 +66,7 @@ fn no_wrong_input_ends_valid_with_a_wrong_number() {
 }
 
 #[test]
-#[ignore = "ten seeds of every case take minutes: cargo test -p skinrig-wrong-inputs -- --ignored"]
+#[ignore = "ten seeds of every case take minutes: SKINRIG_CI_LONG=1 .ci/run, or cargo test -p skinrig-wrong-inputs -- --ignored"]
 fn nor_does_any_of_ten_seeds() {
     let failures = failures(10);
     assert!(

@@ -318,7 +318,7 @@ fn no_alignment_with_good_odds_is_wrong() {
 }
 
 #[test]
-#[ignore = "minutes: RECORDINGS (default 20) recordings of each situation"]
+#[ignore = "minutes: SKINRIG_CI_LONG=1 .ci/run, or with RECORDINGS (default 20) recordings of each situation"]
 fn no_alignment_with_good_odds_is_wrong_in_many_recordings() {
     let each = std::env::var("RECORDINGS").ok();
     let each = each.and_then(|n| n.parse().ok()).unwrap_or(20);

@@ -179,7 +179,7 @@ const TOO_LARGE: f64 = 0.3;
 const OVER_BEST: f64 = 0.05;
 
 #[test]
-#[ignore = "minutes: cargo test -p skinrig-analysis --test models -- --ignored --nocapture two_hundred_seeds"]
+#[ignore = "minutes: SKINRIG_CI_LONG=1 .ci/run, or cargo test -p skinrig-analysis --test models -- --ignored --nocapture two_hundred_seeds"]
 fn the_choice_is_right_over_two_hundred_seeds_of_every_scene() {
     let seeds = std::env::var("SKINRIG_SEEDS").map_or(200, |s| s.parse().unwrap());
     println!(

@@ -366,7 +366,7 @@ pub(super) fn sample() {
 }
 
 #[test]
-#[ignore = "half an hour of real time: cargo test -p skinrig --test nightly -- --ignored --nocapture all_pairs"]
+#[ignore = "half an hour of real time: SKINRIG_CI_LONG=1 .ci/run, or cargo test -p skinrig --test nightly -- --ignored --nocapture all_pairs"]
 fn all_pairs_of_faults_are_told_by_their_own_causes() {
     let (from, to) = range(std::env::var("SKINRIG_PAIRS").ok());
     let pairs = all();
