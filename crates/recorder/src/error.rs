@@ -1,5 +1,6 @@
 //! What can go wrong with a session file.
 
+use std::io::ErrorKind;
 use std::path::PathBuf;
 
 /// A session could not be written or read.
@@ -155,7 +156,14 @@ impl RecorderError {
     #[must_use]
     pub fn is_of_the_machine(&self) -> bool {
         let Self::Sql { source, .. } = self else {
-            return matches!(self, Self::Io { .. } | Self::Unread(_));
+            // No such folder, or a file where a folder should be, is what was asked for.
+            return match self {
+                Self::Io { source, .. } => !matches!(
+                    source.kind(),
+                    ErrorKind::NotFound | ErrorKind::NotADirectory
+                ),
+                other => matches!(other, Self::Unread(_)),
+            };
         };
         let sqlx::Error::Database(error) = &**source else {
             return matches!(&**source, sqlx::Error::Io(_));

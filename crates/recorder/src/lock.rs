@@ -101,7 +101,12 @@ impl Drop for WriterLock {
 
 /// Who writes the session at `session` now, in words; `None` when nobody does.
 pub fn writer_of(session: &Path) -> Option<String> {
-    let mut file = File::open(beside(session)).ok()?;
+    let path = beside(session);
+    // To open a pipe would wait for whoever writes into it.
+    if !std::fs::metadata(&path).is_ok_and(|m| m.is_file()) {
+        return None;
+    }
+    let mut file = File::open(path).ok()?;
     match file.try_lock_shared() {
         Err(TryLockError::WouldBlock) => Some(holder(&mut file)),
         _ => None,

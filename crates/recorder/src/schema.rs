@@ -33,7 +33,7 @@ const BUSY: Duration = Duration::from_secs(10);
 
 /// Makes a new session file with an empty schema.
 pub async fn create(path: &Path) -> Result<SqliteConnection, RecorderError> {
-    refuse_links(path)?;
+    refuse_special_files(path)?;
     match File::create_new(path) {
         Ok(_) => {}
         Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists => {
@@ -154,11 +154,11 @@ const LOOK_AGAIN: Duration = Duration::from_millis(10);
 
 /// Opens a session file for reading, after a look at its first page.
 pub async fn open(path: &Path) -> Result<SqliteConnection, RecorderError> {
+    refuse_special_files(path)?;
     let from = Instant::now();
     while crate::lock::is_being_sealed(path) && from.elapsed() < SEALED_WITHIN {
         std::thread::sleep(LOOK_AGAIN);
     }
-    refuse_links(path)?;
     refuse_super_journal(path)?;
     let mut mode = check_first_page(path)?;
     // Also of a change into or out of the log, whose first page may already say the other mode.
@@ -260,16 +260,32 @@ pub fn beside(path: &Path, ending: &str) -> PathBuf {
     PathBuf::from(name)
 }
 
-/// What is written beside a session is written there: a link in its place, in a folder from a stranger, would lead the writing to any
-/// other file.
-pub fn refuse_links(path: &Path) -> Result<(), RecorderError> {
+/// A session and the files beside it are regular files: a pipe or a device may never end, or never begin. What is written beside a
+/// session is written there: a link in its place, in a folder from a stranger, would lead the writing to any other file.
+pub fn refuse_special_files(path: &Path) -> Result<(), RecorderError> {
+    let not = |found: String| {
+        Err(RecorderError::NotASession {
+            path: path.to_owned(),
+            found,
+        })
+    };
+    match std::fs::metadata(path) {
+        Ok(m) if m.is_dir() => return not("a folder".to_owned()),
+        Ok(m) if !m.is_file() => return not("a pipe, a socket or a device".to_owned()),
+        _ => {}
+    }
     for ending in ["-wal", "-shm", "-journal", "-lock"] {
         let file = beside(path, ending);
-        if std::fs::symlink_metadata(&file).is_ok_and(|m| m.is_symlink()) {
-            return Err(RecorderError::NotASession {
-                path: path.to_owned(),
-                found: format!("a link beside it, {}: remove it", file.display()),
-            });
+        let Ok(metadata) = std::fs::symlink_metadata(&file) else {
+            continue;
+        };
+        if !metadata.is_file() {
+            let what = if metadata.is_symlink() {
+                "a link"
+            } else {
+                "something that is no file"
+            };
+            return not(format!("{what} beside it, {}: remove it", file.display()));
         }
     }
     Ok(())
@@ -349,9 +365,6 @@ fn check_first_page(path: &Path) -> Result<Mode, RecorderError> {
     };
     let mut file = File::open(path).map_err(io)?;
     let metadata = file.metadata().map_err(io)?;
-    if metadata.is_dir() {
-        return not("a folder");
-    }
     // A writer makes the file first; what it then writes may still be in the log or the journal beside it.
     if metadata.len() == 0 {
         return Err(empty(path));

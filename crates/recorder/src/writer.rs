@@ -75,7 +75,7 @@ impl SessionWriter {
     pub fn create(path: impl AsRef<Path>) -> Result<Self, RecorderError> {
         let path = path.as_ref().to_owned();
         let runtime = runtime(&path)?;
-        schema::refuse_links(&path)?;
+        schema::refuse_special_files(&path)?;
         // The lock before the file: whoever sees the file sees that somebody writes it.
         let exists = || RecorderError::Exists { path: path.clone() };
         if path.exists() {

@@ -86,14 +86,15 @@ fn check_first_page(path: &Path) -> Result<bool, HistoryError> {
             found: found.to_owned(),
         })
     };
-    let file = match File::open(path) {
-        Ok(file) => file,
+    match std::fs::metadata(path) {
+        Ok(m) if m.is_dir() => return foreign("a folder"),
+        // To open a pipe would wait for whoever writes into it.
+        Ok(m) if !m.is_file() => return foreign("a pipe, a socket or a device"),
+        Ok(_) => {}
         Err(e) if e.kind() == ErrorKind::NotFound => return Ok(false),
         Err(e) => return Err(io(e)),
-    };
-    if file.metadata().map_err(io)?.is_dir() {
-        return foreign("a folder");
     }
+    let file = File::open(path).map_err(io)?;
     let mut page = Vec::new();
     file.take(100).read_to_end(&mut page).map_err(io)?;
     if page.is_empty() {

@@ -24,6 +24,7 @@ mod replay;
 mod resume;
 mod rigs;
 mod sample_size;
+mod special;
 mod strangers;
 mod streams;
 mod support;

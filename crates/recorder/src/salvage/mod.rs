@@ -84,6 +84,7 @@ pub fn salvage(from: &Path, to: &Path) -> Result<SalvageReport, RecorderError> {
     let runtime = tokio::runtime::Builder::new_current_thread()
         .build()
         .map_err(|source| io(from, "starting to read it", source))?;
+    schema::refuse_special_files(from)?;
     let log = schema::beside(from, "-wal");
     let source_sha256 = sha256_of(from)?;
     let mut pages = Pages::open(from, &log).map_err(|e| io(from, "reading it", e))?;
