@@ -1,6 +1,6 @@
 //! `skinrig resume`: a session that was cut off or not finished goes on in a further leg.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use chrono::{SecondsFormat, Utc};
 use sha2::{Digest, Sha256};
@@ -73,12 +73,12 @@ pub fn resume(args: &ResumeArgs, command_line: &str, json: bool) -> Outcome {
         software: crate::version::SOFTWARE.to_owned(),
         command_line: command_line.to_owned(),
     };
-    let report = if wanted.contains(&true) {
+    let (session, report) = if wanted.contains(&true) {
         go_on(args, &found, &wanted, header, writer, &operator)?
     } else {
-        end_only(&found, header, writer)?
+        (session.clone(), end_only(&found, header, writer)?)
     };
-    conclude(session, &report, args.no_analysis, None, json)
+    conclude(&session, &report, args.no_analysis, None, json)
 }
 
 /// Why a session cannot go on: what is wrong with it, item by item, or why it cannot be read.
@@ -244,7 +244,7 @@ fn go_on(
     header: ResumeHeader,
     writer: SessionWriter,
     operator: &Operator,
-) -> Result<RunReport, Failure> {
+) -> Result<(PathBuf, RunReport), Failure> {
     let protocol = protocol_of(found)?;
     let rest = rest_of(&protocol, &found.plan, wanted)?;
     let Opened {
@@ -279,7 +279,7 @@ fn go_on(
             histories: found.histories.clone(),
         })
         .execute();
-    Ok(close(sink, report, operator))
+    close(sink, args.session.clone(), report, operator)
 }
 
 /// The session's own protocol, read again: its text is in the session, files that it names are where they were.

@@ -8,8 +8,8 @@ use skinrig_controller::{
 };
 use skinrig_device::Rig;
 use skinrig_model::{
-    AnalysisSettings, CameraId, HostDuration, HostTime, InterruptionKind, PressVerdict, RunEnd,
-    RunHeader, SimLevel,
+    AnalysisSettings, CameraId, HostDuration, HostTime, InterruptionKind, PressRole, PressVerdict,
+    RunEnd, RunHeader, SimLevel,
 };
 use skinrig_protocol::{Plan, PlantedFault, Protocol};
 use skinrig_recorder::{RecorderError, SessionReader, SessionWriter};
@@ -104,13 +104,25 @@ pub fn record(
         }
         None => Run::with_settings(plan, header, rig, control, &mut sink, settings).execute(),
     };
-    Ok((path, close(sink, report, operator)))
+    close(sink, path, report, operator)
 }
 
-/// Seals the session, and tells what went wrong besides.
-pub(crate) fn close(sink: SessionSink, mut report: RunReport, operator: &Operator) -> RunReport {
+/// Seals the session, and tells what went wrong besides. Gives the path under which it is kept: another one when it was moved or
+/// removed meanwhile.
+pub(crate) fn close(
+    sink: SessionSink,
+    mut path: PathBuf,
+    mut report: RunReport,
+    operator: &Operator,
+) -> Result<(PathBuf, RunReport), Failure> {
+    let mut lost = None;
     if let Err(error) = sink.seal() {
         let is_complete = matches!(error, RecorderError::HeldOpen { .. });
+        match &error {
+            RecorderError::Rescued { to, .. } => path = shortest(to),
+            RecorderError::Lost { .. } => lost = Some(error.to_string()),
+            _ => {}
+        }
         let error = ControllerError::from(SinkFault(error.to_string()));
         if report.end == RunEnd::Completed && !is_complete {
             report.end = RunEnd::Faulted(error.to_string());
@@ -126,7 +138,19 @@ pub(crate) fn close(sink: SessionSink, mut report: RunReport, operator: &Operato
             errln!("warning: {problem}");
         }
     }
-    report
+    match lost {
+        Some(lost) => Err(Failure::rig(format!(
+            "{lost}\n  next: begin again with `skinrig run`, and leave a session where it is until its run has ended"
+        ))),
+        None => Ok((path, report)),
+    }
+}
+
+/// A path as people would type it here.
+fn shortest(path: &Path) -> PathBuf {
+    let here = std::env::current_dir().ok();
+    let below = here.and_then(|here| path.strip_prefix(here).ok().map(Path::to_path_buf));
+    below.unwrap_or_else(|| path.to_owned())
 }
 
 /// A new session file under a name that nobody else took meanwhile.

@@ -144,6 +144,10 @@ impl SessionSink {
 }
 
 impl RecordSink for SessionSink {
+    fn check(&mut self) -> Result<(), SinkFault> {
+        self.writer.check().map_err(|e| SinkFault(e.to_string()))
+    }
+
     fn free_bytes(&mut self) -> Option<u64> {
         let free_b = gates::free_bytes(self.folder.as_deref()?).ok()?;
         Some(free_b as u64)

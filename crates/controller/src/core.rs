@@ -82,6 +82,7 @@ pub(crate) struct Core<'a> {
     marks: VecDeque<Mark>,
     marks_since: HostTime,
     line_free_at: HostTime,
+    sink_checked: HostTime,
     next_seq: [Option<u64>; 2],
     pub(crate) continuity: [Continuity; 2],
     poses: Vec<PoseSample>,
@@ -140,6 +141,7 @@ impl<'a> Core<'a> {
             marks: VecDeque::new(),
             marks_since: HostTime::ZERO,
             line_free_at: HostTime::ZERO,
+            sink_checked: HostTime::ZERO,
             next_seq: [None; 2],
             continuity: [Continuity::default(); 2],
             poses: Vec::new(),
@@ -201,8 +203,19 @@ impl<'a> Core<'a> {
             return poses;
         }
         poses.and(cameras).and(line)?;
+        self.check_sink()?;
         self.queue_marks();
         self.send_marks()
+    }
+
+    /// Asks now and then whether what was recorded is still there.
+    fn check_sink(&mut self) -> Result<(), ControllerError> {
+        let now = self.now();
+        if now - self.sink_checked < self.settings.check_sink_every {
+            return Ok(());
+        }
+        self.sink_checked = now;
+        self.journal.check()
     }
 
     /// Takes what the trigger box reported and emits it, also what came before it failed.

@@ -68,6 +68,11 @@ impl<'a> Journal<'a> {
         self.sink.free_bytes()
     }
 
+    /// Whether the sink still has what it took.
+    pub(crate) fn check(&mut self) -> Result<(), ControllerError> {
+        Ok(self.sink.check()?)
+    }
+
     /// From now on nothing that the sink does stops the run's end.
     pub(crate) const fn ending(&mut self) {
         self.lenient = true;

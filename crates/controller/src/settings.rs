@@ -33,6 +33,8 @@ pub struct ControllerSettings {
     pub mark_within: HostDuration,
     /// Pose samples per record, at least 1.
     pub pose_block: usize,
+    /// How often the consumer of records is asked whether it still has them.
+    pub check_sink_every: HostDuration,
 }
 
 impl Default for ControllerSettings {
@@ -50,6 +52,7 @@ impl Default for ControllerSettings {
             steady_within: HostDuration::from_millis(500),
             mark_within: HostDuration::from_millis(1_000),
             pose_block: 256,
+            check_sink_every: HostDuration::from_millis(500),
         }
     }
 }

@@ -16,6 +16,16 @@ pub trait RecordSink {
     /// [`SinkFault`] when the record cannot be kept; the controller then retracts, disarms and ends the run.
     fn accept(&mut self, record: Record) -> Result<(), SinkFault>;
 
+    /// Whether what was taken is still where it was put. Asked every [`check_sink_every`] from the first record to the end of the plan.
+    ///
+    /// [`check_sink_every`]: crate::ControllerSettings::check_sink_every
+    ///
+    /// # Errors
+    /// [`SinkFault`] when it is not; the controller then retracts, disarms and ends the run, and the records of the end are taken.
+    fn check(&mut self) -> Result<(), SinkFault> {
+        Ok(())
+    }
+
     /// Bytes that there is still room for; `None` when it does not know.
     fn free_bytes(&mut self) -> Option<u64> {
         None

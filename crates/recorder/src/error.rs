@@ -118,6 +118,30 @@ pub enum RecorderError {
         /// SQLite's answer.
         found: String,
     },
+    /// A file of a session under way is no longer where its run opened it.
+    #[error("{}: expected the file that this run writes, found {found}", path.display())]
+    Displaced {
+        /// The session file, or its log.
+        path: PathBuf,
+        /// What became of it.
+        found: String,
+    },
+    /// A file of a session was moved or removed while it was written; all of it is kept.
+    #[error("{displaced}; all that was recorded is in {}", to.display())]
+    Rescued {
+        /// What happened, in words.
+        displaced: String,
+        /// Where the session is now.
+        to: PathBuf,
+    },
+    /// A file of a session was moved or removed while it was written, and what was recorded could not be kept.
+    #[error("{displaced}; what was recorded could not be saved: {why}")]
+    Lost {
+        /// What happened, in words.
+        displaced: String,
+        /// Why, path by path.
+        why: String,
+    },
     /// The session cannot be sealed in its present state.
     #[error("{}: cannot seal: expected {expected}, found {found}; the session stays readable, and `skinrig resume` finishes it", path.display())]
     Unsealable {

@@ -10,6 +10,7 @@
 //! [`Intent`]: skinrig_model::Record::Intent
 //! [`Outcome`]: skinrig_model::Record::Outcome
 
+mod beside;
 mod box_row;
 pub mod catalogue;
 mod chain;
@@ -23,6 +24,11 @@ pub mod writer;
 
 mod digest;
 mod from_row;
+#[cfg(target_os = "linux")]
+mod held;
+#[cfg(not(target_os = "linux"))]
+#[path = "held_elsewhere.rs"]
+mod held;
 mod insert;
 mod leg;
 mod lock;
@@ -30,6 +36,7 @@ mod pose;
 mod prepare;
 mod query;
 mod queue;
+mod rescue;
 mod resume;
 mod salvage;
 mod schema;

@@ -1,7 +1,7 @@
-//! Who may write a session: one process at a time, told by a lock on a file beside it.
+//! Who may write a session: one process at a time, told by a lock on a file beside it and by locks on the files of the session.
 //!
-//! The lock ends with the process, however that ends. It lies on a file of its own, because SQLite puts its own locks on the
-//! session file, and some systems let the two interfere.
+//! All of them end with the process, however that ends. The file beside the session says who holds it and what it does with it,
+//! which readers heed; the locks on the session itself ([`crate::held`]) keep a second writer out when that file is removed.
 
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{Read, Seek, SeekFrom, Write};
@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use crate::error::RecorderError;
+use crate::held::{self, Held, Refuge};
 
 /// Who asks [`writer_of`] holds the lock for an instant: a lock that is still held after this time is a writer's.
 const LOOKED_WITHIN: Duration = Duration::from_millis(500);
@@ -17,16 +18,21 @@ const TRY_AGAIN: Duration = Duration::from_millis(2);
 
 /// What a holder that seals its session adds to its own words.
 const SEALING: &str = ", which seals it";
+/// A holder that left no word about itself.
+const OTHER: &str = "another process";
 
 /// Held by whoever writes a session, for as long as it does. The file goes away with it.
 #[derive(Debug)]
 pub struct WriterLock {
     path: PathBuf,
     file: File,
+    session: PathBuf,
+    /// None before the session file is made.
+    held: Option<Held>,
 }
 
 impl WriterLock {
-    /// The only lock of the session at `session`.
+    /// The only lock of the session at `session`, and of the file there when there is one.
     ///
     /// # Errors
     /// [`RecorderError::InUse`] when another writer has it.
@@ -38,7 +44,7 @@ impl WriterLock {
             source,
         };
         let from = Instant::now();
-        loop {
+        let mut file = loop {
             let mut file = OpenOptions::new()
                 .create(true)
                 .truncate(false)
@@ -62,10 +68,114 @@ impl WriterLock {
             }
             // The one before may have removed the file between our opening and our locking: then the lock is on nothing.
             if is_still_at(&file, &path).map_err(io)? {
-                file.set_len(0).map_err(io)?;
-                write!(file, "process {}", std::process::id()).map_err(io)?;
-                return Ok(Self { path, file });
+                break file;
             }
+        };
+        let mut lock = Self {
+            path: path.clone(),
+            session: session.to_owned(),
+            held: None,
+            file: file.try_clone().map_err(io)?,
+        };
+        if session.exists() {
+            lock.hold(from)?;
+        }
+        file.set_len(0).map_err(io)?;
+        file.seek(SeekFrom::Start(0)).map_err(io)?;
+        write!(file, "process {}", std::process::id()).map_err(io)?;
+        Ok(lock)
+    }
+
+    /// Locks the session file itself, which was made since.
+    ///
+    /// # Errors
+    /// As [`take`](Self::take).
+    pub fn take_file(&mut self) -> Result<(), RecorderError> {
+        self.hold(Instant::now())
+    }
+
+    fn hold(&mut self, from: Instant) -> Result<(), RecorderError> {
+        loop {
+            match Held::take(&self.session).map_err(|e| self.io(e))? {
+                Some(held) => {
+                    self.held = Some(held);
+                    return Ok(());
+                }
+                // Of two that come at once neither may have got it.
+                None if from.elapsed() < LOOKED_WITHIN && !held::is_ours(&self.session) => {
+                    std::thread::sleep(TRY_AGAIN);
+                }
+                None => return Err(self.in_use()),
+            }
+        }
+    }
+
+    /// Locks the log that SQLite has made.
+    ///
+    /// # Errors
+    /// As [`take`](Self::take).
+    pub fn take_log(&mut self) -> Result<(), RecorderError> {
+        let Some(held) = &mut self.held else {
+            return Ok(());
+        };
+        match held.take_log() {
+            Ok(true) => Ok(()),
+            Ok(false) => Err(self.in_use()),
+            Err(e) => Err(self.io(e)),
+        }
+    }
+
+    fn in_use(&self) -> RecorderError {
+        RecorderError::InUse {
+            path: self.session.clone(),
+            by: OTHER.to_owned(),
+        }
+    }
+
+    fn io(&self, source: std::io::Error) -> RecorderError {
+        RecorderError::Io {
+            path: self.session.clone(),
+            doing: "locking the session",
+            source,
+        }
+    }
+
+    /// Whether the session is where it was opened.
+    ///
+    /// # Errors
+    /// [`RecorderError::Displaced`].
+    pub fn check(&self) -> Result<(), RecorderError> {
+        self.held.as_ref().map_or(Ok(()), Held::check)
+    }
+
+    /// Where a session that is not can be kept.
+    pub fn refuge(&self) -> Refuge {
+        let nowhere = Refuge {
+            place: None,
+            copies: Vec::new(),
+        };
+        self.held.as_ref().map_or(nowhere, Held::refuge)
+    }
+
+    /// Copies the open session file; see [`Held::copy`].
+    pub fn copy(&self, paths: &[PathBuf]) -> Result<PathBuf, String> {
+        let none = || Err("expected an open session file, found none".to_owned());
+        self.held
+            .as_ref()
+            .map_or_else(none, |held| held.copy(paths))
+    }
+
+    /// Removes what is left beside a session that is not where it was opened.
+    pub fn tidy(&self) {
+        if let Some(held) = &self.held {
+            held.tidy();
+        }
+    }
+
+    /// SQLite is about to remove the log.
+    pub fn without_log(&mut self) {
+        if let Some(held) = &mut self.held {
+            held.without_log();
         }
     }
 }
@@ -92,8 +202,8 @@ pub fn is_being_sealed(session: &Path) -> bool {
 
 impl Drop for WriterLock {
     fn drop(&mut self) {
-        // Removed while it is locked, so that nobody removes the next one's. A file that stays behind locks nothing.
-        if cfg!(unix) {
+        // Removed while it is locked, so that nobody removes the next one's, and only if it is ours. A file that stays behind locks nothing.
+        if cfg!(unix) && is_still_at(&self.file, &self.path).unwrap_or(false) {
             let _ = std::fs::remove_file(&self.path);
         }
     }
@@ -103,13 +213,17 @@ impl Drop for WriterLock {
 pub fn writer_of(session: &Path) -> Option<String> {
     let path = beside(session);
     // To open a pipe would wait for whoever writes into it.
-    if !std::fs::metadata(&path).is_ok_and(|m| m.is_file()) {
-        return None;
+    let is_file = |path: &Path| std::fs::metadata(path).is_ok_and(|m| m.is_file());
+    if is_file(&path)
+        && let Ok(mut file) = File::open(&path)
+        && let Err(TryLockError::WouldBlock) = file.try_lock_shared()
+    {
+        return Some(holder(&mut file));
     }
-    let mut file = File::open(path).ok()?;
-    match file.try_lock_shared() {
-        Err(TryLockError::WouldBlock) => Some(holder(&mut file)),
-        _ => None,
+    // The file beside it may have been removed.
+    match held::is_ours(session) {
+        true => Some(format!("process {}", std::process::id())),
+        false => held::is_held(session).then(|| OTHER.to_owned()),
     }
 }
 
@@ -124,7 +238,7 @@ fn holder(file: &mut File) -> String {
     let mut text = String::new();
     match file.take(64).read_to_string(&mut text) {
         Ok(n) if n > 0 => text,
-        _ => "another process".to_owned(),
+        _ => OTHER.to_owned(),
     }
 }
 

@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 
 use skinrig_model::Record;
 
+use crate::held::Refuge;
 use crate::prepare::Ready;
 use crate::query::Fault;
 
@@ -72,12 +73,14 @@ pub struct QueueLoad {
 }
 
 /// How a session is left.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone)]
 pub enum Close {
     /// Committed, readable, not sealed.
     AsItIs,
     /// Sealed.
     Seal,
+    /// Brought to where it can be found: it was moved or removed.
+    Rescue(Refuge),
 }
 
 /// What the writing thread does next.
@@ -192,7 +195,7 @@ impl Shared {
             if !queue.prepared.is_empty() {
                 return Next::Write(std::mem::take(&mut queue.prepared));
             }
-            if let Some(close) = queue.closed
+            if let Some(close) = queue.closed.clone()
                 && queue.accepted.is_empty()
                 && !queue.preparing
             {

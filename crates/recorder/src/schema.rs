@@ -1,14 +1,15 @@
 //! How a session file is opened, for writing and for reading, and which schema it has.
 
 use std::fs::File;
-use std::io::{Read, Seek, SeekFrom};
-use std::path::{Path, PathBuf};
+use std::io::Read;
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 use sqlx::migrate::Migrator;
 use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection, SqliteJournalMode, SqliteSynchronous};
 use sqlx::{ConnectOptions, Connection, Row, Sqlite, Transaction};
 
+use crate::beside::{beside, refuse_special_files, refuse_super_journal};
 use crate::error::RecorderError;
 use crate::query::{Fault, each_row};
 
@@ -33,22 +34,28 @@ const BUSY: Duration = Duration::from_secs(10);
 
 /// Makes a new session file with an empty schema.
 pub async fn create(path: &Path) -> Result<SqliteConnection, RecorderError> {
+    create_file(path)?;
+    fill(path).await
+}
+
+/// Makes a new, empty file.
+pub fn create_file(path: &Path) -> Result<(), RecorderError> {
     refuse_special_files(path)?;
     match File::create_new(path) {
-        Ok(_) => {}
-        Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists => {
-            return Err(RecorderError::Exists {
-                path: path.to_owned(),
-            });
-        }
-        Err(source) => {
-            return Err(RecorderError::Io {
-                path: path.to_owned(),
-                doing: "creating it",
-                source,
-            });
-        }
+        Ok(_) => Ok(()),
+        Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists => Err(RecorderError::Exists {
+            path: path.to_owned(),
+        }),
+        Err(source) => Err(RecorderError::Io {
+            path: path.to_owned(),
+            doing: "creating it",
+            source,
+        }),
     }
+}
+
+/// Makes the schema in an empty file.
+pub async fn fill(path: &Path) -> Result<SqliteConnection, RecorderError> {
     let fault = |e: sqlx::Error| Fault::from(e).at(path, "creating the schema");
     let mut conn = new_file(path).await.map_err(fault)?;
     MIGRATOR.run(&mut conn).await.map_err(|e| fault(e.into()))?;
@@ -115,6 +122,10 @@ pub async fn log_ahead(conn: &mut SqliteConnection) -> Result<(), Fault> {
         return Err(Fault::bad("journal mode", "wal", mode));
     }
     sqlx::query("PRAGMA synchronous = FULL")
+        .execute(&mut *conn)
+        .await?;
+    // Makes the log and its index.
+    sqlx::query("SELECT count(*) FROM sqlite_schema")
         .execute(conn)
         .await?;
     Ok(())
@@ -252,89 +263,6 @@ async fn check_schema_is_data(conn: &mut SqliteConnection) -> Result<(), Fault> 
     }
 }
 
-/// The file that SQLite keeps beside a session: `-wal`, the write-ahead log, or `-journal`, what a transaction in rollback mode
-/// would be undone with.
-pub fn beside(path: &Path, ending: &str) -> PathBuf {
-    let mut name = path.as_os_str().to_owned();
-    name.push(ending);
-    PathBuf::from(name)
-}
-
-/// A session and the files beside it are regular files: a pipe or a device may never end, or never begin. What is written beside a
-/// session is written there: a link in its place, in a folder from a stranger, would lead the writing to any other file.
-pub fn refuse_special_files(path: &Path) -> Result<(), RecorderError> {
-    let not = |found: String| {
-        Err(RecorderError::NotASession {
-            path: path.to_owned(),
-            found,
-        })
-    };
-    match std::fs::metadata(path) {
-        Ok(m) if m.is_dir() => return not("a folder".to_owned()),
-        Ok(m) if !m.is_file() => return not("a pipe, a socket or a device".to_owned()),
-        _ => {}
-    }
-    for ending in ["-wal", "-shm", "-journal", "-lock"] {
-        let file = beside(path, ending);
-        let Ok(metadata) = std::fs::symlink_metadata(&file) else {
-            continue;
-        };
-        if !metadata.is_file() {
-            let what = if metadata.is_symlink() {
-                "a link"
-            } else {
-                "something that is no file"
-            };
-            return not(format!("{what} beside it, {}: remove it", file.display()));
-        }
-    }
-    Ok(())
-}
-
-/// The last bytes of a journal that names a super-journal, the one file of a transaction over several databases
-/// (sqlite.org/fileformat.html section 3).
-const SUPER_JOURNAL_END: [u8; 8] = [0xd9, 0xd5, 0x05, 0xf9, 0x20, 0xa1, 0x63, 0xd7];
-
-/// Once SQLite has played a journal it deletes the super-journal that is named in it, which from a stranger may be any file of the
-/// user. A session is one database and no transaction of its own has a super-journal.
-fn refuse_super_journal(path: &Path) -> Result<(), RecorderError> {
-    // SQLite follows a link and looks beside the file itself.
-    let file = std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
-    let journal = beside(&file, "-journal");
-    let io = |source| RecorderError::Io {
-        path: journal.clone(),
-        doing: "reading its end",
-        source,
-    };
-    let mut opened = match File::open(&journal) {
-        Ok(opened) => opened,
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(()),
-        Err(e) => return Err(io(e)),
-    };
-    let bytes = opened.metadata().map_err(io)?.len();
-    let Some(last) = bytes.checked_sub(SUPER_JOURNAL_END.len() as u64) else {
-        return Ok(());
-    };
-    let mut end = [0; SUPER_JOURNAL_END.len()];
-    opened.seek(SeekFrom::Start(last)).map_err(io)?;
-    match opened.read_exact(&mut end) {
-        Ok(()) => {}
-        // Whoever writes the session has just cut it.
-        Err(e) if e.kind() == std::io::ErrorKind::UnexpectedEof => return Ok(()),
-        Err(e) => return Err(io(e)),
-    }
-    if end == SUPER_JOURNAL_END {
-        return Err(RecorderError::NotASession {
-            path: path.to_owned(),
-            found: format!(
-                "a journal beside it, {}, that names a further file for deletion: remove the journal, and do not trust the session",
-                journal.display()
-            ),
-        });
-    }
-    Ok(())
-}
-
 /// The journal mode that the first page says.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Mode {
@@ -406,6 +334,7 @@ fn check_first_page(path: &Path) -> Result<Mode, RecorderError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::beside::SUPER_JOURNAL_END;
 
     struct NoBytes;
     impl crate::ChunkScanner for NoBytes {

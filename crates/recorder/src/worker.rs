@@ -12,8 +12,9 @@ use crate::error::RecorderError;
 use crate::insert::Journal;
 use crate::query::Fault;
 use crate::queue::{Close, Next, Prepared, Shared};
-use crate::seal;
+use crate::writer::Left;
 use crate::writer::Sealed;
+use crate::{rescue, seal};
 
 /// What is not committed by a durable record or by its size is committed after this time.
 const COMMIT_AFTER: Duration = Duration::from_millis(500);
@@ -54,7 +55,7 @@ fn told(fault: Fault, path: &Path, doing: &'static str) -> String {
 
 impl Worker {
     /// Writes until the session is closed, then leaves it as it was asked to.
-    pub fn run(mut self) -> Option<Result<Sealed, RecorderError>> {
+    pub fn run(mut self) -> Option<Left> {
         let farewell = Farewell(Arc::clone(&self.shared));
         let path = self.journal.path.clone();
         let mut written = 0;
@@ -81,12 +82,20 @@ impl Worker {
             journal,
             shared,
         } = self;
-        let result = if close == Close::Seal && !failed {
-            Some(runtime.block_on(seal_session(journal, &shared)))
-        } else {
-            // Nothing can be done about a failing close: what was committed is safe.
-            let _ = runtime.block_on(journal.conn.close());
-            None
+        let result = match close {
+            Close::Seal if !failed => {
+                let sealed = runtime.block_on(seal_session(journal, &shared));
+                Some(Left::Sealed(sealed))
+            }
+            Close::Rescue(refuge) => {
+                let saved = runtime.block_on(rescue::rescue(journal.conn, refuge));
+                Some(Left::Saved(saved))
+            }
+            Close::Seal | Close::AsItIs => {
+                // Nothing can be done about a failing close: what was committed is safe.
+                let _ = runtime.block_on(journal.conn.close());
+                None
+            }
         };
         drop(farewell);
         result

@@ -19,7 +19,7 @@ use crate::queue::{Close, QueueLoad, Shared};
 use crate::rows::SessionTotals;
 use crate::verify::ChunkScanner;
 use crate::worker::Worker;
-use crate::{prepare, resume, schema};
+use crate::{beside, prepare, resume, schema};
 
 /// A sealed session.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -56,7 +56,16 @@ pub struct SessionWriter {
 /// Between two looks whether the session is sealed.
 const LOOK_AGAIN: Duration = Duration::from_millis(5);
 
-type Written = JoinHandle<Option<Result<Sealed, RecorderError>>>;
+type Written = JoinHandle<Option<Left>>;
+
+/// How the writing thread left the session.
+#[derive(Debug)]
+pub(crate) enum Left {
+    /// Sealed, or why not.
+    Sealed(Result<Sealed, RecorderError>),
+    /// Brought to this path, or why not.
+    Saved(Result<PathBuf, String>),
+}
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Phase {
@@ -75,17 +84,20 @@ impl SessionWriter {
     pub fn create(path: impl AsRef<Path>) -> Result<Self, RecorderError> {
         let path = path.as_ref().to_owned();
         let runtime = runtime(&path)?;
-        schema::refuse_special_files(&path)?;
+        beside::refuse_special_files(&path)?;
         // The lock before the file: whoever sees the file sees that somebody writes it.
         let exists = || RecorderError::Exists { path: path.clone() };
         if path.exists() {
             return Err(exists());
         }
-        let lock = WriterLock::take(&path).map_err(|e| match e {
+        let mut lock = WriterLock::take(&path).map_err(|e| match e {
             RecorderError::InUse { .. } => exists(),
             other => other,
         })?;
-        let conn = runtime.block_on(schema::create(&path))?;
+        schema::create_file(&path)?;
+        lock.take_file()?;
+        let conn = runtime.block_on(schema::fill(&path))?;
+        lock.take_log()?;
         let mut writer = Self {
             lock,
             path,
@@ -134,9 +146,10 @@ impl SessionWriter {
         scanner: &mut dyn ChunkScanner,
     ) -> Result<Self, RecorderError> {
         let path = path.as_ref().to_owned();
-        let lock = resume::lock_unsealed(&path, scanner)?;
+        let mut lock = resume::lock_unsealed(&path, scanner)?;
         let runtime = runtime(&path)?;
         let conn = runtime.block_on(resume::open_again(&path))?;
+        lock.take_log()?;
         let mut writer = Self {
             lock,
             path,
@@ -180,6 +193,7 @@ impl SessionWriter {
     fn begin_leg(&mut self, header: &ResumeHeader) -> Result<(), RecorderError> {
         let runtime = runtime(&self.path)?;
         let (conn, leg) = runtime.block_on(resume::begin(&self.path, header))?;
+        self.lock.take_log()?;
         self.joint = leg.joint;
         let preparer = Preparer::resuming(leg.formats, leg.joint.first_seq);
         self.start(runtime, conn, preparer, leg.number)
@@ -264,9 +278,6 @@ impl SessionWriter {
     /// # Errors
     /// As [`finish`](Self::finish).
     pub fn finish_or_tell(mut self, tell: impl FnOnce()) -> Result<Sealed, RecorderError> {
-        if let Some(detail) = self.shared.failure() {
-            return Err(RecorderError::Failed(detail));
-        }
         if self.threads.is_none() {
             return Err(RecorderError::Unsealable {
                 path: self.path.clone(),
@@ -274,8 +285,14 @@ impl SessionWriter {
                 found: "a leg that was not begun".into(),
             });
         }
-        let ended = || "the recorder thread ended".to_owned();
+        if let Err(displaced) = self.check() {
+            return Err(self.rescue(&displaced));
+        }
+        if let Some(detail) = self.shared.failure() {
+            return Err(RecorderError::Failed(detail));
+        }
         self.lock.announce_sealing();
+        self.lock.without_log();
         self.shared.close(Close::Seal);
         let mut tell = Some(tell);
         while self.threads.as_ref().is_some_and(|(_, w)| !w.is_finished()) {
@@ -286,20 +303,64 @@ impl SessionWriter {
             }
             std::thread::sleep(LOOK_AGAIN);
         }
-        let sealed = self.close(Close::Seal).unwrap_or_else(|| {
-            let detail = self.shared.failure().unwrap_or_else(ended);
-            Err(RecorderError::Failed(detail))
-        });
+        let sealed = match self.close(Close::Seal) {
+            Some(Left::Sealed(sealed)) => sealed,
+            _ => Err(self.ended_early()),
+        };
         self.lock.withdraw_sealing();
+        // What sealing met with when the file went away under it; the file is closed, and without a log.
+        if let (Err(_), Err(displaced)) = (&sealed, self.check()) {
+            let refuge = self.lock.refuge();
+            let saved = refuge
+                .place
+                .map_or_else(|| self.lock.copy(&refuge.copies), Ok);
+            return Err(rescued(&displaced, saved));
+        }
         sealed
     }
 
-    fn close(&mut self, how: Close) -> Option<Result<Sealed, RecorderError>> {
+    /// Whether the session is still where it was opened: it is written to the open file, whatever becomes of its name. To be asked
+    /// now and then during a run. When it is not, the run is to be ended; [`finish`](Self::finish) then brings all that was recorded,
+    /// its end included, to where it can be found.
+    ///
+    /// # Errors
+    /// [`RecorderError::Displaced`].
+    pub fn check(&self) -> Result<(), RecorderError> {
+        self.lock.check()
+    }
+
+    /// Brings what was recorded to where it can be found; says where.
+    fn rescue(&mut self, displaced: &RecorderError) -> RecorderError {
+        let saved = match self.close(Close::Rescue(self.lock.refuge())) {
+            Some(Left::Saved(saved)) => saved,
+            _ => Err(self.ended_early().to_string()),
+        };
+        if saved.is_ok() {
+            self.lock.tidy();
+        }
+        rescued(displaced, saved)
+    }
+
+    fn ended_early(&self) -> RecorderError {
+        let ended = || "the recorder thread ended".to_owned();
+        RecorderError::Failed(self.shared.failure().unwrap_or_else(ended))
+    }
+
+    fn close(&mut self, how: Close) -> Option<Left> {
         let (preparing, writing) = self.threads.take()?;
         self.shared.close(how);
         // A panic of the first thread has told the second, which leaves an unsealed session.
         let _ = preparing.join();
         writing.join().ok().flatten()
+    }
+}
+
+/// What became of a session that was moved or removed.
+fn rescued(displaced: &RecorderError, saved: Result<PathBuf, String>) -> RecorderError {
+    let displaced = displaced.to_string();
+    match saved {
+        Ok(to) => RecorderError::Rescued { displaced, to },
+        Err(why) => RecorderError::Lost { displaced, why },
     }
 }
 

@@ -7,6 +7,7 @@ mod catalogue;
 mod compare;
 mod damage;
 mod dataset;
+mod displaced;
 mod evaluation;
 mod faults;
 mod help;

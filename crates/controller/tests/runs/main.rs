@@ -18,4 +18,5 @@ mod spoilt;
 mod steady;
 mod suspend;
 mod touch;
+mod vanished;
 mod watchdog;

@@ -19,6 +19,7 @@ use serde::Serialize;
 use sha2::{Digest, Sha256};
 use skinrig_model::CameraId;
 
+use crate::beside::{beside, refuse_special_files};
 use crate::error::RecorderError;
 use crate::query::Fault;
 use crate::schema;
@@ -84,8 +85,8 @@ pub fn salvage(from: &Path, to: &Path) -> Result<SalvageReport, RecorderError> {
     let runtime = tokio::runtime::Builder::new_current_thread()
         .build()
         .map_err(|source| io(from, "starting to read it", source))?;
-    schema::refuse_special_files(from)?;
-    let log = schema::beside(from, "-wal");
+    refuse_special_files(from)?;
+    let log = beside(from, "-wal");
     let source_sha256 = sha256_of(from)?;
     let mut pages = Pages::open(from, &log).map_err(|e| io(from, "reading it", e))?;
     runtime.block_on(async {
@@ -97,8 +98,8 @@ pub fn salvage(from: &Path, to: &Path) -> Result<SalvageReport, RecorderError> {
             drop(conn);
             for file in [
                 to.to_owned(),
-                schema::beside(to, "-wal"),
-                schema::beside(to, "-shm"),
+                beside(to, "-wal"),
+                beside(to, "-shm"),
             ] {
                 let _ = std::fs::remove_file(file);
             }

@@ -5,6 +5,7 @@ mod chain;
 mod common;
 mod crash;
 mod damage;
+mod displaced;
 mod gaps;
 mod legs;
 mod python;

@@ -1,0 +1,169 @@
+//! The session is moved, removed or replaced while it is recorded, or its lock file is: noticed, kept, and gone on with by the command
+//! that the program names.
+#![cfg(target_os = "linux")]
+
+use std::path::{Path, PathBuf};
+
+use skinrig_recorder::SessionReader;
+
+use crate::interrupt::Underway;
+use crate::support::{Lab, SMALL, only, program, show, skinrig, text};
+
+fn begin(lab: &Lab) -> (Underway, PathBuf) {
+    let folder = lab.text("sessions");
+    let arguments = [
+        "run",
+        SMALL,
+        "--real-time",
+        "--no-analysis",
+        "--sessions",
+        &folder,
+    ];
+    let underway = Underway::of(program(&arguments));
+    (underway, only(&lab.path("sessions"), ".session.sqlite"))
+}
+
+fn beside(session: &Path, ending: &str) -> PathBuf {
+    PathBuf::from(format!("{}{ending}", session.display()))
+}
+
+fn tried(session: &Path) -> usize {
+    let presses = SessionReader::open(session).unwrap().presses().unwrap();
+    let attempts = presses.iter().flat_map(|(_, attempts)| attempts);
+    attempts.filter(|a| a.intent.is_some()).count()
+}
+
+/// Does `harm` to a run; it ends with 3, says `found`, and names the session at `kept`, which is sound and goes on.
+#[track_caller]
+fn harmed(harm: impl FnOnce(&Lab, &Path), found: &str, kept: impl FnOnce(&Lab, &Path) -> PathBuf) {
+    let lab = Lab::new();
+    let (run, session) = begin(&lab);
+    let before = tried(&session);
+    harm(&lab, &session);
+    let (code, said) = run.end();
+    assert_eq!(code, Some(3), "{said}");
+    let kept = text(&kept(&lab, &session));
+    for part in [
+        found,
+        &format!("the session up to there is kept: {kept}\n"),
+        &format!("go on with `skinrig resume {kept}`"),
+    ] {
+        assert!(said.contains(part), "expected {part:?} in {said}");
+    }
+    let after = tried(Path::new(&kept));
+    assert!(
+        after <= before + 1,
+        "{before} presses, then {after}: {said}"
+    );
+    let verified = skinrig(&["verify", &kept]).code(0).out;
+    assert!(verified.contains("not sealed"), "{verified}");
+    skinrig(&["resume", "--no-analysis", &kept]).code(0);
+    let verified = skinrig(&["verify", &kept]).code(0).out;
+    assert!(verified.contains("sound, sealed"), "{verified}");
+    let shown = show(Path::new(&kept));
+    let presses = shown["presses"].as_array().unwrap();
+    assert!(presses.iter().all(|p| p["verdict"] == "valid"), "{shown}");
+}
+
+fn rescued(folder: &Path, session: &Path) -> PathBuf {
+    let name = session.file_name().unwrap().to_str().unwrap();
+    folder.join(name.replace(".session.sqlite", ".rescued.session.sqlite"))
+}
+
+#[test]
+fn the_file_is_renamed() {
+    harmed(
+        |lab, session| std::fs::rename(session, lab.path("b.session.sqlite")).unwrap(),
+        "found it moved to",
+        |lab, _| lab.path("b.session.sqlite"),
+    );
+}
+
+#[test]
+fn the_file_is_removed() {
+    harmed(
+        |_, session| std::fs::remove_file(session).unwrap(),
+        "found it removed",
+        |lab, session| rescued(&lab.path("sessions"), session),
+    );
+}
+
+#[test]
+fn the_folder_is_renamed() {
+    harmed(
+        |lab, _| std::fs::rename(lab.path("sessions"), lab.path("other")).unwrap(),
+        "found it moved to",
+        |lab, session| lab.path("other").join(session.file_name().unwrap()),
+    );
+}
+
+#[test]
+fn the_folder_is_removed() {
+    harmed(
+        |lab, _| std::fs::remove_dir_all(lab.path("sessions")).unwrap(),
+        "found it removed",
+        |lab, session| rescued(lab.path("").as_path(), session),
+    );
+}
+
+#[test]
+fn the_log_is_removed() {
+    harmed(
+        |_, session| std::fs::remove_file(beside(session, "-wal")).unwrap(),
+        "-wal: expected the file that this run writes, found it removed",
+        |_, session| session.to_owned(),
+    );
+}
+
+#[test]
+fn another_file_takes_its_place() {
+    harmed(
+        |lab, session| {
+            std::fs::write(lab.path("other"), "not a session").unwrap();
+            std::fs::rename(lab.path("other"), session).unwrap();
+        },
+        "found another file in its place, and its own removed",
+        |lab, session| rescued(&lab.path("sessions"), session),
+    );
+}
+
+/// Without it, and with any other file in its place, a second writer is refused, and the run ends as it would have.
+#[test]
+fn the_lock_file_is_removed_or_replaced() {
+    for replaced in [false, true] {
+        let lab = Lab::new();
+        let (run, session) = begin(&lab);
+        let lock = beside(&session, "-lock");
+        std::fs::remove_file(&lock).unwrap();
+        if replaced {
+            std::fs::write(&lock, "").unwrap();
+        }
+        let path = text(&session);
+        skinrig(&["resume", &path]).code(2).complains(&[
+            "expected a session that nobody writes, found another process writing it",
+        ]);
+        // Under another name, where no lock file was ever.
+        let link = lab.path("link.session.sqlite");
+        std::fs::hard_link(&session, &link).unwrap();
+        assert_ne!(skinrig(&["resume", &text(&link)]).code, Some(0));
+        std::fs::remove_file(link).unwrap();
+        run.signal("INT");
+        let (code, said) = run.end();
+        assert_eq!(code, Some(5), "{said}");
+        let verified = skinrig(&["verify", &path]).code(0).out;
+        assert!(verified.contains("sound, sealed"), "{verified}");
+    }
+}
+
+/// A run that waits for its operator notices it, too.
+#[test]
+fn a_paused_run_notices_it() {
+    harmed(
+        |lab, session| {
+            skinrig(&["control", &text(session), "pause", "--wait", "30s"]).code(0);
+            std::fs::rename(session, lab.path("b.session.sqlite")).unwrap();
+        },
+        "found it moved to",
+        |lab, _| lab.path("b.session.sqlite"),
+    );
+}

@@ -1,0 +1,89 @@
+//! The consumer of records loses what it has: noticed within half a second of the rig's time, wherever the run is.
+
+use crate::course::{START, faults};
+use crate::mock::*;
+use skinrig_controller::{ControllerError, RecordSink, RunReport, SinkFault, execute};
+use skinrig_model::*;
+
+/// A sink whose records are gone from some time on, which it says only when it is asked. ms of the rig's clock.
+struct Vanishing {
+    sink: Sink,
+    world: Shared,
+    gone_ms: i64,
+    asked_ms: Vec<i64>,
+}
+
+impl RecordSink for Vanishing {
+    fn accept(&mut self, record: Record) -> Result<(), SinkFault> {
+        self.sink.accept(record)
+    }
+
+    fn check(&mut self) -> Result<(), SinkFault> {
+        let ms = lock(&self.world).t / MS;
+        self.asked_ms.push(ms);
+        if ms < self.gone_ms {
+            return Ok(());
+        }
+        Err(SinkFault("the file is gone".into()))
+    }
+}
+
+fn run(gone_ms: i64, operator: Option<(u64, Press)>) -> (Vanishing, RunReport) {
+    let plan = plan();
+    let world = World::shared(
+        Faults {
+            operator,
+            ..faults()
+        },
+        START,
+    );
+    let control = lock(&world).control.clone();
+    let mut sink = Vanishing {
+        sink: Sink::default(),
+        world: world.clone(),
+        gone_ms,
+        asked_ms: Vec::new(),
+    };
+    let report = execute(&plan, header(&plan), rig(&world), &control, &mut sink);
+    (sink, report)
+}
+
+/// Twice what is promised of the time between two looks: 0.5 s and the tick in which it comes.
+const WITHIN_MS: i64 = 500 + 10;
+
+#[test]
+fn what_is_gone_is_noticed_within_half_a_second() {
+    let (whole, report) = run(i64::MAX, None);
+    assert_eq!(report.end, RunEnd::Completed);
+    let end_ms = report.ended_at.0 / MS;
+    assert!(whole.asked_ms.len() as i64 > end_ms / WITHIN_MS - 2);
+    for operator in [
+        None,
+        Some((150, Press::Pause)),
+        Some((150, Press::PauseNow)),
+    ] {
+        for gone_ms in (0..end_ms - WITHIN_MS).step_by(20) {
+            let (sink, report) = run(gone_ms, operator);
+            let case = format!("gone at {gone_ms} ms, {operator:?}");
+            let fault = SinkFault("the file is gone".into());
+            assert_eq!(report.causes, [ControllerError::Sink(fault)], "{case}");
+            assert!(report.retracted && report.disarmed, "{case}: {report:?}");
+            // One failed answer ends it; the end is written all the same.
+            let noticed_ms = *sink.asked_ms.last().unwrap();
+            assert!(noticed_ms - gone_ms <= WITHIN_MS, "{case}: {noticed_ms}");
+            let records = &sink.sink.records;
+            assert!(
+                matches!(records.last(), Some(Record::Ended { .. })),
+                "{case}"
+            );
+            let later = records
+                .iter()
+                .filter(|r| matches!(r, Record::Intent { t, .. } if t.0 / MS > gone_ms));
+            assert!(later.count() <= 1, "{case}: presses after that");
+            let ends = records
+                .iter()
+                .filter(|r| matches!(r, Record::Outcome(_) | Record::Missed(..)));
+            assert_eq!(ends.count(), 3, "{case}");
+        }
+    }
+}

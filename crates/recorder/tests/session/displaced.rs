@@ -1,0 +1,242 @@
+//! A session that is moved, removed or replaced while it is written: noticed, and kept in one file that goes on. The lock file beside it
+//! keeps nobody out by itself.
+#![cfg(target_os = "linux")]
+
+use std::path::{Path, PathBuf};
+
+use skinrig_model::*;
+use skinrig_recorder::{RecorderError, SessionReader, SessionWriter, verify, writer_of};
+
+use crate::common::{Evt2, further_leg, records, sealed};
+
+const PRESSES: u32 = 5;
+
+/// A session under way, two outcomes long.
+struct Run {
+    root: tempfile::TempDir,
+    path: PathBuf,
+    writer: SessionWriter,
+    rest: Vec<Record>,
+}
+
+fn beside(path: &Path, ending: &str) -> PathBuf {
+    PathBuf::from(format!("{}{ending}", path.display()))
+}
+
+fn begin() -> Run {
+    let root = tempfile::tempdir().unwrap();
+    let path = root.path().join("sessions/a.session.sqlite");
+    std::fs::create_dir(path.parent().unwrap()).unwrap();
+    let mut writer = SessionWriter::create(&path).unwrap();
+    let all = records(PRESSES);
+    let outcomes = |r: &Record| matches!(r, Record::Outcome(_));
+    let second = all.iter().position(outcomes).unwrap() + 1;
+    let rest = all[second..].to_vec();
+    for record in &all[..second] {
+        writer.accept(record.clone()).unwrap();
+    }
+    writer.check().unwrap();
+    Run {
+        root,
+        path,
+        writer,
+        rest,
+    }
+}
+
+impl Run {
+    fn folder(&self) -> PathBuf {
+        self.path.parent().unwrap().to_owned()
+    }
+
+    /// Found out; written to its end all the same; kept in one file, which is the session and goes on. Where.
+    #[track_caller]
+    fn is_rescued(mut self, found: &str) -> (tempfile::TempDir, PathBuf) {
+        let told = self.writer.check().unwrap_err();
+        assert!(matches!(told, RecorderError::Displaced { .. }), "{told}");
+        assert!(told.to_string().contains(found), "{told}");
+        for record in std::mem::take(&mut self.rest) {
+            self.writer.accept(record).unwrap();
+        }
+        let kept = match self.writer.finish() {
+            Err(RecorderError::Rescued { to, displaced }) => {
+                assert_eq!(displaced, told.to_string());
+                to
+            }
+            other => panic!("{other:?}"),
+        };
+        assert!(!beside(&kept, "-wal").exists());
+        let report = verify(&kept, &mut Evt2::default()).unwrap();
+        assert_eq!((report.problems, report.sealed), (vec![], false));
+        let reader = SessionReader::open(&kept).unwrap();
+        assert!(matches!(
+            reader.end().unwrap(),
+            Some((_, RunEnd::Stopped(_)))
+        ));
+        let known = reader.history().unwrap();
+        drop(reader);
+        let mut leg = SessionWriter::resume(&kept, &mut Evt2::default()).unwrap();
+        for record in further_leg(&known) {
+            leg.accept(record).unwrap();
+        }
+        leg.finish().unwrap();
+        let report = verify(&kept, &mut Evt2::default()).unwrap();
+        assert_eq!((report.problems, report.sealed), (vec![], true));
+        (self.root, kept)
+    }
+}
+
+#[test]
+fn a_renamed_file_is_found() {
+    let run = begin();
+    let new = run.folder().join("b.session.sqlite");
+    std::fs::rename(&run.path, &new).unwrap();
+    let (root, kept) = run.is_rescued("moved to");
+    assert_eq!(kept, new);
+    // Nothing of its log is left under the old name.
+    let left = std::fs::read_dir(root.path().join("sessions")).unwrap();
+    let left: Vec<_> = left.map(|e| e.unwrap().file_name()).collect();
+    assert_eq!(left, ["b.session.sqlite"]);
+}
+
+#[test]
+fn a_removed_file_is_copied() {
+    let run = begin();
+    std::fs::remove_file(&run.path).unwrap();
+    let expected = run.folder().join("a.rescued.session.sqlite");
+    let (_root, kept) = run.is_rescued("found it removed");
+    assert_eq!(kept, expected);
+}
+
+#[test]
+fn a_renamed_folder_is_followed() {
+    let run = begin();
+    let new = run.root.path().join("elsewhere");
+    std::fs::rename(run.folder(), &new).unwrap();
+    // Somebody makes the folder anew.
+    std::fs::create_dir(run.folder()).unwrap();
+    let (_root, kept) = run.is_rescued("moved to");
+    assert_eq!(kept, new.join("a.session.sqlite"));
+}
+
+#[test]
+fn out_of_a_removed_folder_a_copy_is_made_above_it() {
+    let run = begin();
+    std::fs::remove_dir_all(run.folder()).unwrap();
+    let (root, kept) = run.is_rescued("found it removed");
+    assert_eq!(kept, root.path().join("a.rescued.session.sqlite"));
+}
+
+#[test]
+fn a_removed_log_loses_nothing() {
+    for ending in ["-wal", "-shm"] {
+        let run = begin();
+        std::fs::remove_file(beside(&run.path, ending)).unwrap();
+        let path = run.path.clone();
+        let (_root, kept) =
+            run.is_rescued(&format!("{ending}: expected the file that this run writes"));
+        assert_eq!(kept, path);
+    }
+}
+
+#[test]
+fn another_file_in_its_place_is_left_alone() {
+    for own_is_kept in [true, false] {
+        let run = begin();
+        let new = run.folder().join("b.session.sqlite");
+        if own_is_kept {
+            std::fs::rename(&run.path, &new).unwrap();
+        }
+        let other = run.root.path().join("other.session.sqlite");
+        sealed(&other, PRESSES);
+        let bytes = std::fs::read(&other).unwrap();
+        std::fs::rename(&other, &run.path).unwrap();
+        // The log is still that of the run: nobody may go on with what has its name now.
+        let refused = SessionWriter::resume(&run.path, &mut Evt2::default());
+        assert!(
+            matches!(refused, Err(RecorderError::InUse { .. })),
+            "{refused:?}"
+        );
+        let path = run.path.clone();
+        let copy = run.folder().join("a.rescued.session.sqlite");
+        let (_root, kept) = run.is_rescued("another file in its place");
+        assert_eq!(kept, if own_is_kept { new } else { copy });
+        assert_eq!(std::fs::read(&path).unwrap(), bytes);
+        let report = verify(&path, &mut Evt2::default()).unwrap();
+        assert_eq!((report.problems, report.sealed), (vec![], true));
+    }
+}
+
+#[test]
+fn the_next_free_name_is_taken() {
+    let run = begin();
+    let first = run.folder().join("a.rescued.session.sqlite");
+    std::fs::write(&first, "precious").unwrap();
+    std::fs::remove_file(&run.path).unwrap();
+    let (_root, kept) = run.is_rescued("removed");
+    assert!(
+        kept.ends_with("a.rescued-2.session.sqlite"),
+        "{}",
+        kept.display()
+    );
+    assert_eq!(std::fs::read_to_string(first).unwrap(), "precious");
+}
+
+#[test]
+fn without_the_lock_file_nobody_else_gets_in() {
+    for replaced in [false, true] {
+        let mut run = begin();
+        let lock = beside(&run.path, "-lock");
+        std::fs::remove_file(&lock).unwrap();
+        if replaced {
+            std::fs::write(&lock, "anything").unwrap();
+        }
+        for refused in [
+            SessionWriter::resume(&run.path, &mut Evt2::default()),
+            SessionWriter::ended(&run.path, &mut Evt2::default()),
+        ] {
+            assert!(
+                matches!(refused, Err(RecorderError::InUse { .. })),
+                "{refused:?}"
+            );
+        }
+        assert!(writer_of(&run.path).is_some());
+        run.writer.check().unwrap();
+        for record in std::mem::take(&mut run.rest) {
+            run.writer.accept(record).unwrap();
+        }
+        run.writer.finish().unwrap();
+        assert_eq!(writer_of(&run.path), None);
+        let report = verify(&run.path, &mut Evt2::default()).unwrap();
+        assert_eq!((report.problems, report.sealed), (vec![], true));
+    }
+}
+
+/// A sealed session is read-only and has no log; a leg of it is refused to others from its first instant on.
+#[test]
+fn a_leg_is_locked_before_it_begins() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.session.sqlite");
+    sealed(&path, PRESSES);
+    let known = SessionReader::open(&path).unwrap().history().unwrap();
+    let mut leg = SessionWriter::resume(&path, &mut Evt2::default()).unwrap();
+    std::fs::remove_file(beside(&path, "-lock")).unwrap();
+    // Under another name, where there is no lock file at all.
+    let link = folder.path().join("b.session.sqlite");
+    std::fs::hard_link(&path, &link).unwrap();
+    let refused = || {
+        for path in [&path, &link] {
+            let refused = SessionWriter::resume(path, &mut Evt2::default());
+            assert!(
+                matches!(refused, Err(RecorderError::InUse { .. })),
+                "{refused:?}"
+            );
+        }
+    };
+    refused();
+    for record in further_leg(&known) {
+        leg.accept(record).unwrap();
+        refused();
+    }
+    leg.finish().unwrap();
+}
