@@ -4,8 +4,9 @@
 
 It shares no code with what writes sessions: it reads the tables with sqlite3, unfolds the chunks and reads the trigger trains out of
 the cameras' bytes as docs/session-file.md and crates/model/src/pulse.rs describe them. Prints what is wrong; ends with 1 when anything
-is, else with 0. It expects a complete EVT2 session of a rig whose trigger line works, in which no press had to be taken again but
-because a process was gone.
+is, else with 0. It expects a complete EVT2 session of a rig whose trigger line works, in which every press is valid in the end. A press
+may be taken again because a process was gone, or because the rig or the operator cost an attempt; after a run that came to its end
+only such presses are.
 """
 
 import array
@@ -19,6 +20,7 @@ import zlib
 from collections import Counter
 
 CONTACT, LOOPBACK = 2, (1 << 17) - 1
+PASSING = {"data_lost", "no_data", "data_late", "storm", "late", "aside", "paused", "run_ended"}
 KINDS = {"approach": 1, "contact": 2, "at_depth": 3, "retract": 4, "release": 5}
 
 
@@ -117,9 +119,24 @@ def check(path):
                 wrong.append(f"{place}: two valid attempts in leg {leg}")
             valid[press["id"], leg] = attempt
             expect(f"{place}: leg of attempt {attempt['number']}", leg, attempt["leg"])
-    taken = Counter((leg_of(a["intent_ns"]), a["press"]) for a in rows("SELECT * FROM attempt WHERE intent_ns IS NOT NULL"))
+    def passes(attempt):
+        """Whether it is invalid for nothing but what the rig or the operator did."""
+        return attempt["verdict"] == "invalid" and set((attempt["faults"] or "none").split()) <= PASSING
+
+    tried = rows("SELECT * FROM attempt WHERE intent_ns IS NOT NULL ORDER BY press, number")
+    taken = Counter((leg_of(a["intent_ns"]), a["press"]) for a in tried)
     for (leg, press), n in taken.items():
-        expect(f"press {press}: attempts in leg {leg}", 1, n)
+        again = [a for a in tried if a["press"] == press and leg_of(a["intent_ns"]) == leg][1:]
+        before = {a["number"]: a for a in tried if a["press"] == press}
+        expect(f"press {press}: attempts in leg {leg}", 1 + sum(passes(before[a["previous"]]) for a in again), n)
+    roles = {p["id"]: p["role"] for p in presses}
+    for leg in further:
+        if leg["previous_status"] != "completed":
+            continue
+        for press in {p for n, p in taken if n == leg["number"] and roles[p] != "sync"}:
+            before = [a for a in tried if a["press"] == press and leg_of(a["intent_ns"]) < leg["number"]]
+            if not before or not passes(before[-1]):
+                wrong.append(f"press {press}: taken again in leg {leg['number']}, although the run before it had come to its end with it")
 
     told = Counter((leg_of(m["t_ns"]), KINDS[m["kind"]], m["press"]) for m in rows("SELECT * FROM mark"))
     totals = Counter()
@@ -148,6 +165,10 @@ def check(path):
             place = f"camera {camera}, press {press}, leg {leg}"
             if attempt["clear_ns"] > ends[leg]:
                 wrong.append(f"{place}: its bytes end before it was over")
+            if taken[leg, press] > 1:
+                # What the attempts before it told the cameras may be lost.
+                expect(f"{place}: any contact", True, 1 <= seen[leg, CONTACT, press] <= told[leg, CONTACT, press])
+                continue
             for kind in KINDS.values():
                 expect(f"{place}: trains of kind {kind}", told[leg, kind, press], seen[leg, kind, press])
             expect(f"{place}: contacts", 1, seen[leg, CONTACT, press])

@@ -13,3 +13,4 @@ mod disk;
 mod kills;
 mod lab;
 mod power;
+mod rig;

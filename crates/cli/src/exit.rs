@@ -17,8 +17,8 @@ pub enum Exit {
     Internal,
     /// Bad input: command line, protocol, schedule, data file or session file.
     Input,
-    /// A check before a run failed, or a device, the trigger line or the recorder during it; the session up to there is
-    /// kept.
+    /// A check before a run failed, or a device, the trigger line or the recorder during it; or the run came to its end with presses
+    /// that the rig cost. The session up to there is kept.
     Rig,
     /// A stated limit was not met: `--max-rmse`, `verify`, the alignment of the clocks (an INVALID session).
     Limit,
@@ -48,7 +48,7 @@ impl Exit {
         0  done\n  \
         1  fault of skinrig or of this machine\n  \
         2  bad input: command line, protocol, schedule, data or session file\n  \
-        3  rig fault, or a failed check before a run (the session up to there is kept)\n  \
+        3  rig fault, a failed check before a run, or presses that the rig cost (what was recorded is kept)\n  \
         4  a limit was not met (--max-rmse, verify, an INVALID session)\n  \
         5  stopped by the operator (the session up to there is kept)";
 }

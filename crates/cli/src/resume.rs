@@ -134,7 +134,7 @@ fn read(session: &Path) -> Result<Unfinished, Failure> {
     };
     let reader = SessionReader::open(session).map_err(Failure::session)?;
     let header = reader.header().map_err(Failure::session)?;
-    if matches!(header.rig_kind.as_str(), "imported" | "replayed") {
+    if !header.is_of_a_rig() {
         return Err(refused(
             "a session that a rig recorded",
             format!(
@@ -193,7 +193,7 @@ fn describe(session: &Path, found: &Unfinished, wanted: &[bool]) -> String {
         None => "cut off".to_owned(),
         Some(RunEnd::Stopped(reason)) => format!("stopped: {reason}"),
         Some(RunEnd::Faulted(reason)) => format!("faulted: {reason}"),
-        Some(RunEnd::Completed) => "completed".to_owned(),
+        Some(RunEnd::Completed) => "completed, but the rig cost presses".to_owned(),
     };
     let all = || found.plan.presses.iter().zip(&found.histories).zip(wanted);
     let valid = all().filter(|((_, h), _)| h.verdict == Some(PressVerdict::Valid));

@@ -276,7 +276,17 @@ pub fn conclude(
         }
     };
     match &report.end {
-        RunEnd::Completed => analysed,
+        RunEnd::Completed => match cost_by_the_rig(session).map_err(Failure::internal)? {
+            Some(cost) => {
+                also(analysed);
+                Err(Failure::rig(format!(
+                    "{cost}\n  the session is kept: {}\n  next: put right what they name (device, cable, disk), then take these presses \
+                     again with `skinrig resume {0}`",
+                    session.display()
+                )))
+            }
+            None => analysed,
+        },
         RunEnd::Stopped(reason) => {
             also(analysed);
             errln!("stopped: {reason}; {kept}\n  next: {}", go_on(session));
@@ -293,11 +303,52 @@ pub fn conclude(
     }
 }
 
+/// The presses of a completed session that the rig or the operator cost, in words; `None` when there are none, or when no rig can take
+/// them again.
+fn cost_by_the_rig(session: &Path) -> Result<Option<String>, RecorderError> {
+    const NAMED: usize = 3;
+    let reader = SessionReader::open(session)?;
+    let header = reader.header()?;
+    let histories = reader.history()?;
+    let Ok(plan) = serde_json::from_str::<Plan>(&header.plan_json) else {
+        return Ok(None); // a session that was analysed; resuming it says what is wrong
+    };
+    if !header.is_of_a_rig() {
+        return Ok(None);
+    }
+    let wanted = plan.wanted(&histories);
+    let all = plan.presses.iter().zip(&histories).zip(wanted);
+    let cost: Vec<_> = all
+        .filter(|((press, _), wanted)| *wanted && press.role != PressRole::Sync)
+        .map(|((press, known), _)| {
+            let reason = known.verdict.as_ref().and_then(PressVerdict::reason);
+            format!("{}: {}", press.id, reason.unwrap_or("no verdict"))
+        })
+        .collect();
+    if cost.is_empty() {
+        return Ok(None);
+    }
+    let mut words = format!(
+        "all of the plan was done, but {} of {} presses are invalid through the rig and not the skin: {}",
+        cost.len(),
+        plan.presses.len(),
+        cost.iter()
+            .take(NAMED)
+            .cloned()
+            .collect::<Vec<_>>()
+            .join("; ")
+    );
+    if cost.len() > NAMED {
+        words += &format!("; and {} more", cost.len() - NAMED);
+    }
+    Ok(Some(words))
+}
+
 /// The next step of a session that was not finished: a rig can go on, an import or a replay begins anew.
 fn go_on(session: &Path) -> String {
     let header = SessionReader::open(session).and_then(|reader| reader.header());
     match header {
-        Ok(header) if !matches!(header.rig_kind.as_str(), "imported" | "replayed") => {
+        Ok(header) if header.is_of_a_rig() => {
             format!("go on with `skinrig resume {}`", session.display())
         }
         _ => "run again".to_owned(),

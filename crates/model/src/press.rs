@@ -136,6 +136,10 @@ pub struct PressHistory {
     pub spent: u32,
     /// The verdict of the last one; absent when there was none, or when it was cut off.
     pub verdict: Option<PressVerdict>,
+    /// True when the last one is invalid for nothing but what passes: the rig or the operator cost it.
+    pub given_back: bool,
+    /// True when the plan has been executed to its end since: then only what was given back is taken again.
+    pub plan_done: bool,
 }
 
 /// The measured result of one attempt.

@@ -134,6 +134,14 @@ pub struct RunHeader {
     pub presses: Vec<PlannedPress>,
 }
 
+impl RunHeader {
+    /// True when a rig pressed, which can press again; false for an import and a replay of what was recorded before.
+    #[must_use]
+    pub fn is_of_a_rig(&self) -> bool {
+        !matches!(self.rig_kind.as_str(), "imported" | "replayed")
+    }
+}
+
 /// What is known before anything moves when a session goes on that was cut off or not finished. Protocol, plan, seed and frame are
 /// the session's own; everything here may differ from its first leg.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]

@@ -38,14 +38,16 @@ impl Retakes {
     }
 
     /// Whether a resumed run takes a press with this history (again): when it is neither valid nor excluded, and either did not
-    /// come to its end or has an attempt left. Attempts that the rig or the operator cost are given back.
+    /// come to its end or has an attempt left. Attempts that the rig or the operator cost are given back; when the plan was done
+    /// already, only presses whose last attempt was are taken again.
     #[must_use]
     pub fn wants(&self, history: &PressHistory) -> bool {
         match &history.verdict {
             None | Some(PressVerdict::Missed(_)) => true,
             Some(PressVerdict::Valid | PressVerdict::Excluded(_)) => false,
             Some(verdict @ PressVerdict::Invalid(_)) => {
-                verdict.is_cut_off() || history.spent <= self.per_press
+                let is_open = history.given_back || !history.plan_done;
+                verdict.is_cut_off() || (is_open && history.spent <= self.per_press)
             }
         }
     }

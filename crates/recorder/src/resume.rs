@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use skinrig_model::{PressFaultKind, PressVerdict, ResumeHeader, RunEnd, StreamFormat};
+use skinrig_model::{PressFaultKind, PressRole, PressVerdict, ResumeHeader, RunEnd, StreamFormat};
 use sqlx::sqlite::{SqliteConnection, SqliteRow};
 use sqlx::{Connection, Sqlite, Transaction};
 
@@ -28,14 +28,27 @@ pub fn lock_unfinished(
     scanner: &mut dyn ChunkScanner,
 ) -> Result<WriterLock, RecorderError> {
     let lock = lock(path)?;
-    let end = SessionReader::open(path).and_then(|reader| reader.end());
-    if let Ok(Some((_, RunEnd::Completed))) = end {
+    let completed = SessionReader::open(path).and_then(|reader| is_completed(&reader));
+    if let Ok(true) = completed {
         return Err(RecorderError::Completed {
             path: path.to_owned(),
         });
     }
     check(path, scanner)?;
     Ok(lock)
+}
+
+/// Whether a session came to its end and has no press that a rig could give anew.
+fn is_completed(reader: &SessionReader) -> Result<bool, RecorderError> {
+    if !matches!(reader.end()?, Some((_, RunEnd::Completed))) {
+        return Ok(false);
+    }
+    if !reader.header()?.is_of_a_rig() {
+        return Ok(true);
+    }
+    let (presses, known) = (reader.presses()?, reader.history()?);
+    let mut all = presses.iter().zip(known);
+    Ok(!all.any(|((press, _), known)| press.role != PressRole::Sync && known.given_back))
 }
 
 /// Locks a session that has its end and no seal, or half a one, and checks all of it; nothing changes.

@@ -14,7 +14,7 @@ use crate::error::RecorderError;
 use crate::query::{Fault, each_row};
 
 /// The schema version that this build writes, and the newest that it reads (`PRAGMA user_version`).
-pub const SCHEMA_VERSION: u32 = 9;
+pub const SCHEMA_VERSION: u32 = 10;
 
 /// `skrg` in ASCII (`PRAGMA application_id`).
 pub const APPLICATION_ID: u32 = u32::from_be_bytes(*b"skrg");
@@ -353,6 +353,51 @@ mod tests {
     #[test]
     fn the_version_counts_the_migrations() {
         assert_eq!(MIGRATOR.iter().count(), SCHEMA_VERSION as usize);
+    }
+
+    /// Schema 10 makes the table of legs anew, although the rows of kept seals refer to it.
+    #[test]
+    fn legs_and_what_refers_to_them_survive_their_new_table() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("old.session.sqlite");
+        let runtime = tokio::runtime::Builder::new_current_thread()
+            .build()
+            .unwrap();
+        runtime.block_on(async {
+            let mut conn = create_version(&path, 9).await.unwrap();
+            for number in [2, 3] {
+                let insert = "INSERT INTO leg VALUES (?1, 'o', 's', 'h', 's', 'c', ?1, ?1, 0, 1, 2, 3, 4, 'stopped', 'r', ?1, zeroblob(32))";
+                sqlx::query(insert).bind(number).execute(&mut conn).await.unwrap();
+                let insert = "INSERT INTO previous_seal (leg, tree_sha256) VALUES (?, zeroblob(32))";
+                sqlx::query(insert).bind(number).execute(&mut conn).await.unwrap();
+            }
+            let digest = async |conn: &mut SqliteConnection| {
+                let all = crate::digest::digest_tables(conn).await.unwrap();
+                all.into_iter().find(|t| t.name == "leg").unwrap()
+            };
+            let before = digest(&mut conn).await;
+            conn.close().await.unwrap();
+
+            let mut conn = open_again(&path).await.unwrap();
+            let mut all = conn.begin_with("BEGIN IMMEDIATE").await.unwrap();
+            migrate(&mut all).await.unwrap();
+            let of_completed = "UPDATE leg SET previous_status = 'completed', previous_reason = NULL WHERE number = ?";
+            all.commit().await.unwrap();
+            assert_eq!(digest(&mut conn).await, before);
+            sqlx::query(of_completed).bind(3).execute(&mut conn).await.unwrap();
+            // What refers to the legs still does.
+            for refused in [
+                "DELETE FROM leg WHERE number = 2",
+                "INSERT INTO previous_seal (leg, tree_sha256) VALUES (4, zeroblob(32))",
+                "UPDATE leg SET previous_reason = 'x' WHERE number = 3",
+                "UPDATE leg SET previous_reason = NULL WHERE number = 2",
+                "UPDATE leg SET previous_status = NULL, previous_reason = NULL WHERE number = 2",
+            ] {
+                let done = sqlx::query(refused).execute(&mut conn).await;
+                assert!(done.is_err(), "{refused}");
+            }
+            conn.close().await.unwrap();
+        });
     }
 
     /// A sealed session of schema 1 is read and verified as before: the tables that came later are no part of it.

@@ -169,6 +169,7 @@ fn history(attempts: u32, verdict: Option<PressVerdict>) -> PressHistory {
         attempts,
         spent: attempts,
         verdict,
+        ..PressHistory::default()
     }
 }
 

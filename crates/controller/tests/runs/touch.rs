@@ -228,11 +228,13 @@ fn a_further_leg_checks_the_surface_before_it_presses() {
             attempts: 1,
             spent: 0,
             verdict: None,
+            ..PressHistory::default()
         };
         let done = PressHistory {
             attempts: 1,
             spent: 0,
             verdict: Some(PressVerdict::Valid),
+            ..PressHistory::default()
         };
         let histories = vec![done, cut_off, PressHistory::default()];
         let wanted = plan.wanted(&histories);

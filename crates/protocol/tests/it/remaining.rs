@@ -60,6 +60,7 @@ fn what_was_not_done_is_wanted_after_the_sync_presses() {
         attempts: 1,
         spent: 0,
         verdict: Some(PressVerdict::Valid),
+        ..PressHistory::default()
     };
     let mut histories = vec![done; plan.presses.len()];
     let none = plan.wanted(&histories);
@@ -84,6 +85,7 @@ fn a_press_is_final_when_it_is_good_or_has_no_attempt_left() {
             attempts: 9,
             spent,
             verdict,
+            ..PressHistory::default()
         })
     };
     let invalid = |reason: &str| Some(PressVerdict::Invalid(reason.into()));
@@ -95,6 +97,30 @@ fn a_press_is_final_when_it_is_good_or_has_no_attempt_left() {
     assert!(!wants(3, invalid("hold: expected within 0.05 mm")));
     assert!(!wants(1, Some(PressVerdict::Valid)));
     assert!(!wants(1, Some(PressVerdict::Excluded("rule".into()))));
+}
+
+/// After a run that came to its end only those presses are open that the rig or the operator cost.
+#[test]
+fn of_a_plan_that_is_done_only_what_was_given_back_is_wanted() {
+    let wants = |given_back, spent, verdict: PressVerdict| {
+        Retakes::default().wants(&PressHistory {
+            attempts: 3,
+            spent,
+            verdict: Some(verdict),
+            given_back,
+            plan_done: true,
+        })
+    };
+    let lost = || PressVerdict::Invalid("camera 1 lost 64 bytes".into());
+    assert!(wants(true, 0, lost()));
+    assert!(wants(true, 2, lost()));
+    assert!(!wants(true, 3, lost()));
+    assert!(!wants(
+        false,
+        1,
+        PressVerdict::Invalid("hold: expected".into())
+    ));
+    assert!(!wants(false, 0, PressVerdict::Valid));
 }
 
 proptest! {

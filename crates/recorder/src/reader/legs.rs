@@ -51,6 +51,10 @@ impl SessionReader {
     /// # Errors
     /// When the file is damaged.
     pub fn history(&self) -> Result<Vec<PressHistory>, RecorderError> {
+        let ends = self.legs()?.into_iter().map(|leg| leg.end);
+        let plan_done = ends
+            .into_iter()
+            .any(|end| matches!(end, Some((_, RunEnd::Completed))));
         let known = |attempts: Vec<crate::rows::AttemptRow>| {
             let last = attempts.last()?;
             let verdict = last.outcome.as_ref().map(|o| o.verdict.clone());
@@ -63,10 +67,13 @@ impl SessionReader {
                 _ => false,
             };
             let spent = attempts.iter().filter(spends).count();
+            let invalid = matches!(verdict, Some(PressVerdict::Invalid(_)));
             Some(PressHistory {
                 attempts: last.id.number,
                 spent: u32::try_from(spent).unwrap_or(u32::MAX),
                 verdict: verdict.filter(|v| !v.is_cut_off()),
+                given_back: invalid && !spends(&last),
+                plan_done,
             })
         };
         let presses = self.presses()?.into_iter();
@@ -133,9 +140,10 @@ fn further_from(row: &sqlx::sqlite::SqliteRow) -> Result<(LegRow, Before), Fault
         (Some(t), Some(status)) => {
             let reason = opt_text(row, "previous_reason")?.unwrap_or_default();
             let end = match status.as_str() {
+                "completed" => RunEnd::Completed,
                 "stopped" => RunEnd::Stopped(reason),
                 "faulted" => RunEnd::Faulted(reason),
-                other => return Err(Fault::bad("leg", "stopped or faulted", other)),
+                other => return Err(Fault::bad("leg", "completed, stopped or faulted", other)),
             };
             Some((HostTime(t), end))
         }

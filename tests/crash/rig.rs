@@ -1,0 +1,111 @@
+//! The rig costs presses of a run that comes to its end: that is no success, and the presses are taken again in a further leg, also
+//! when that leg is killed. Held against the program that shares no code with the writer.
+
+use std::path::Path;
+use std::process::Command;
+
+use skinrig_model::{PressRole, PressVerdict};
+use skinrig_recorder::SessionReader;
+
+use crate::lab::{
+    Presses, assert_kept, campaign, expect, journal, program, resume, session_in, words,
+};
+
+/// The campaign on a rig whose camera sends nothing any more from the tenth press on; the session.
+fn spoilt(folder: &Path) -> std::path::PathBuf {
+    let mut run = campaign(folder);
+    run.args(["--fault", "camera1-stalled@approach:10"]);
+    let said = expect(run, 3);
+    for part in [
+        "3 of 12 presses are invalid through the rig and not the skin: press 10: camera 1 sent no bytes",
+        "take these presses again with `skinrig resume ",
+    ] {
+        assert!(said.contains(part), "expected {part:?} in {said}");
+    }
+    session_in(folder).unwrap()
+}
+
+fn verify(session: &Path) -> String {
+    let mut command = program(&["verify"]);
+    command.arg(session);
+    expect(command, 0)
+}
+
+/// Every press is valid; of those that the run before had no attempt was added but to sync presses.
+fn is_whole(session: &Path, before: &Presses) {
+    let said = verify(session);
+    assert!(said.contains("sound, sealed"), "{said}");
+    let after = journal(session).unwrap();
+    assert_kept(before, &after, "what the rig cost");
+    for ((press, was), (_, is)) in before.iter().zip(&after) {
+        let valid = |a: &skinrig_recorder::AttemptRow| {
+            a.outcome.as_ref().map(|o| &o.verdict) == Some(&PressVerdict::Valid)
+        };
+        assert!(is.last().is_some_and(valid), "{}: {is:?}", press.id);
+        if press.role != PressRole::Sync && was.last().is_some_and(valid) {
+            assert_eq!(was.len(), is.len(), "{}", press.id);
+        }
+    }
+    let python = std::env::var("SKINRIG_PYTHON").unwrap_or_else(|_| "python3".to_owned());
+    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/crash/history.py");
+    let Ok(checked) = Command::new(python).arg(script).arg(session).output() else {
+        return;
+    };
+    assert!(checked.status.success(), "{}", words(&checked));
+}
+
+#[test]
+fn what_the_rig_cost_is_taken_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let session = spoilt(folder.path());
+    let said = verify(&session);
+    assert!(said.contains("sound, sealed"), "{said}");
+    let before = journal(&session).unwrap();
+    let said = expect(resume(&session), 0);
+    assert!(
+        said.contains("3 presses from press 10 to press 12"),
+        "{said}"
+    );
+    is_whole(&session, &before);
+    let legs = SessionReader::open(&session).unwrap().legs().unwrap();
+    assert_eq!(legs.len(), 2);
+    assert!(legs.iter().all(|leg| {
+        leg.end
+            .as_ref()
+            .is_some_and(|(_, end)| end.name() == "completed")
+    }));
+    // Nothing is spoilt any more.
+    let said = expect(resume(&session), 2);
+    assert!(said.contains("there is nothing to resume"), "{said}");
+}
+
+/// The rig is not mended: the leg ends as the run did, and the next one may do better.
+#[test]
+fn a_rig_that_is_not_mended_costs_them_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let session = spoilt(folder.path());
+    let before = journal(&session).unwrap();
+    let mut again = resume(&session);
+    // After the two sync presses of the leg.
+    again.args(["--fault", "camera2-stalled@approach:4"]);
+    let said = expect(again, 3);
+    assert!(said.contains("2 of 12 presses are invalid"), "{said}");
+    expect(resume(&session), 0);
+    is_whole(&session, &before);
+}
+
+/// Killed at the beginning, in the middle and before the seal of the leg that takes them again.
+#[test]
+fn killed_while_they_are_taken_again() {
+    for fault in ["killed@journal:1", "killed@journal:12", "killed@seal"] {
+        let folder = tempfile::tempdir().unwrap();
+        let session = spoilt(folder.path());
+        let before = journal(&session).unwrap();
+        let mut killed = resume(&session);
+        let killed = killed.args(["--fault", fault]).output().unwrap();
+        assert_eq!(killed.status.code(), None, "{fault}: {}", words(&killed));
+        verify(&session);
+        expect(resume(&session), 0);
+        is_whole(&session, &before);
+    }
+}
