@@ -51,7 +51,7 @@ impl Run {
 
     /// Found out; written to its end all the same; kept in one file, which is the session and goes on. Where.
     #[track_caller]
-    fn is_rescued(mut self, found: &str) -> (tempfile::TempDir, PathBuf) {
+    fn into_rescued(mut self, found: &str) -> (tempfile::TempDir, PathBuf) {
         let told = self.writer.check().unwrap_err();
         assert!(matches!(told, RecorderError::Displaced { .. }), "{told}");
         assert!(told.to_string().contains(found), "{told}");
@@ -91,7 +91,7 @@ fn a_renamed_file_is_found() {
     let run = begin();
     let new = run.folder().join("b.session.sqlite");
     std::fs::rename(&run.path, &new).unwrap();
-    let (root, kept) = run.is_rescued("moved to");
+    let (root, kept) = run.into_rescued("moved to");
     assert_eq!(kept, new);
     // Nothing of its log is left under the old name.
     let left = std::fs::read_dir(root.path().join("sessions")).unwrap();
@@ -104,7 +104,7 @@ fn a_removed_file_is_copied() {
     let run = begin();
     std::fs::remove_file(&run.path).unwrap();
     let expected = run.folder().join("a.rescued.session.sqlite");
-    let (_root, kept) = run.is_rescued("found it removed");
+    let (_root, kept) = run.into_rescued("found it removed");
     assert_eq!(kept, expected);
 }
 
@@ -115,7 +115,7 @@ fn a_renamed_folder_is_followed() {
     std::fs::rename(run.folder(), &new).unwrap();
     // Somebody makes the folder anew.
     std::fs::create_dir(run.folder()).unwrap();
-    let (_root, kept) = run.is_rescued("moved to");
+    let (_root, kept) = run.into_rescued("moved to");
     assert_eq!(kept, new.join("a.session.sqlite"));
 }
 
@@ -123,7 +123,7 @@ fn a_renamed_folder_is_followed() {
 fn out_of_a_removed_folder_a_copy_is_made_above_it() {
     let run = begin();
     std::fs::remove_dir_all(run.folder()).unwrap();
-    let (root, kept) = run.is_rescued("found it removed");
+    let (root, kept) = run.into_rescued("found it removed");
     assert_eq!(kept, root.path().join("a.rescued.session.sqlite"));
 }
 
@@ -134,7 +134,7 @@ fn a_removed_log_loses_nothing() {
         std::fs::remove_file(beside(&run.path, ending)).unwrap();
         let path = run.path.clone();
         let (_root, kept) =
-            run.is_rescued(&format!("{ending}: expected the file that this run writes"));
+            run.into_rescued(&format!("{ending}: expected the file that this run writes"));
         assert_eq!(kept, path);
     }
 }
@@ -159,7 +159,7 @@ fn another_file_in_its_place_is_left_alone() {
         );
         let path = run.path.clone();
         let copy = run.folder().join("a.rescued.session.sqlite");
-        let (_root, kept) = run.is_rescued("another file in its place");
+        let (_root, kept) = run.into_rescued("another file in its place");
         assert_eq!(kept, if own_is_kept { new } else { copy });
         assert_eq!(std::fs::read(&path).unwrap(), bytes);
         let report = verify(&path, &mut Evt2::default()).unwrap();
@@ -173,7 +173,7 @@ fn the_next_free_name_is_taken() {
     let first = run.folder().join("a.rescued.session.sqlite");
     std::fs::write(&first, "precious").unwrap();
     std::fs::remove_file(&run.path).unwrap();
-    let (_root, kept) = run.is_rescued("removed");
+    let (_root, kept) = run.into_rescued("removed");
     assert!(
         kept.ends_with("a.rescued-2.session.sqlite"),
         "{}",
