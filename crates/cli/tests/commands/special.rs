@@ -67,10 +67,7 @@ fn said(arguments: &[&str]) -> Option<Output> {
 #[cfg(target_os = "linux")]
 fn pipes_and_devices_are_refused() {
     let lab = Lab::new();
-    let session = lab
-        .record("sessions", &[])
-        .display()
-        .to_string();
+    let session = lab.record("sessions", &[]).display().to_string();
     let pipe = lab.text("pipe");
     let made = Command::new("mkfifo").arg(&pipe).status();
     assert!(made.unwrap().success());
