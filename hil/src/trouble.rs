@@ -32,12 +32,17 @@ pub const fn of_camera(camera: CameraId) -> &'static str {
 #[must_use]
 pub fn of(error: &DeviceError) -> Trouble {
     let (kind, role) = match error {
-        DeviceError::Lost { role, .. } => (EvidenceKind::DeviceLost, *role),
+        DeviceError::Lost { role, .. } | DeviceError::Silent { role, .. } => {
+            (EvidenceKind::DeviceLost, *role)
+        }
         DeviceError::ReadBack { role, .. } => (EvidenceKind::ReadBack, *role),
         DeviceError::Refused { role, .. } => (EvidenceKind::Refused, *role),
         DeviceError::State { role, .. } => (EvidenceKind::State, *role),
         // No bench replays: whoever asked took the wrong devices.
-        DeviceError::Diverged { role, .. } => (EvidenceKind::Software, *role),
+        // Neither does any leave a call under way.
+        DeviceError::Diverged { role, .. } | DeviceError::Pending { role, .. } => {
+            (EvidenceKind::Software, *role)
+        }
     };
     Box::new(Evidence::new(kind, subject(role), error.to_string()).next(next(kind, role)))
 }

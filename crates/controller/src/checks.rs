@@ -337,6 +337,7 @@ impl Core<'_> {
                     self.hold_line(sent.t + train);
                     break;
                 }
+                Err(DeviceError::Pending { .. }) => self.tick(None)?,
                 Err(DeviceError::State { .. }) if self.now() < until => self.tick(Some(until))?,
                 Err(e) => return Err(ControllerError::from(e).into()),
             }

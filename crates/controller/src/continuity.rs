@@ -1,6 +1,7 @@
 //! Whether the cameras' streams go on: their time keeps pace with the host's, they reach to the end of a press, and no storm
 //! drowns it. A press whose data are spoilt is taken again.
 
+use skinrig_device::DeviceError;
 use skinrig_model::{CameraId, HostDuration, HostTime, RawChunk, Record};
 
 use crate::core::{Collect, Core};
@@ -23,6 +24,10 @@ pub(crate) struct Continuity {
     last_us: Option<i64>,
     /// The last bytes came late.
     late: bool,
+    /// When the flush under way was first asked for.
+    flushing_since: Option<HostTime>,
+    /// Everything up to then was handed over.
+    flushed_to: Option<HostTime>,
 }
 
 /// How a chunk's time compares with the host's.
@@ -64,6 +69,27 @@ impl Continuity {
         } else {
             Pace::Even
         }
+    }
+
+    /// Takes the answer to a flush that was asked for at `now`; one that is under way is no fault.
+    pub(crate) fn flush(
+        &mut self,
+        now: HostTime,
+        answer: Result<(), DeviceError>,
+    ) -> Result<(), DeviceError> {
+        let since = *self.flushing_since.get_or_insert(now);
+        match answer {
+            Err(DeviceError::Pending { .. }) => return Ok(()),
+            Ok(()) => self.flushed_to = Some(since),
+            Err(_) => {}
+        }
+        self.flushing_since = None;
+        answer
+    }
+
+    /// Whether everything up to `t` was handed over.
+    pub(crate) fn is_flushed_to(&self, t: HostTime) -> bool {
+        self.flushed_to.is_some_and(|to| to >= t)
     }
 
     /// Up to when, by the host's clock, the stream tells what the camera saw. By the camera's own time where it tells one: bytes that
@@ -112,7 +138,10 @@ impl Core<'_> {
         let end = self.end_of_press();
         let within = self.settings.data_within;
         self.collect(Collect::Flush)?;
-        while self.first_behind(end).is_some() && self.now() < end + within {
+        // A camera that does not answer a flush is a fault in the end.
+        while !self.is_flushed_to(end)
+            || self.first_behind(end).is_some() && self.now() < end + within
+        {
             self.tick(None)?;
             self.collect(Collect::Flush)?;
         }
@@ -129,6 +158,11 @@ impl Core<'_> {
             }
         }
         Ok(())
+    }
+
+    /// Whether both cameras have handed over everything up to `t`.
+    pub(crate) fn is_flushed_to(&self, t: HostTime) -> bool {
+        self.continuity.iter().all(|c| c.is_flushed_to(t))
     }
 
     /// A camera whose stream has not come to `end`.

@@ -272,14 +272,19 @@ impl<'a> Core<'a> {
         self.journal.emit(Record::Poses(block))
     }
 
-    /// Takes what both cameras have and emits it, also what came before one failed.
+    /// Takes what both cameras have and emits it, also what came before one failed. A camera that needs longer for a flush hands over
+    /// the rest later: see [`Continuity::is_flushed_to`].
     pub(crate) fn collect(&mut self, how: Collect) -> Result<(), ControllerError> {
         let mut answer = Ok(());
         for camera in CameraId::ALL {
+            let now = self.clock.now();
             let device = self.cameras[camera.index()].as_mut();
             let taken = match how {
                 Collect::Poll => device.poll(&mut self.chunks),
-                Collect::Flush => device.flush(&mut self.chunks),
+                Collect::Flush => {
+                    let flushed = device.flush(&mut self.chunks);
+                    self.continuity[camera.index()].flush(now, flushed)
+                }
             };
             let emitted = self.emit_chunks();
             answer = answer.and(emitted).and(taken.map_err(Into::into));
@@ -381,6 +386,8 @@ impl<'a> Core<'a> {
                 self.line_free_at = sent.t + trigger.capabilities().train_duration;
                 self.journal.emit(Record::MarkSent(sent))
             }
+            // On its way: the next turn asks for the answer.
+            Err(DeviceError::Pending { .. }) => Ok(()),
             // Still busy: the next turn tries again.
             Err(DeviceError::State { .. })
                 if now - self.marks_since < self.settings.mark_within =>

@@ -1,5 +1,6 @@
 //! Suspension: a run waits at clearance height while something disturbs it, and goes on by itself when that is over.
 
+use skinrig_device::DeviceError;
 use skinrig_model::{CameraId, HostDuration, HostTime, InterruptionKind, RawChunk, Record};
 use skinrig_protocol::{Suspend, Threshold, UnderWay};
 
@@ -244,8 +245,13 @@ impl Core<'_> {
         if now - from < WINDOW {
             return Ok(());
         }
-        // A chunk may take long to fill, and what it holds belongs to this window.
-        self.collect(Collect::Flush)?;
+        // A chunk may take long to fill, and what it holds belongs to this window. Not handed over yet: the next turn looks again.
+        if !self.is_flushed_to(from + WINDOW) {
+            self.collect(Collect::Flush)?;
+        }
+        if !self.is_flushed_to(from + WINDOW) {
+            return Ok(());
+        }
         self.suspender.window_from = Some(now);
         let measured = Measured {
             temperatures_c: self.temperatures(now)?,
@@ -297,7 +303,10 @@ impl Core<'_> {
             if !self.suspender.watches_heat(camera) {
                 continue;
             }
-            let told = self.cameras[camera.index()].temperature_c()?;
+            let told = match self.cameras[camera.index()].temperature_c() {
+                Err(DeviceError::Pending { .. }) => continue, // told in the next window
+                other => other?,
+            };
             if told.is_none() {
                 self.suspender.leave_heat(camera);
                 let text = format!(

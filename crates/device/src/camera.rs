@@ -125,7 +125,8 @@ pub trait EventCamera: Send {
     /// been handed over.
     ///
     /// # Errors
-    /// As [`poll`](Self::poll).
+    /// As [`poll`](Self::poll). [`DeviceError::Pending`] from a camera that needs longer: everything up to the first of the calls
+    /// that were answered so is handed over with the one that is not.
     fn flush(&mut self, chunks: &mut Vec<RawChunk>) -> Result<(), DeviceError>;
 
     /// Flushes and stops. Allowed in every state, any number of times.
@@ -144,7 +145,7 @@ pub trait EventCamera: Send {
     /// the device.
     ///
     /// # Errors
-    /// [`DeviceError::Lost`] when a camera that could tell does not answer.
+    /// [`DeviceError::Lost`] when a camera that could tell does not answer; [`DeviceError::Pending`] from one that needs longer.
     fn temperature_c(&mut self) -> Result<Option<f64>, DeviceError> {
         Ok(None)
     }

@@ -1,6 +1,6 @@
 //! What can go wrong with a device.
 
-use skinrig_model::DeviceRole;
+use skinrig_model::{DeviceRole, HostDuration};
 
 /// A device failed, or was asked for something that it cannot do.
 ///
@@ -16,6 +16,30 @@ pub enum DeviceError {
         serial: String,
         /// What was seen.
         detail: String,
+    },
+    /// The device did not answer a call in time, which may still be under way. What it was asked may or may not be carried out.
+    #[error(
+        "{role} {serial}: not answering: expected an answer to `{doing}` within {within}, found none"
+    )]
+    Silent {
+        /// Which device.
+        role: DeviceRole,
+        /// Its serial number.
+        serial: String,
+        /// The call.
+        doing: &'static str,
+        /// How long it was given.
+        within: HostDuration,
+    },
+    /// Asked, and not answered yet: no fault. Whoever asked makes the same call again at the next look.
+    #[error("{role} {serial}: expected an answer to `{doing}`, found it under way; ask again")]
+    Pending {
+        /// Which device.
+        role: DeviceRole,
+        /// Its serial number.
+        serial: String,
+        /// The call.
+        doing: &'static str,
     },
     /// A setting did not read back as written.
     #[error("{role} {serial}: {name}: expected {expected} after writing, found {found}")]

@@ -24,7 +24,8 @@ pub trait TriggerBox: Send {
     ///
     /// # Errors
     /// [`DeviceError::State`] while a train is under way; [`DeviceError::Refused`] for a press id that does
-    /// not fit a train; [`DeviceError::Lost`].
+    /// not fit a train; [`DeviceError::Lost`]. [`DeviceError::Pending`] from a box that needs longer: the answer comes when the same
+    /// mark is asked for again, which sends nothing twice.
     fn send(&mut self, mark: Mark) -> Result<SentMark, DeviceError>;
 
     /// Appends what the box reported since the last call, in the order in which it came: exchanges of time with the

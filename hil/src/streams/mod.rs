@@ -167,6 +167,7 @@ impl<'a> Streams<'a> {
                     }
                     return true;
                 }
+                Err(DeviceError::Pending { .. }) => self.step(self.now() + STEP, see),
                 Err(DeviceError::State { .. }) if self.now() < until => self.step(until, see),
                 Err(e) => self.box_trouble = Some(trouble::of(&e)),
             }
@@ -263,6 +264,10 @@ impl<'a> Streams<'a> {
             };
             self.take(see);
             let live = &mut self.cameras[i];
+            let fetched = match fetched {
+                Err(DeviceError::Pending { .. }) => Ok(()), // the rest comes with a later look
+                other => other,
+            };
             if let Err(e) = fetched {
                 live.trouble = Some(trouble::of(&e));
             } else if all {
@@ -288,7 +293,7 @@ impl<'a> Streams<'a> {
         };
         match trigger.poll(&mut self.reports) {
             Ok(()) => {}
-            Err(e @ DeviceError::Lost { .. }) => {
+            Err(e @ (DeviceError::Lost { .. } | DeviceError::Silent { .. })) => {
                 self.box_trouble.get_or_insert_with(|| trouble::of(&e));
             }
             // Something unreadable on its line: it goes on.

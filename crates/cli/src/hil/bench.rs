@@ -119,11 +119,12 @@ impl RealBench {
         if setup.model == "evk1" {
             let opened = bench::evk1(setup, camera, self.clock);
             return match opened {
-                Ok(evk1) => Ok(Box::new(evk1)),
+                Ok(evk1) => bench::detached_camera(Box::new(evk1), self.rig.kind, self.clock)
+                    .map_err(|e| skinrig_hil::trouble::of(&e)),
                 Err(e) => Err(trouble::camera(&e, subject, held)),
             };
         }
-        bench::open_camera(setup, camera, self.clock).map_err(|failure| {
+        bench::open_camera(setup, self.rig.kind, camera, self.clock).map_err(|failure| {
             let what = failure.message;
             Box::new(Evidence::new(EvidenceKind::Absent, subject, what))
         })
@@ -186,10 +187,10 @@ impl Bench for RealBench {
         if let (Some(slot @ Err(_)), Some(setup)) =
             (&mut devices.trigger_box, &self.rig.trigger_box)
         {
-            *slot = match bench::trigger_box(setup, self.rig.kind, self.clock) {
-                Ok(device) => Ok(Box::new(device)),
-                Err(e) => Err(trouble::trigger_box(&e, setup)),
-            };
+            let kind = self.rig.kind;
+            *slot = bench::trigger_box(setup, kind, self.clock)
+                .and_then(|device| bench::detached_box(Box::new(device), kind, self.clock))
+                .map_err(|e| trouble::trigger_box(&e, setup));
         }
         let mut firmware = Vec::new();
         if let Ok(robot) = &devices.robot {

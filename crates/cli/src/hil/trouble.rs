@@ -101,7 +101,8 @@ pub fn trigger_box(error: &DeviceError, setup: &BoxSetup) -> Trouble {
         DeviceError::Refused { .. } => EvidenceKind::OtherDevice,
         DeviceError::ReadBack { .. } => EvidenceKind::ReadBack,
         DeviceError::State { .. } => EvidenceKind::State,
-        DeviceError::Diverged { .. } => EvidenceKind::Software,
+        DeviceError::Silent { .. } => EvidenceKind::DeviceLost,
+        DeviceError::Diverged { .. } | DeviceError::Pending { .. } => EvidenceKind::Software,
     };
     trouble(kind, "trigger box", error)
 }

@@ -5,8 +5,8 @@ use std::time::Duration;
 
 use skinrig_controller::ControllerSettings;
 use skinrig_device::{
-    CameraSettings, DeviceError, EventCamera, Indenter, NoiseFilter, RealClock, Rig, Roi, SyncMode,
-    TriggerBox,
+    CameraSettings, DetachedBox, DetachedCamera, DeviceError, EventCamera, Indenter, NoiseFilter,
+    Patience, RealClock, Rig, Roi, SyncMode, TriggerBox,
 };
 use skinrig_evk1::biases::parse_bias_file;
 use skinrig_evk1::{Evk1, Evk1Config, Evk1Error, Tolerance};
@@ -66,8 +66,8 @@ pub fn open(rig: &RigFile, protocol: &Protocol) -> Result<Rig, Failure> {
     ];
     let indenter = open_robot(rig, clock)?;
     let cameras = [
-        open_camera(&rig.cameras[0], CameraId::One, clock)?,
-        open_camera(&rig.cameras[1], CameraId::Two, clock)?,
+        open_camera(&rig.cameras[0], rig.kind, CameraId::One, clock)?,
+        open_camera(&rig.cameras[1], rig.kind, CameraId::Two, clock)?,
     ];
     let trigger_box = match &rig.trigger_box {
         Some(setup) => Some(open_trigger_box(setup, rig.kind, clock)?),
@@ -261,19 +261,59 @@ fn axis(word: &str) -> Axis {
     }
 }
 
+/// How long a device of a rig of this kind may take to answer before it counts as silent.
+const fn patience(kind: RigKind) -> Patience {
+    match kind {
+        // Stand-ins share the processors of this computer; beyond the time limit of the emulated box.
+        RigKind::Emulated => Patience {
+            running: HostDuration::from_millis(12_000),
+            set_up: HostDuration::from_millis(60_000),
+        },
+        RigKind::Bench => Patience::BENCH,
+    }
+}
+
+/// The camera on a thread of its own: none of its calls holds up whoever moves the robot.
+///
+/// # Errors
+/// [`DeviceError::Lost`] when there is no thread to be had.
+pub(crate) fn detached_camera(
+    device: Box<dyn EventCamera>,
+    kind: RigKind,
+    clock: RealClock,
+) -> Result<Box<dyn EventCamera>, DeviceError> {
+    let detached = DetachedCamera::new(device, Box::new(clock), patience(kind))?;
+    Ok(Box::new(detached))
+}
+
+/// As [`detached_camera`], the trigger box.
+///
+/// # Errors
+/// As there.
+pub(crate) fn detached_box(
+    device: Box<dyn TriggerBox>,
+    kind: RigKind,
+    clock: RealClock,
+) -> Result<Box<dyn TriggerBox>, DeviceError> {
+    let detached = DetachedBox::new(device, Box::new(clock), patience(kind))?;
+    Ok(Box::new(detached))
+}
+
 pub(crate) fn open_camera(
     setup: &CameraSetup,
+    kind: RigKind,
     camera: CameraId,
     clock: RealClock,
 ) -> Result<Box<dyn EventCamera>, Failure> {
-    if setup.model != "evk1" {
-        return evt3_camera::open(setup, camera, clock);
-    }
-    Ok(Box::new(evk1(setup, camera, clock).map_err(|e| {
-        Failure::rig(format!(
-            "{camera}: {e}\n  next: `skinrig devices` shows what is connected"
-        ))
-    })?))
+    let device = match setup.model {
+        "evk1" => Box::new(evk1(setup, camera, clock).map_err(|e| {
+            Failure::rig(format!(
+                "{camera}: {e}\n  next: `skinrig devices` shows what is connected"
+            ))
+        })?),
+        _ => evt3_camera::open(setup, camera, clock)?,
+    };
+    detached_camera(device, kind, clock).map_err(Failure::rig)
 }
 
 /// The driver of an EVK1.
@@ -346,9 +386,8 @@ fn open_trigger_box(
     kind: RigKind,
     clock: RealClock,
 ) -> Result<Box<dyn TriggerBox>, Failure> {
-    Ok(Box::new(
-        trigger_box(setup, kind, clock).map_err(Failure::rig)?,
-    ))
+    let device = trigger_box(setup, kind, clock).map_err(Failure::rig)?;
+    detached_box(Box::new(device), kind, clock).map_err(Failure::rig)
 }
 
 /// The trigger box's driver; the box is armed.
@@ -399,7 +438,8 @@ mod tests {
         let text = EXAMPLE.replacen(second, &format!("{second}\n    model: evk4"), 1);
         let rig = RigFile::parse("rig.yaml", text.as_bytes(), &|_| None).ok();
         let camera = rig.as_ref().map(|r| &r.cameras[1]);
-        let refused = camera.map(|c| open_camera(c, CameraId::Two, RealClock::start()).err());
+        let refused =
+            camera.map(|c| open_camera(c, RigKind::Bench, CameraId::Two, RealClock::start()).err());
         let said = refused.flatten().map(|e| e.message).unwrap_or_default();
         assert!(said.contains("found `evk4`"), "{said}");
         assert!(

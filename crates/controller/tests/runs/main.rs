@@ -1,5 +1,6 @@
 //! The controller on a scripted rig.
 
+mod blocking;
 mod broken_off;
 mod course;
 mod edges;

@@ -2,7 +2,7 @@
 
 use skinrig_model::{HostDuration, HostTime, RawChunk};
 
-use super::pass;
+use super::{answered, pass};
 use crate::{CameraSettings, Clock, DeviceError, EventCamera, Roi, TestPattern};
 
 /// The promises of [`EventCamera`]. `make` gives a fresh, stopped camera and its clock; `settings` are what
@@ -20,7 +20,7 @@ fn camera_states(
     make: &mut dyn FnMut() -> (Box<dyn EventCamera>, Box<dyn Clock>),
     settings: &CameraSettings,
 ) {
-    let (mut camera, _clock) = make();
+    let (mut camera, mut clock) = make();
     let mut chunks = Vec::new();
     assert!(
         !camera.identity().model.is_empty(),
@@ -74,13 +74,11 @@ fn camera_states(
         DeviceError::State { .. },
         "camera: configure while streaming must be a State error"
     );
-    let hot = camera
-        .temperature_c()
+    let hot = answered(clock.as_mut(), || camera.temperature_c())
         .expect("camera: temperature while streaming");
     camera.stop(&mut chunks).expect("camera: stop");
     camera.stop(&mut chunks).expect("camera: stop twice");
-    let cold = camera
-        .temperature_c()
+    let cold = answered(clock.as_mut(), || camera.temperature_c())
         .expect("camera: temperature while stopped");
     assert_eq!(
         hot.map(f64::is_finite),
@@ -109,10 +107,9 @@ fn camera_stream(
         pass(clock.as_mut(), HostDuration::from_millis(300), || {
             camera.poll(&mut all).expect("camera: poll");
         });
-        let at = clock.now();
-        camera.flush(&mut all).expect("camera: flush");
-        let after = all.len();
-        camera.flush(&mut all).expect("camera: flush again");
+        answered(clock.as_mut(), || camera.flush(&mut all)).expect("camera: flush");
+        let (after, at) = (all.len(), clock.now());
+        answered(clock.as_mut(), || camera.flush(&mut all)).expect("camera: flush again");
         // On a clock that does not stand still, bytes arrive between any two calls.
         assert!(
             all.len() == after || clock.now() > at,
@@ -122,7 +119,7 @@ fn camera_stream(
         camera.stop(&mut all).expect("camera: stop");
         let stopped = all.len();
         camera.poll(&mut all).expect("camera: poll after stop");
-        camera.flush(&mut all).expect("camera: flush after stop");
+        answered(clock.as_mut(), || camera.flush(&mut all)).expect("camera: flush after stop");
         assert_eq!(all.len(), stopped, "camera: a stopped camera sends nothing");
         if round == 0 {
             let bytes: usize = all[before..].iter().map(|c| c.bytes.len()).sum();

@@ -8,7 +8,7 @@
 
 use skinrig_model::{HostDuration, HostTime};
 
-use crate::Clock;
+use crate::{Clock, DeviceError};
 
 /// Asserts that `answer` is an error of the kind named by `pattern`.
 macro_rules! expect_error {
@@ -30,6 +30,19 @@ fn pass(clock: &mut dyn Clock, span: HostDuration, mut look: impl FnMut()) {
         let next = clock.now() + TICK;
         clock.wait_until(if next < end { next } else { end });
         look();
+    }
+}
+
+/// Asks until the device has answered.
+fn answered<T>(
+    clock: &mut dyn Clock,
+    mut ask: impl FnMut() -> Result<T, DeviceError>,
+) -> Result<T, DeviceError> {
+    loop {
+        match ask() {
+            Err(DeviceError::Pending { .. }) => pass(clock, TICK, || {}),
+            answer => return answer,
+        }
     }
 }
 

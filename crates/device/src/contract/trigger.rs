@@ -2,7 +2,7 @@
 
 use skinrig_model::{HostDuration, HostTime, Mark, PressId, SentMark};
 
-use super::{TICK, pass};
+use super::{TICK, answered, pass};
 use crate::{Clock, DeviceError, TriggerBox};
 
 /// The promises of [`TriggerBox`]. `make` gives a fresh box and its clock; `marks` are at least two different
@@ -25,14 +25,15 @@ pub fn trigger_box(
     let mut impossible = marks[0];
     impossible.press = PressId::from_index(skinrig_model::pulse::MAX_MARKED_PRESS + 1);
     expect_error!(
-        device.send(impossible),
+        answered(clock.as_mut(), || device.send(impossible)),
         DeviceError::Refused { .. },
         "trigger box: a press id that does not fit must be refused"
     );
     let mut last: Option<HostTime> = None;
     for &mark in marks {
         let before = clock.now();
-        let sent = device.send(mark).expect("trigger box: a good mark");
+        let sent =
+            answered(clock.as_mut(), || device.send(mark)).expect("trigger box: a good mark");
         assert_eq!(sent.mark, mark, "trigger box: sent another mark");
         assert!(
             sent.uncertainty_ns >= 0,
@@ -49,7 +50,7 @@ pub fn trigger_box(
         );
         last = Some(sent.t);
         let mut free = over_for_certain(sent, train);
-        match device.send(mark) {
+        match answered(clock.as_mut(), || device.send(mark)) {
             Err(DeviceError::State { .. }) => {}
             // On a real clock the train may be over before the question reaches the box.
             Ok(again) if clock.now() >= sent.t + train + HostDuration(-sent.uncertainty_ns) => {

@@ -4,9 +4,12 @@ use std::sync::{Arc, Mutex};
 
 use crate::common::{LIMITS, Log, noted};
 use skinrig_device::contract::{self, IndenterContract};
-use skinrig_device::{Clock, EventCamera, Indenter, Rig, TriggerBox};
+use skinrig_device::detached::Calls;
+use skinrig_device::{
+    Clock, DetachedBox, DetachedCamera, EventCamera, Indenter, Patience, Rig, TriggerBox,
+};
 use skinrig_model::{
-    CameraId, HostDuration, Mark, MarkKind, Point3, PressId, SimLevel, StreamFormat,
+    CameraId, HostDuration, HostTime, Mark, MarkKind, Point3, PressId, SimLevel, StreamFormat,
 };
 use skinrig_sim::replay::{RecordedRig, replayed_rig};
 use skinrig_sim::{Paced, SimClock, SimConfig, simulated_rig};
@@ -107,4 +110,69 @@ fn trigger_boxes_keep_the_contract() {
         };
         contract::trigger_box(&mut split, marks);
     });
+}
+
+/// A clock that goes on when the device has answered.
+#[derive(Clone)]
+struct SettledClock {
+    clock: Arc<Mutex<Box<dyn Clock>>>,
+    calls: Arc<Mutex<Option<Calls>>>,
+}
+
+impl SettledClock {
+    fn new(clock: Box<dyn Clock>) -> Self {
+        Self {
+            clock: Arc::new(Mutex::new(clock)),
+            calls: Arc::default(),
+        }
+    }
+}
+
+impl Clock for SettledClock {
+    fn now(&self) -> HostTime {
+        self.clock.lock().unwrap().now()
+    }
+    fn wait_until(&mut self, t: HostTime) {
+        let calls = self.calls.lock().unwrap().clone();
+        while calls.as_ref().is_some_and(|c| c.under_way() > 0) {
+            std::thread::yield_now();
+        }
+        self.clock.lock().unwrap().wait_until(t);
+    }
+}
+
+fn sim() -> Rig {
+    simulated_rig(&SimConfig::new(3, SimLevel::Geometric))
+}
+
+#[test]
+fn devices_on_threads_of_their_own_keep_the_contract() {
+    let settings = sim().camera_settings;
+    for id in CameraId::ALL {
+        let mut make = || -> (Box<dyn EventCamera>, Box<dyn Clock>) {
+            let rig = sim();
+            let clock = SettledClock::new(rig.clock);
+            let [one, two] = rig.cameras;
+            let camera = if id == CameraId::One { one } else { two };
+            let camera = DetachedCamera::new(camera, Box::new(clock.clone()), Patience::BENCH);
+            let camera = camera.expect("a thread");
+            *clock.calls.lock().unwrap() = Some(camera.calls());
+            (Box::new(camera), Box::new(clock))
+        };
+        contract::event_camera(&mut make, &settings[id.index()]);
+    }
+    let mark = |n| Mark {
+        kind: MarkKind::Contact,
+        press: PressId::from_index(n),
+    };
+    let mut make = || -> (Box<dyn TriggerBox>, Box<dyn Clock>) {
+        let rig = sim();
+        let clock = SettledClock::new(rig.clock);
+        let device = rig.trigger_box.expect("a trigger box");
+        let device = DetachedBox::new(device, Box::new(clock.clone()), Patience::BENCH);
+        let device = device.expect("a thread");
+        *clock.calls.lock().unwrap() = Some(device.calls());
+        (Box::new(device), Box::new(clock))
+    };
+    contract::trigger_box(&mut make, &[mark(1), mark(2)]);
 }

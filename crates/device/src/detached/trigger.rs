@@ -1,0 +1,94 @@
+//! A trigger box on a thread of its own.
+
+use skinrig_model::{BoxReport, DeviceIdentity, DeviceRole, Mark, SentMark};
+
+use super::{Call, Calls, Patience, Worker};
+use crate::{Clock, DeviceError, TriggerBox, TriggerCapabilities};
+
+type Device = Box<dyn TriggerBox>;
+type Answer<T> = Result<T, DeviceError>;
+
+/// A [`TriggerBox`] whose calls are carried out on a thread of its own. Reports come at the look after the one that asked for them.
+pub struct DetachedBox {
+    capabilities: TriggerCapabilities,
+    worker: Worker<Device>,
+    sending: Option<Call<(Mark, Answer<SentMark>)>>,
+    poll: Option<Call<(Vec<BoxReport>, Answer<()>)>>,
+}
+
+impl DetachedBox {
+    /// Takes a box to a thread of its own.
+    ///
+    /// # Errors
+    /// [`DeviceError::Lost`] when there is no thread to be had.
+    pub fn new(
+        device: Device,
+        clock: Box<dyn Clock>,
+        patience: Patience,
+    ) -> Result<Self, DeviceError> {
+        let (role, identity) = (DeviceRole::TriggerBox, device.identity());
+        Ok(Self {
+            capabilities: device.capabilities(),
+            worker: Worker::start(role, identity, device, clock, patience)?,
+            sending: None,
+            poll: None,
+        })
+    }
+
+    /// The calls that it has not answered.
+    #[must_use]
+    pub fn calls(&self) -> Calls {
+        self.worker.calls.clone()
+    }
+}
+
+impl TriggerBox for DetachedBox {
+    fn identity(&self) -> DeviceIdentity {
+        self.worker.identity.clone()
+    }
+
+    fn capabilities(&self) -> TriggerCapabilities {
+        self.capabilities
+    }
+
+    fn send(&mut self, mark: Mark) -> Answer<SentMark> {
+        match self.worker.answer(&mut self.sending)? {
+            Some((asked, answer)) if asked == mark => return answer,
+            // The answer for a mark that was given up; the box reports that train all the same.
+            Some(_) | None => {}
+        }
+        if self.sending.is_none() {
+            let within = self.worker.patience.running;
+            let call = move |d: &mut Device| (mark, d.send(mark));
+            self.sending = Some(self.worker.ask("send", within, call)?);
+        }
+        Err(self.worker.pending("send"))
+    }
+
+    fn poll(&mut self, reports: &mut Vec<BoxReport>) -> Answer<()> {
+        let answer = self.worker.answer(&mut self.poll)?;
+        if self.poll.is_none() {
+            let within = self.worker.patience.running;
+            let call = |d: &mut Device| {
+                let mut reports = Vec::new();
+                let answer = d.poll(&mut reports);
+                (reports, answer)
+            };
+            self.poll = Some(self.worker.ask("report", within, call)?);
+        }
+        let Some((fresh, answer)) = answer else {
+            return Ok(());
+        };
+        reports.extend(fresh);
+        answer
+    }
+
+    fn take_notes(&mut self) -> Vec<String> {
+        let told = self.worker.wait("notes", |d| d.take_notes());
+        told.unwrap_or_else(|e| {
+            vec![format!(
+                "what it lost is not known ({e}): look at the alignment certificate"
+            )]
+        })
+    }
+}
