@@ -1,8 +1,9 @@
 //! Where a session's numbers come from, gathered for the report.
 
+use crate::rig::bench::TOLERATED;
 use chrono::DateTime;
 use skinrig_analysis::Analysis;
-use skinrig_model::{HostTime, PressVerdict, RunEnd, RunHeader};
+use skinrig_model::{HostTime, PressVerdict, RunEnd, RunHeader, Setting};
 use skinrig_recorder::{RecorderError, SessionReader};
 use skinrig_report::{
     DeviceRow, InterruptionRow, LegRow, LossRow, NoteRow, Provenance, RetakenRow,
@@ -86,7 +87,7 @@ pub fn provenance(
         plan_sha256: header.plan_sha256.clone(),
         seed: header.seed,
         rig_kind: header.rig_kind.clone(),
-        rig_name: header.rig_name.clone(),
+        rig_name: rig_name(reader, header)?,
         simulated: header.rig_name.contains("simulated"),
         // A replay keeps the name, not the kind.
         emulated: header.rig_kind == "emulated" || header.rig_name.contains("emulated"),
@@ -105,6 +106,18 @@ pub fn provenance(
         lost_bytes,
         losses,
     })
+}
+
+/// The name of the rig. It says that mismatches were let pass also when only a later leg did so.
+fn rig_name(reader: &SessionReader, header: &RunHeader) -> Result<String, RecorderError> {
+    let mut name = header.rig_name.clone();
+    let devices = reader.devices()?;
+    let mut settings = devices.iter().flat_map(|d| &d.settings);
+    if !name.contains(TOLERATED) && settings.any(|s| s.requested == Setting::TOLERATED) {
+        name.push_str(TOLERATED);
+        name.push_str(" in a later leg");
+    }
+    Ok(name)
 }
 
 /// A leg that was cut off went on to at most this long before the next one's origin: the recorder leaves one to two seconds.

@@ -22,6 +22,7 @@ use crate::hil::lease;
 use crate::paths;
 use crate::progress::ProgressView;
 use crate::results::RigDocument;
+use crate::rig::tolerated::Tolerated;
 use crate::rig::{self, bench, gates, planted};
 use crate::run::{close, conclude, host_name};
 use crate::signals::Operator;
@@ -251,8 +252,7 @@ fn go_on(
         rig,
         preflight,
         notes,
-        // Until the session is closed.
-        lease: _lease,
+        bench,
     } = open_rig(args, found, protocol, &rest, wanted)?;
     let expected = skinrig_model::HostDuration::from_secs_f64(rest.summary().duration_s);
     let view = ProgressView::resumed(&found.plan.presses, &found.histories, wanted, expected);
@@ -279,7 +279,11 @@ fn go_on(
             histories: found.histories.clone(),
         })
         .execute();
-    close(sink, args.session.clone(), report, operator)
+    let closed = close(sink, args.session.clone(), report, operator);
+    if let Some(bench) = bench {
+        bench.tolerated.propose(&bench.file);
+    }
+    closed
 }
 
 /// The session's own protocol, read again: its text is in the session, files that it names are where they were.
@@ -325,8 +329,15 @@ struct Opened {
     preflight: Preflight,
     /// What is to be remarked about it.
     notes: Vec<String>,
-    /// Of a bench.
-    lease: Option<Lease>,
+    /// A bench, ours until the session is closed.
+    bench: Option<OpenBench>,
+}
+
+/// What stays with an opened bench.
+struct OpenBench {
+    tolerated: Tolerated,
+    file: RigFile,
+    _lease: Lease,
 }
 
 /// The rig of the session, opened.
@@ -341,6 +352,12 @@ fn open_rig(
     let header = &found.header;
     let summary = rest.summary();
     if header.rig_kind == "simulated" {
+        if args.tolerant {
+            return Err(Failure::input(format!(
+                "{}: expected no --tolerant, because the session is of the simulated rig, which has no mismatches",
+                args.session.display()
+            )));
+        }
         if let Some(file) = &args.rig {
             return Err(Failure::input(format!(
                 "{}: expected no --rig, because the session is of the simulated rig, found {}",
@@ -368,7 +385,7 @@ fn open_rig(
             rig,
             preflight,
             notes,
-            lease: None,
+            bench: None,
         });
     }
     let path = match (&args.rig, found.document.rig["file_name"].as_str()) {
@@ -381,11 +398,14 @@ fn open_rig(
             )));
         }
     };
-    let file = bench::load(&path)?;
+    let mut file = bench::load(&path)?;
+    if args.tolerant {
+        bench::tolerate(&mut file);
+    }
     planted::refuse(&args.faults, &bench::display_name(&file))?;
     same_bench(&file, found)?;
     let lease = lease::take(&file, &format!("resume {}", args.session.display()))?;
-    let rig = bench::open(&file, &protocol)?;
+    let (rig, tolerated) = bench::open(&file, &protocol)?;
     let notes = same_devices(&rig, &found.devices, args.allow_other_device)?;
     let mut preflight = gates::of_bench(&file, &rig, folder, summary.duration_s);
     preflight.made.insert(0, gates::recorder(&args.session));
@@ -393,7 +413,11 @@ fn open_rig(
         rig,
         preflight,
         notes,
-        lease: Some(lease),
+        bench: Some(OpenBench {
+            tolerated,
+            file,
+            _lease: lease,
+        }),
     })
 }
 

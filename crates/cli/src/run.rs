@@ -454,17 +454,19 @@ fn on_bench(
     }
     // Until the session is closed.
     let _lease = lease::take(&file, &format!("run {}", protocol.name))?;
-    let rig = bench::open(&file, &protocol)?;
+    let (rig, tolerated) = bench::open(&file, &protocol)?;
     let preflight = gates::of_bench(&file, &rig, &args.sessions, summary.duration_s);
     let intent = intent_of(&protocol, seed, summary.duration_s, command_line);
-    record(
+    let recorded = record(
         &intent,
         &plan,
         rig,
         &args.sessions,
         Some(preflight),
         operator,
-    )
+    );
+    tolerated.propose(&file);
+    recorded
 }
 
 /// What a run of `protocol` is to record.

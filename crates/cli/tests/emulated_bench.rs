@@ -8,6 +8,8 @@
 
 #[path = "emulated_bench/first_contact.rs"]
 mod first_contact;
+#[path = "emulated_bench/tolerant.rs"]
+mod tolerant;
 
 use std::fs;
 use std::path::{Path, PathBuf};

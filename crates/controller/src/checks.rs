@@ -196,7 +196,7 @@ pub fn identity_checks(
 
 /// The settings that were written and read back as something else; values that were only read do not count.
 pub fn differing(settings: &[Setting]) -> impl Iterator<Item = &Setting> {
-    let written = settings.iter().filter(|s| s.requested != Setting::AS_FOUND);
+    let written = settings.iter().filter(|s| s.was_requested());
     written.filter(|s| !same(&s.requested, &s.read_back))
 }
 
@@ -387,7 +387,7 @@ impl Core<'_> {
 
 /// Everything that was written reads back; values that were only read do not count.
 fn read_back(role: DeviceRole, settings: &[Setting]) -> PreflightCheck {
-    let written = settings.iter().filter(|s| s.requested != Setting::AS_FOUND);
+    let written = settings.iter().filter(|s| s.was_requested());
     let differing: Vec<String> = differing(settings)
         .map(|s| format!("{} {} instead of {}", s.name, s.read_back, s.requested))
         .collect();

@@ -89,6 +89,16 @@ pub struct Setting {
 impl Setting {
     /// In place of what was asked for: the value was only read.
     pub const AS_FOUND: &str = "as found";
+
+    /// In place of a requested value: a mismatch that was let pass; `read_back` says what was expected and found, and the name what
+    /// accepts it.
+    pub const TOLERATED: &str = "tolerated";
+
+    /// Whether a value was asked for, so that another one that is read back is a difference.
+    #[must_use]
+    pub fn was_requested(&self) -> bool {
+        self.requested != Self::AS_FOUND && self.requested != Self::TOLERATED
+    }
 }
 
 /// What is known before anything moves. Written first.

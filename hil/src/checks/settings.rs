@@ -1,7 +1,7 @@
 //! Checks: settings of the cameras, read back.
 
 use skinrig_controller::differing;
-use skinrig_model::CameraId;
+use skinrig_model::{CameraId, Setting};
 use skinrig_nightly::{Evidence, EvidenceKind};
 use skinrig_protocol::suite::Check;
 
@@ -50,6 +50,15 @@ fn one(camera: CameraId, bench: &mut dyn Bench, found: &mut Findings) {
         let (name, wrote, told) = (&setting.name, &setting.requested, &setting.read_back);
         let what = format!("{name}: expected {wrote} after writing, found {told}");
         let next = "power-cycle the camera; `read_back_exceptions` is for registers that a camera is known to read differently";
+        found
+            .evidence
+            .push(Evidence::new(EvidenceKind::ReadBack, subject, what).next(next));
+        count += 1;
+    }
+    // A night on tolerance must not look like one on settings that hold.
+    for mismatch in read.iter().filter(|s| s.requested == Setting::TOLERATED) {
+        let next = "add the key to the rig file if that is right for this camera, and run without --tolerant";
+        let what = format!("{}: {}", mismatch.name, mismatch.read_back);
         found
             .evidence
             .push(Evidence::new(EvidenceKind::ReadBack, subject, what).next(next));

@@ -120,6 +120,10 @@ pub struct ResumeArgs {
     #[arg(long, value_name = "FILE")]
     pub rig: Option<PathBuf>,
 
+    /// As `run --tolerant`, for this leg, on a bench: it is noted with the leg.
+    #[arg(long, conflicts_with = "real_time")]
+    pub tolerant: bool,
+
     /// Run the simulated rig at the speed of a real one.
     #[arg(long, conflicts_with = "rig")]
     pub real_time: bool,

@@ -81,6 +81,10 @@ pub struct HilRunArgs {
     #[arg(long, value_name = "FILE")]
     pub rig: PathBuf,
 
+    /// As `run --tolerant`, for every check and the golden campaign. What is let pass counts as a difference of the check `settings`.
+    #[arg(long)]
+    pub tolerant: bool,
+
     /// Folder in which the night gets a folder of its own, with its results, its page and its golden session.
     #[arg(long, value_name = "DIR", default_value = "nights")]
     pub out: PathBuf,

@@ -17,6 +17,7 @@ use skinrig_protocol::{CameraRequest, Protocol};
 use super::{drill, golden, trouble};
 use crate::exit::Failure;
 use crate::rig::bench;
+use crate::rig::tolerated::Tolerated;
 use crate::signals::Operator;
 
 /// How long a program that switches the lamps may take.
@@ -32,6 +33,7 @@ pub struct RealBench {
     command_line: String,
     clock: RealClock,
     devices: Option<Devices>,
+    tolerated: Tolerated,
     firmware: Vec<(String, String)>,
     // Last, so that it is released when every device is closed.
     lease: Option<Lease>,
@@ -48,6 +50,7 @@ impl RealBench {
             command_line: command_line.to_owned(),
             clock: RealClock::start(),
             devices: None,
+            tolerated: Tolerated::default(),
             firmware: Vec::new(),
             lease: None,
         }
@@ -72,6 +75,11 @@ impl RealBench {
     #[must_use]
     pub fn command_line(&self) -> &str {
         &self.command_line
+    }
+
+    /// Prints the lines of the rig file that accept what was let pass.
+    pub fn propose(&self) {
+        self.tolerated.propose(&self.rig);
     }
 
     /// Opens every device and puts them together as the rig of a run of `protocol`, with a clock that begins with it. Nothing is
@@ -113,18 +121,22 @@ impl RealBench {
     }
 
     /// `held` cameras of this bench are open already: busy for everybody else.
-    fn open_camera(&self, camera: CameraId, held: usize) -> Slot<dyn EventCamera> {
+    fn open_camera(&mut self, camera: CameraId, held: usize) -> Slot<dyn EventCamera> {
         let setup = &self.rig.cameras[camera.index()];
         let subject = subject(camera);
         if setup.model == "evk1" {
             let opened = bench::evk1(setup, camera, self.clock);
             return match opened {
-                Ok(evk1) => bench::detached_camera(Box::new(evk1), self.rig.kind, self.clock)
-                    .map_err(|e| skinrig_hil::trouble::of(&e)),
+                Ok(evk1) => {
+                    self.tolerated.add(camera, evk1.tolerated());
+                    bench::detached_camera(Box::new(evk1), self.rig.kind, self.clock)
+                        .map_err(|e| skinrig_hil::trouble::of(&e))
+                }
                 Err(e) => Err(trouble::camera(&e, subject, held)),
             };
         }
-        bench::open_camera(setup, self.rig.kind, camera, self.clock).map_err(|failure| {
+        let (kind, clock) = (self.rig.kind, self.clock);
+        bench::open_camera(setup, kind, camera, clock, &mut self.tolerated).map_err(|failure| {
             let what = failure.message;
             Box::new(Evidence::new(EvidenceKind::Absent, subject, what))
         })

@@ -5,8 +5,8 @@ use std::path::Path;
 
 use chrono::{SecondsFormat, Utc};
 use skinrig_device::RealClock;
-use skinrig_hil::Tonight;
 use skinrig_hil::runner::plan::Known;
+use skinrig_hil::{Bench as _, Tonight};
 use skinrig_model::HostDuration;
 use skinrig_nightly::night::NIGHT_VERSION;
 use skinrig_nightly::{Night, NightExit, Verdict, Versions};
@@ -34,7 +34,10 @@ pub fn run(args: &HilRunArgs, command_line: &str, json: bool) -> Outcome {
     // Before any device is opened: from then on a robot may be live.
     let operator = Operator::of_suite().map_err(Failure::rig)?;
     let suite = load(&args.suite)?;
-    let rig = bench::load(&args.rig)?;
+    let mut rig = bench::load(&args.rig)?;
+    if args.tolerant {
+        bench::tolerate(&mut rig);
+    }
     bench::refuse_without_sample(&rig)?;
     inputs::check(&rig)?;
     known_checks(&suite, args.only.as_deref())?;
@@ -75,6 +78,8 @@ pub fn run(args: &HilRunArgs, command_line: &str, json: bool) -> Outcome {
     let night = tonight.run(night, &mut bench, &mut live);
     let unwritten = live.finish();
     // Nothing is open any more.
+    bench.close();
+    bench.propose();
     drop(bench);
     let trends = keep(&night, &folder, args.history.as_deref());
     if json {

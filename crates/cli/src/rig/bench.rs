@@ -20,6 +20,7 @@ use skinrig_protocol::rig::{BoxSetup, CameraSetup, RigFile, RigKind, SyncRole};
 use skinrig_trigger_box::{SerialTriggerBox, TriggerBoxConfig};
 
 use super::evt3_camera;
+use super::tolerated::Tolerated;
 use crate::exit::Failure;
 
 /// Reads the rig file at `path`.
@@ -51,12 +52,12 @@ pub fn tighten(protocol: &mut Protocol, rig: &RigFile) {
     protocol.surface = protocol.surface.or(rig.surface);
 }
 
-/// Opens every device of `rig`. The robot stays braked.
+/// Opens every device of `rig`, and tells what is let pass of them. The robot stays braked.
 ///
 /// # Errors
 /// [`Failure::input`] when the file says that the sample is off: a run presses it, and an arm that lost its power must not
 /// sweep through it. [`Failure::rig`] naming the device that could not be opened and the next step.
-pub fn open(rig: &RigFile, protocol: &Protocol) -> Result<Rig, Failure> {
+pub fn open(rig: &RigFile, protocol: &Protocol) -> Result<(Rig, Tolerated), Failure> {
     refuse_without_sample(rig)?;
     let clock = RealClock::start();
     // Settings first: a bad bias file is no reason to have opened a device.
@@ -65,22 +66,25 @@ pub fn open(rig: &RigFile, protocol: &Protocol) -> Result<Rig, Failure> {
         camera_settings(&rig.cameras[1], &protocol.cameras[1])?,
     ];
     let indenter = open_robot(rig, clock)?;
-    let cameras = [
-        open_camera(&rig.cameras[0], rig.kind, CameraId::One, clock)?,
-        open_camera(&rig.cameras[1], rig.kind, CameraId::Two, clock)?,
-    ];
+    let mut tolerated = Tolerated::default();
+    let mut open_one = |camera: CameraId| {
+        let setup = &rig.cameras[camera.index()];
+        open_camera(setup, rig.kind, camera, clock, &mut tolerated)
+    };
+    let cameras = [open_one(CameraId::One)?, open_one(CameraId::Two)?];
     let trigger_box = match &rig.trigger_box {
         Some(setup) => Some(open_trigger_box(setup, rig.kind, clock)?),
         None => None,
     };
-    assemble(
+    let rig = assemble(
         (rig, protocol),
         camera_settings,
         indenter,
         cameras,
         trigger_box,
         clock,
-    )
+    )?;
+    Ok((rig, tolerated))
 }
 
 /// Open devices as the rig of a run.
@@ -151,6 +155,9 @@ pub fn settings(kind: &str) -> ControllerSettings {
     settings
 }
 
+/// In the name of a rig whose mismatches were let pass.
+pub const TOLERATED: &str = ", mismatches tolerated";
+
 /// The bench's name, which always says when it is emulated.
 #[must_use]
 pub fn display_name(rig: &RigFile) -> String {
@@ -161,7 +168,7 @@ pub fn display_name(rig: &RigFile) -> String {
     }
     // In the name, so that no report of such a session can be read without it.
     if rig.cameras.iter().any(|c| c.tolerant) {
-        name.push_str(", mismatches tolerated");
+        name.push_str(TOLERATED);
     }
     name
 }
@@ -304,13 +311,18 @@ pub(crate) fn open_camera(
     kind: RigKind,
     camera: CameraId,
     clock: RealClock,
+    tolerated: &mut Tolerated,
 ) -> Result<Box<dyn EventCamera>, Failure> {
     let device = match setup.model {
-        "evk1" => Box::new(evk1(setup, camera, clock).map_err(|e| {
-            Failure::rig(format!(
-                "{camera}: {e}\n  next: `skinrig devices` shows what is connected"
-            ))
-        })?),
+        "evk1" => {
+            let opened = evk1(setup, camera, clock).map_err(|e| {
+                Failure::rig(format!(
+                    "{camera}: {e}\n  next: `skinrig devices` shows what is connected"
+                ))
+            })?;
+            tolerated.add(camera, opened.tolerated());
+            Box::new(opened)
+        }
         _ => evt3_camera::open(setup, camera, clock)?,
     };
     detached_camera(device, kind, clock).map_err(Failure::rig)
@@ -438,8 +450,11 @@ mod tests {
         let text = EXAMPLE.replacen(second, &format!("{second}\n    model: evk4"), 1);
         let rig = RigFile::parse("rig.yaml", text.as_bytes(), &|_| None).ok();
         let camera = rig.as_ref().map(|r| &r.cameras[1]);
-        let refused =
-            camera.map(|c| open_camera(c, RigKind::Bench, CameraId::Two, RealClock::start()).err());
+        let refused = camera.map(|c| {
+            let mut tolerated = Tolerated::default();
+            let clock = RealClock::start();
+            open_camera(c, RigKind::Bench, CameraId::Two, clock, &mut tolerated).err()
+        });
         let said = refused.flatten().map(|e| e.message).unwrap_or_default();
         assert!(said.contains("found `evk4`"), "{said}");
         assert!(

@@ -5,6 +5,7 @@ pub mod evt3_camera;
 pub mod gates;
 pub mod inputs;
 pub mod planted;
+pub mod tolerated;
 
 use std::path::Path;
 

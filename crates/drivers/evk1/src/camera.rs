@@ -22,7 +22,7 @@ use crate::inbox::{Inbox, Taken};
 use crate::registers::{CHIP_ID, OVERFLOW_HITCOUNT, TEMPERATURE};
 use crate::report::StreamReport;
 use crate::settings::Checked;
-use crate::tolerance::{Mismatch, Mismatches, Tolerance};
+use crate::tolerance::{Accept, Mismatch, Mismatches, Tolerance};
 use crate::triggers::{self, CHANNELS, TriggerOut};
 use crate::usb::Transport;
 use crate::{noise_filter, pattern, sequences, sync};
@@ -72,7 +72,7 @@ fn reset(
         Err(e) if tolerance.failed_reset && e != UsbError::Gone => Ok(()),
         Err(e) if tolerance.everything && e != UsbError::Gone => {
             seen.add(
-                "failed_reset: accepted",
+                Accept::FailedReset,
                 format!("expected a reset on the bus, found {e}"),
             );
             Ok(())
@@ -178,6 +178,12 @@ impl Evk1 {
     #[must_use]
     pub fn mismatches(&self) -> Vec<Mismatch> {
         self.seen.all()
+    }
+
+    /// The list itself, which goes on growing while the camera runs.
+    #[must_use]
+    pub fn tolerated(&self) -> Mismatches {
+        self.seen.clone()
     }
 
     /// What happened to the stream that runs, or to the last one.
@@ -325,7 +331,7 @@ impl Evk1 {
         self.settings = Some(checked);
         read.extend(self.seen.all().into_iter().map(|mismatch| Setting {
             name: format!("tolerated: {}", mismatch.key),
-            requested: "nothing".to_owned(),
+            requested: Setting::TOLERATED.to_owned(),
             read_back: mismatch.what,
         }));
         Ok(read)
@@ -495,6 +501,12 @@ impl Evk1 {
         if let (true, Some((_, hits))) = (self.config.overflow_is_loss, self.report.overflow_hits) {
             let now = self.clock.now();
             self.follow_overflow(&mut stream.overflow, hits, now, chunks);
+        }
+        self.report.failed_transfers = stream.inbox.failed_transfers();
+        let failed = self.report.failed_transfers;
+        if failed > 0 && !self.config.tolerance.failed_transfers {
+            let found = format!("expected transfers that succeed, found {failed} that failed");
+            self.seen.add(Accept::FailedTransfers, found);
         }
         self.notes.extend(self.report.notes());
         let tolerated = self.seen.all().into_iter();

@@ -60,6 +60,8 @@ struct State {
     /// Bytes since the start, modulo the size of a word, kept or not.
     phase: usize,
     error: Option<UsbError>,
+    /// Transfers that failed and were counted as a loss.
+    failed_transfers: u64,
 }
 
 /// What the driver took out.
@@ -101,12 +103,19 @@ impl Inbox {
         }
     }
 
-    /// Something was lost at `at`, nobody knows how much: it counts as one word, and what comes next begins a word.
+    /// A transfer failed and something was lost at `at`, nobody knows how much: it counts as one word, and what comes next begins a word.
     pub fn lose_some(&self, at: HostTime) {
         let mut state = self.state();
         state.close();
         state.lose(WORD, at);
         state.phase = 0;
+        state.failed_transfers += 1;
+    }
+
+    /// How often a transfer failed and something was lost with it.
+    #[must_use]
+    pub fn failed_transfers(&self) -> u64 {
+        self.state().failed_transfers
     }
 
     /// Notes what ended the stream; the first one counts.

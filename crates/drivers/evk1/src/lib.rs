@@ -36,5 +36,5 @@ pub use config::Evk1Config;
 pub use error::{Evk1Error, UsbError};
 pub use identify::{Found, FoundState, Identity, UDEV_STEP, enumerate};
 pub use report::StreamReport;
-pub use tolerance::{Mismatch, Mismatches, Tolerance};
+pub use tolerance::{Accept, Mismatch, Mismatches, Tolerance};
 pub use triggers::TriggerOut;

@@ -19,6 +19,8 @@ pub struct StreamReport {
     pub lost_bytes: u64,
     /// How often bytes were lost.
     pub loss_count: u64,
+    /// Transfers that failed, each a loss; told when the stream stops.
+    pub failed_transfers: u64,
     /// Host time over which they were lost, together.
     pub lost_time: HostDuration,
     /// The first losses.
@@ -77,6 +79,12 @@ impl StreamReport {
             notes.push(format!(
                 "{} bytes were lost on the host in {} gaps of {} together",
                 self.lost_bytes, self.loss_count, self.lost_time
+            ));
+        }
+        if self.failed_transfers > 0 {
+            notes.push(format!(
+                "{} transfers failed, and what they held is lost: how much is not known",
+                self.failed_transfers
             ));
         }
         if self.time_gaps > 0 {

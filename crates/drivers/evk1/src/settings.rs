@@ -83,10 +83,18 @@ impl Checked {
                     found: read_back,
                 });
             }
-            all.push(Setting {
-                name: name.to_owned(),
-                requested,
-                read_back,
+            // What reads differently by leave is a fact, and no difference.
+            all.push(match differs {
+                false => Setting {
+                    name: name.to_owned(),
+                    requested,
+                    read_back,
+                },
+                true => Setting {
+                    name: name.to_owned(),
+                    read_back: format!("{read_back} (after writing {requested})"),
+                    requested: Setting::AS_FOUND.to_owned(),
+                },
             });
             Ok(())
         };

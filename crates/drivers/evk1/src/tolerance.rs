@@ -20,11 +20,36 @@ pub struct Tolerance {
     pub everything: bool,
 }
 
+/// A key of a camera in a rig file, with the value that accepts a mismatch.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Accept {
+    /// Register reads may come with this status byte.
+    ReadStatus(u8),
+    /// A reset on the bus may fail.
+    FailedReset,
+    /// A transfer that fails is a loss.
+    FailedTransfers,
+    /// This register may read back differently.
+    ReadBack(u32),
+}
+
+impl fmt::Display for Accept {
+    /// As in a rig file.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::ReadStatus(status) => write!(f, "read_status: [\"{status:#04x}\"]"),
+            Self::FailedReset => write!(f, "failed_reset: accepted"),
+            Self::FailedTransfers => write!(f, "failed_transfers: loss"),
+            Self::ReadBack(address) => write!(f, "read_back_exceptions: [\"{address:#06x}\"]"),
+        }
+    }
+}
+
 /// Something that was tolerated, and what accepts it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Mismatch {
-    /// Key of the camera in a rig file, with the value that accepts it.
-    pub key: String,
+    /// What accepts it.
+    pub key: Accept,
     /// What was expected and found.
     pub what: String,
 }
@@ -50,8 +75,8 @@ impl Mismatches {
         self.lock().clone()
     }
 
-    pub(crate) fn add(&self, key: impl Into<String>, what: impl Into<String>) {
-        let (key, what) = (key.into(), what.into());
+    pub(crate) fn add(&self, key: Accept, what: impl Into<String>) {
+        let what = what.into();
         let mut all = self.lock();
         if !all.iter().any(|m| m.key == key) {
             all.push(Mismatch { key, what });

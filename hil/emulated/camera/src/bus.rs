@@ -329,6 +329,8 @@ impl Inner {
                 camera?.lock().faults.stuck.insert(address);
             }
             Order::Silence(on) => camera?.lock().faults.silent = on,
+            Order::FailResets(on) => plugged.queues.fail_resets(on),
+            Order::BreakTransfer(after) => plugged.queues.break_after(after),
             Order::FailReads(on) => camera?.lock().faults.failing_reads = on,
             Order::Edge {
                 channel,

@@ -95,6 +95,10 @@ pub enum Order {
     Silence(bool),
     /// Whether register reads report failure.
     FailReads(bool),
+    /// Whether resets of the port fail.
+    FailResets(bool),
+    /// After so many more transfers with bytes one fails, and its bytes are lost.
+    BreakTransfer(u32),
     /// An edge at a trigger input, at a time of the monotonic clock in ns.
     Edge {
         /// The input.

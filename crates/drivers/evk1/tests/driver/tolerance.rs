@@ -33,7 +33,11 @@ fn accepted_by(faults: &Faults, accepting: Evk1Config, key: &str) {
     assert_eq!(opened.mismatches(), [], "{key}");
     opened.configure(&CameraSettings::default()).unwrap();
     let mut opened = bench(faults).open_with(everything()).unwrap();
-    let keys: Vec<String> = opened.mismatches().into_iter().map(|m| m.key).collect();
+    let keys: Vec<String> = opened
+        .mismatches()
+        .into_iter()
+        .map(|m| m.key.to_string())
+        .collect();
     assert_eq!(keys, [key]);
     // It belongs to the device's facts of the session.
     let settings = opened.configure(&CameraSettings::default()).unwrap();

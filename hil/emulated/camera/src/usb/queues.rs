@@ -67,6 +67,9 @@ struct State {
     ended: bool,
     /// The next transfer ends this many bytes early.
     cut: Option<usize>,
+    /// After so many more transfers one fails.
+    broken: Option<u32>,
+    resets_fail: bool,
     handed: Handed,
     ready: Readiness,
 }
@@ -96,6 +99,8 @@ impl Queues {
             level: 0,
             ended: false,
             cut: None,
+            broken: None,
+            resets_fail: false,
             handed: Handed::default(),
             ready,
         };
@@ -258,11 +263,15 @@ impl Queues {
         self.lock().halted = false;
     }
 
-    /// The host resets the port: bytes that nobody has fetched are gone.
-    pub fn reset(&self) {
+    /// The host resets the port: bytes that nobody has fetched are gone. False when nothing came of it.
+    pub fn reset(&self) -> bool {
         let mut state = self.lock();
+        if state.resets_fail {
+            return false;
+        }
         state.halted = false;
         state.empty();
+        true
     }
 
     // ---- from the device
@@ -327,6 +336,16 @@ impl Queues {
         self.lock().cut = Some(bytes);
     }
 
+    /// Whether resets of the port fail.
+    pub fn fail_resets(&self, on: bool) {
+        self.lock().resets_fail = on;
+    }
+
+    /// The transfer of the data endpoint after `transfers` more fails, with what it holds.
+    pub fn break_after(&self, transfers: u32) {
+        self.lock().broken = Some(transfers);
+    }
+
     /// What has been handed to the host so far.
     pub fn handed(&self) -> Handed {
         self.lock().handed
@@ -360,6 +379,15 @@ impl State {
             let bytes = self.take(wanted);
             if let Some(open) = self.files.get_mut(&file) {
                 open.waiting.pop_front();
+            }
+            match &mut self.broken {
+                Some(0) => {
+                    self.broken = None;
+                    self.finish(file, transfer, Errno::PROTO.raw_os_error(), Vec::new());
+                    continue;
+                }
+                Some(left) => *left -= 1,
+                None => {}
             }
             self.finish(file, transfer, 0, bytes);
         }

@@ -74,9 +74,12 @@ impl Node {
                 queues.plugged()
             }
             usbfs::RESET => {
-                queues.reset();
-                self.function.reset();
-                queues.plugged()
+                if queues.reset() {
+                    self.function.reset();
+                    queues.plugged()
+                } else {
+                    Err(Errno::IO)
+                }
             }
             usbfs::SUBMIT_URB => self.submit(file, wire, argument)?,
             usbfs::DISCARD_URB => queues.discard(file, argument),

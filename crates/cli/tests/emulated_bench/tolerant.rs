@@ -1,0 +1,133 @@
+//! A camera that is not as expected, end to end on the emulated bench: refused, let pass once and told, then accepted by the lines that
+//! were proposed. Emulated; which of it a healthy camera shows nobody has seen.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Output;
+
+use skinrig_emulated_bench::{CAMERA_SERIALS, EmulatedBench, Order};
+use skinrig_model::Setting;
+use skinrig_recorder::SessionReader;
+
+use super::{said, start, the_only, top};
+
+const SKINRIG: &str = env!("CARGO_BIN_EXE_skinrig");
+/// The register of `bias_diff_on`.
+const BIAS: u32 = 0x0350;
+
+/// The emulated bench's rig file, with a bias that camera 2 does not take, and with `more` lines for that camera.
+fn rig(folder: &Path, more: &str) -> PathBuf {
+    let text = fs::read_to_string(top().join("hil/rigs/emulated.yaml")).unwrap();
+    let serial = format!("    serial: \"{}\"\n", CAMERA_SERIALS[1]);
+    let text = text.replace(
+        &serial,
+        &format!("{serial}    biases: {{bias_diff_on: 400}}\n{more}"),
+    );
+    let path = folder.join("first.yaml");
+    fs::write(&path, text).unwrap();
+    path
+}
+
+/// The quick check with one press.
+fn protocol(folder: &Path) -> PathBuf {
+    let text = fs::read_to_string(top().join("protocols/quick-check.yaml")).unwrap();
+    let kept = |line: &&str| !line.trim_start().starts_with("- [") || line.contains("the centre");
+    let text: Vec<&str> = text.lines().filter(kept).collect();
+    let path = folder.join("one-press.yaml");
+    fs::write(&path, text.join("\n")).unwrap();
+    path
+}
+
+fn skinrig(bench: &EmulatedBench, arguments: &[&str]) -> Output {
+    let mut command = bench.command(SKINRIG).unwrap();
+    command.current_dir(top()).args(arguments);
+    command.output().unwrap()
+}
+
+#[test]
+fn what_was_let_pass_once_is_accepted_by_the_lines_that_were_proposed() {
+    let Some((_alone, bench)) = start() else {
+        return;
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let order = |order: Order| {
+        bench.bus().remote().unwrap().order(CAMERA_SERIALS[1], order).unwrap();
+    };
+    order(Order::FailReads(true));
+    order(Order::FailResets(true));
+    order(Order::Stick(BIAS));
+    let (one_press, strict) = (protocol(folder), rig(folder, ""));
+    let run = |rig: &Path, name: &str, more: &[&str]| {
+        let sessions = folder.join(name);
+        let mut arguments = vec!["run", one_press.to_str().unwrap(), "--no-analysis"];
+        arguments.extend(["--rig", rig.to_str().unwrap()]);
+        arguments.extend(["--sessions", sessions.to_str().unwrap()]);
+        arguments.extend(more);
+        (skinrig(&bench, &arguments), sessions)
+    };
+
+    // As it is: refused before anything moves, with the way on.
+    let (refused, _) = run(&strict, "refused", &[]);
+    assert_eq!(refused.status.code(), Some(3), "{}", said(&refused));
+    assert!(said(&refused).contains("--tolerant"), "{}", said(&refused));
+
+    // Let pass once; a transfer fails in between.
+    order(Order::BreakTransfer(60));
+    let (tolerant, sessions) = run(&strict, "tolerant", &["--tolerant"]);
+    let told = said(&tolerant);
+    assert!(tolerant.status.success(), "{told}");
+    let (_, proposed) = told
+        .split_once("cameras:\n  camera2:\n")
+        .unwrap_or_else(|| panic!("{told}"));
+    let lines: String = proposed
+        .lines()
+        .take_while(|l| l.starts_with("    "))
+        .map(|l| format!("{l}\n"))
+        .collect();
+    insta::assert_snapshot!(lines, @r#"
+        read_status: ["0x00"]
+        read_back_exceptions: ["0x0350"]
+        failed_reset: accepted
+        failed_transfers: loss
+    "#);
+
+    // The session says that it was recorded so: in its header, with the device, in a note, before the run.
+    let session = the_only(&sessions, ".session.sqlite");
+    let reader = SessionReader::open(&session).unwrap();
+    let name = reader.header().unwrap().rig_name;
+    assert!(name.ends_with("mismatches tolerated"), "{name}");
+    let devices = reader.devices().unwrap();
+    let settings = devices.iter().flat_map(|d| &d.settings);
+    let let_pass: Vec<&str> = settings
+        .filter(|s| s.requested == Setting::TOLERATED)
+        .map(|s| s.name.as_str())
+        .collect();
+    assert_eq!(let_pass.len(), 3, "{let_pass:?}");
+    let notes = reader.notes().unwrap();
+    let noted = |words: &str| notes.iter().any(|n| n.text.contains(words));
+    assert!(noted("failed_transfers: loss"), "{notes:?}");
+    let checks = reader.preflight().unwrap();
+    assert!(checks.iter().any(|c| c.check == "mismatches"), "{checks:?}");
+    drop(reader);
+    let shown = skinrig(&bench, &["show", session.to_str().unwrap()]);
+    assert!(
+        said(&shown).contains("mismatches tolerated"),
+        "{}",
+        said(&shown)
+    );
+
+    // The lines in the rig file: opened without a word, transfers that fail included.
+    let accepting = rig(folder, &lines);
+    order(Order::BreakTransfer(60));
+    let (accepted, sessions) = run(&accepting, "accepted", &[]);
+    let told = said(&accepted);
+    assert!(accepted.status.success(), "{told}");
+    assert!(
+        !told.contains("tolerated") && !told.contains("let pass"),
+        "{told}"
+    );
+    let reader = SessionReader::open(&the_only(&sessions, ".session.sqlite")).unwrap();
+    let name = reader.header().unwrap().rig_name;
+    assert!(!name.contains("tolerated"), "{name}");
+}
