@@ -99,6 +99,15 @@ mod tests {
                 },
             ),
             (
+                EvidenceKind::DeviceLost,
+                DeviceError::Silent {
+                    role,
+                    serial: serial(),
+                    doing: "poll",
+                    within: skinrig_model::HostDuration::ZERO,
+                },
+            ),
+            (
                 EvidenceKind::ReadBack,
                 DeviceError::ReadBack {
                     role,

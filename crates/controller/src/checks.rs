@@ -461,6 +461,9 @@ mod tests {
             !check.failed() && check.expected == "1 as written",
             "{check:?}"
         );
+        // What was let pass was not asked for either, and says what it is by its name.
+        let passed = setting(Setting::TOLERATED, "expected 1, found 2");
+        assert!(!read_back(DeviceRole::Camera1, &[passed]).failed());
         let check = read_back(DeviceRole::Indenter, &[found, setting("5", "6")]);
         assert!(
             check.failed() && check.found == "x 6 instead of 5",

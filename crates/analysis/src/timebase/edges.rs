@@ -22,7 +22,7 @@ const MOST_ERASED: u32 = 12;
 const LEAST_CONTRADICTED: u32 = 3;
 /// Edges are looked for within this of where anchors, and then trains, put them, µs. Edges of the same direction are at least
 /// 300 µs apart.
-const NEAR_US: [f64; 2] = [60.0, 25.0];
+pub const NEAR_US: [f64; 2] = [60.0, 25.0];
 /// An edge this soon after another of the same direction is its double, µs.
 const DOUBLE_US: u64 = 20;
 /// A train with fewer rising edges than this gives no instant.
@@ -54,6 +54,40 @@ pub struct CameraFromBox {
     pub counts: LineCounts,
     /// Anchors that the others contradict.
     pub contradicted: u32,
+    /// Trains that came, by what they spell, away from where the map puts them.
+    pub off_line: OffLine,
+}
+
+/// Trains that came, and not where any map that a clock may have puts them.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct OffLine {
+    /// How many.
+    pub trains: u32,
+    /// How far off at most, µs.
+    pub most_us: f64,
+}
+
+impl OffLine {
+    fn of(points: &[Point], sent: &[Sent], instants: &[Option<f64>], map: &Smooth) -> Self {
+        let missing = sent.iter().zip(instants).filter(|(_, at)| at.is_none());
+        let missing: Vec<f64> = missing.map(|(sent, _)| sent.box_us).collect();
+        let away = points.iter().filter(|p| {
+            let k = missing.partition_point(|us| *us < p.from_us);
+            missing.get(k) == Some(&p.from_us)
+        });
+        away.fold(Self::default(), |sum, p| Self {
+            trains: sum.trains + 1,
+            most_us: sum.most_us.max((p.to_us - map.value(p.from_us)).abs()),
+        })
+    }
+
+    /// Both together.
+    pub fn and(self, other: Self) -> Self {
+        Self {
+            trains: self.trains + other.trains,
+            most_us: self.most_us.max(other.most_us),
+        }
+    }
 }
 
 impl CameraFromBox {
@@ -176,6 +210,7 @@ impl Edges {
             .map(|(from, to)| (relative(*from, reference_us), relative(*to, reference_us)))
             .collect();
         let counts = self.count(&matched, &spans, reference_us);
+        let off_line = OffLine::of(&points, &epoch.trains, &instants, &map);
         Ok(CameraFromBox {
             map,
             reference_us,
@@ -187,6 +222,7 @@ impl Edges {
             ties_us,
             counts,
             contradicted,
+            off_line,
         })
     }
 

@@ -52,7 +52,12 @@ fn what_was_let_pass_once_is_accepted_by_the_lines_that_were_proposed() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let order = |order: Order| {
-        bench.bus().remote().unwrap().order(CAMERA_SERIALS[1], order).unwrap();
+        bench
+            .bus()
+            .remote()
+            .unwrap()
+            .order(CAMERA_SERIALS[1], order)
+            .unwrap();
     };
     order(Order::FailReads(true));
     order(Order::FailResets(true));
