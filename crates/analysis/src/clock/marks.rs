@@ -152,10 +152,7 @@ pub fn fit_marks(edges: &[TriggerEdge], channel: u8, sent: &[SentMark]) -> Optio
 fn drift_se(pairs: &[Pair]) -> Option<f64> {
     let mut points: Vec<Point> = pairs
         .iter()
-        .map(|p| Point {
-            from_us: p.host_us,
-            to_us: p.camera_us,
-        })
+        .map(|p| Point::new(p.host_us, p.camera_us))
         .collect();
     points.sort_by(|a, b| a.from_us.total_cmp(&b.from_us));
     let fit = Smooth::fit(&points, STEP_US, FLOOR_US)?;

@@ -164,10 +164,7 @@ impl Edges {
         };
         let points: Vec<Point> = anchors
             .iter()
-            .map(|(box_us, t_us)| Point {
-                from_us: *box_us,
-                to_us: relative(*t_us, reference_us),
-            })
+            .map(|(box_us, t_us)| Point::new(*box_us, relative(*t_us, reference_us)))
             .collect();
         let mut map = Smooth::fit(&points, STEP_US, ANCHOR_FLOOR_US)
             .filter(|map| map.drift.value.abs() <= crate::clock::NO_CLOCK_DRIFT)
@@ -189,12 +186,7 @@ impl Edges {
                 .trains
                 .iter()
                 .zip(&instants)
-                .filter_map(|(sent, at)| {
-                    Some(Point {
-                        from_us: sent.box_us,
-                        to_us: (*at)?,
-                    })
-                })
+                .filter_map(|(sent, at)| Some(Point::new(sent.box_us, (*at)?)))
                 .collect();
             map = Smooth::fit(&seen, STEP_US, FLOOR_US)
                 .ok_or_else(|| format!("only {} trains were seen", seen.len()))?;

@@ -60,10 +60,8 @@ mod tests {
         (0..600)
             .map(|k| {
                 let from_us = 1e5 * f64::from(k);
-                Point {
-                    from_us,
-                    to_us: (from_us * (1.0 + ppm * 1e-6) + phase_us).floor() + 0.5,
-                }
+                let at = (from_us * (1.0 + ppm * 1e-6) + phase_us).floor() + 0.5;
+                Point::new(from_us, at)
             })
             .collect()
     }

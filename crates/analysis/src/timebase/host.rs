@@ -9,9 +9,14 @@ use super::edges::{beyond_us, distance_us};
 use super::epochs::Tie;
 use super::smooth::{Figure, Point, Smooth, WANDER};
 use crate::clock::NO_CLOCK_DRIFT;
+use crate::clock::line::median;
 
 /// The quickest exchange in each such span of box time makes a point of the fit, µs.
 const QUICKEST_OF_US: f64 = 5e6;
+/// Exchanges about one that say how busy the line is: the 50 quickest of them give their scatter to 7 %, by chance.
+const NEAR: usize = 150;
+/// The box's clock shows whole µs.
+const TICK_US: f64 = 1.0;
 /// Points of the fit, at least, where there are as many exchanges.
 const POINTS: f64 = 40.0;
 /// What the rate of the fit may be wrong by is bounded in each such span, µs.
@@ -23,15 +28,17 @@ const PARTS: usize = 40;
 const SHAPE: f64 = 0.05e-6;
 /// Residuals of delays are never judged finer than this, µs.
 const FLOOR_US: f64 = 20.0;
+/// Rounds of a search that each leave a hundredth at most: no clock is off by more.
+const ROUNDS: usize = 9;
 /// Steps of the fit, and of the map along it, are at least this long, µs.
 const STEP_US: f64 = super::STEP_US;
 
-/// The map, by knots: between them it is straight.
+/// The map.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HostFromBox {
-    /// (box time, host time), µs, ascending.
-    pub knots: Vec<(f64, f64)>,
-    /// The fit behind it.
+    /// Box times between which the map is nearly straight, ascending, µs.
+    pub knots_us: Vec<f64>,
+    /// The fit behind it, which is moved into the bounds where it leaves them.
     pub fit: Smooth,
     /// Box times of the exchanges, ascending, µs.
     pub ties_us: Vec<f64>,
@@ -47,17 +54,11 @@ impl HostFromBox {
         let (first, last) = (ties.first()?.box_us, ties.last()?.box_us);
         let (bounds, consistent) = Bounds::new(ties, &fit);
         let steps = ((last - first) / STEP_US).ceil().max(1.0) as usize;
-        let knots = (0..=steps)
-            .map(|k| {
-                let at = first + (last - first) * k as f64 / steps as f64;
-                let (low, high) = bounds.at(at);
-                // What is certain goes before what is likely.
-                let by = 0.0f64.max(low).min(high.max(low));
-                (at, fit.value(at) + by)
-            })
-            .collect();
+        let knots = 0..=steps;
         Some(Self {
-            knots,
+            knots_us: knots
+                .map(|k| first + (last - first) * k as f64 / steps as f64)
+                .collect(),
             fit,
             ties_us: ties.iter().map(|t| t.box_us).collect(),
             consistent,
@@ -67,12 +68,22 @@ impl HostFromBox {
 
     /// Host time of a box time, µs.
     pub fn host_us(&self, box_us: f64) -> f64 {
-        interpolate(&self.knots, |k| k.0, |k| k.1, box_us)
+        self.fit.value(box_us) + self.moved_us(box_us)
     }
 
-    /// Box time of a host time, µs.
+    /// How far the map is moved into the bounds, µs: what is certain goes before what is likely.
+    fn moved_us(&self, box_us: f64) -> f64 {
+        let (low, high) = self.bounds.at(box_us);
+        0.0f64.max(low).min(high.max(low))
+    }
+
+    /// Box time of a host time, µs. Both clocks go nearly at one rate, and so does what is left of the way at each round.
     pub fn box_us(&self, host_us: f64) -> f64 {
-        interpolate(&self.knots, |k| k.1, |k| k.0, host_us)
+        let mut box_us = host_us - self.host_us(0.0);
+        for _ in 0..ROUNDS {
+            box_us += host_us - self.host_us(box_us);
+        }
+        box_us
     }
 
     /// Host time of a box time, with its statistical error: that of the delays, both ways taking equally long on average.
@@ -87,7 +98,7 @@ impl HostFromBox {
     /// Half width of the interval about [`Self::host_us`] that certainly holds the host time of a box time, µs.
     pub fn bound_us(&self, box_us: f64) -> f64 {
         let (low, high) = self.bounds.at(box_us);
-        let by = self.host_us(box_us) - self.fit.value(box_us);
+        let by = self.moved_us(box_us);
         // Beyond the exchanges nothing bounds the rate but what a crystal does.
         (by - low).abs().max((high - by).abs()) + WANDER * beyond_us(&self.ties_us, box_us)
     }
@@ -98,32 +109,35 @@ impl HostFromBox {
     }
 }
 
-/// A straight line between the two knots about `x`, or through the two outermost.
-fn interpolate(
-    knots: &[(f64, f64)],
-    from: impl Fn(&(f64, f64)) -> f64,
-    to: impl Fn(&(f64, f64)) -> f64,
-    x: f64,
-) -> f64 {
-    let k = knots[1..knots.len() - 1].partition_point(|knot| from(knot) <= x);
-    let (a, b) = (&knots[k], &knots[k + 1]);
-    to(a) + (x - from(a)) * ((to(b) - to(a)) / (from(b) - from(a)))
+/// The middle of the quickest of each so many exchanges.
+///
+/// As many in each, so that all are as good: the quickest of few is slow, and a last point that is, has the greatest say in the rate.
+fn quickest(ties: &[Tie]) -> Vec<Point> {
+    let delays: Vec<f64> = ties.iter().map(|t| t.received_us - t.sent_us).collect();
+    let span = ties.last().map_or(0.0, |t| t.box_us) - ties.first().map_or(0.0, |t| t.box_us);
+    let points = ((span / QUICKEST_OF_US).max(POINTS) as usize).min(ties.len());
+    let part = |k: usize| k * ties.len() / points..(k + 1) * ties.len() / points;
+    let quickest: Vec<usize> = (0..points)
+        .filter_map(|k| part(k).min_by(|a, b| delays[*a].total_cmp(&delays[*b])))
+        .collect();
+    let scatter: Vec<f64> = quickest.iter().map(|k| scatter_us(&delays, *k)).collect();
+    let usual = median(&mut scatter.clone()).unwrap_or(TICK_US);
+    let each = quickest.iter().map(|k| &ties[*k]).zip(&scatter);
+    each.map(|(t, scatter)| Point {
+        spread: scatter / usual,
+        ..Point::new(t.box_us + 0.5, 0.5 * (t.sent_us + t.received_us))
+    })
+    .collect()
 }
 
-/// The middle of the quickest exchange in each span.
-fn quickest(ties: &[Tie]) -> Vec<Point> {
-    let delay = |t: &Tie| t.received_us - t.sent_us;
-    // Few exchanges: all of them.
-    let span = ties.last().map_or(0.0, |t| t.box_us) - ties.first().map_or(0.0, |t| t.box_us);
-    let each_us = QUICKEST_OF_US.min(span / POINTS);
-    let slot = |t: &Tie| (t.box_us / each_us.max(1.0)).floor();
-    ties.chunk_by(|a, b| slot(a) == slot(b))
-        .filter_map(|part| part.iter().min_by(|a, b| delay(a).total_cmp(&delay(b))))
-        .map(|t| Point {
-            from_us: t.box_us + 0.5,
-            to_us: 0.5 * (t.sent_us + t.received_us),
-        })
-        .collect()
+/// How far delays about the `k`-th scatter above their least, µs. Where a host or a line is busy, even the quickest are slow.
+fn scatter_us(delays: &[f64], k: usize) -> f64 {
+    let from = k
+        .saturating_sub(NEAR / 2)
+        .min(delays.len().saturating_sub(NEAR));
+    let mut near = delays[from..(from + NEAR).min(delays.len())].to_vec();
+    near.sort_by(f64::total_cmp);
+    (near[near.len() / 3] - near[0]).max(TICK_US)
 }
 
 /// What one exchange says of how far the host's clock is from the fit, µs.

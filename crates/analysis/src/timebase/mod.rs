@@ -367,7 +367,7 @@ impl TimeBase {
             let Some(camera) = &piece.cameras[k] else {
                 continue;
             };
-            let mut at: Vec<f64> = piece.host.knots.iter().map(|k| k.0).collect();
+            let mut at = piece.host.knots_us.clone();
             at.extend(camera.map.knots());
             at.sort_by(f64::total_cmp);
             at.dedup();
@@ -568,13 +568,8 @@ fn trains(piece: &Piece, k: usize) -> Option<Vec<Point>> {
     let camera = piece.cameras[k].as_ref()?;
     let each = camera.sent_us.iter().zip(&camera.instants);
     Some(
-        each.filter_map(|(from_us, at)| {
-            Some(Point {
-                from_us: *from_us,
-                to_us: (*at)?,
-            })
-        })
-        .collect(),
+        each.filter_map(|(from_us, at)| Some(Point::new(*from_us, (*at)?)))
+            .collect(),
     )
 }
 
@@ -584,13 +579,8 @@ fn pairs(cameras: &[Option<CameraFromBox>; 2]) -> Vec<Point> {
         return Vec::new();
     };
     let each = one.instants.iter().zip(&two.instants);
-    each.filter_map(|(from, to)| {
-        Some(Point {
-            from_us: (*from)?,
-            to_us: (*to)?,
-        })
-    })
-    .collect()
+    each.filter_map(|(from, to)| Some(Point::new((*from)?, (*to)?)))
+        .collect()
 }
 
 fn shared(piece: &Piece) -> Vec<(f64, f64)> {

@@ -36,6 +36,19 @@ const LINE_BELOW: usize = 8;
 pub struct Point {
     pub from_us: f64,
     pub to_us: f64,
+    /// Standard deviation of its noise, in units of that of a usual point; above 0.
+    pub spread: f64,
+}
+
+impl Point {
+    /// A point as good as any other.
+    pub fn new(from_us: f64, to_us: f64) -> Self {
+        Self {
+            from_us,
+            to_us,
+            spread: 1.0,
+        }
+    }
 }
 
 /// A figure with its standard error, which has so many degrees of freedom.
@@ -109,23 +122,25 @@ impl Smooth {
         let off = |p: &Point| p.to_us - line.offset_us - p.from_us - line.drift * p.from_us;
         let wander_us = 1_000.0 + WANDER * span;
         let mut used: Vec<bool> = points.iter().map(|p| off(p).abs() <= wander_us).collect();
-        let deviations: Vec<(f64, f64)> = points
+        let deviations: Vec<(f64, f64, f64)> = points
             .iter()
-            .map(|p| (p.from_us, p.to_us - p.from_us))
+            .map(|p| (p.from_us, p.to_us - p.from_us, p.spread))
             .collect();
         let mut found = None;
         for _ in 0..ROUNDS {
-            let chosen: Vec<(f64, f64)> = picked(&deviations, &used).collect();
+            let chosen: Vec<(f64, f64, f64)> = picked(&deviations, &used).collect();
             let posterior = Posterior::new(&chosen, step_us)?;
             let residuals: Vec<f64> = deviations
                 .iter()
-                .map(|(x, y)| y - posterior.grid.value(&posterior.mean, *x))
+                .map(|(x, y, _)| y - posterior.grid.value(&posterior.mean, *x))
                 .collect();
-            let mut sizes: Vec<f64> = picked(&residuals, &used).map(f64::abs).collect();
-            let sigma = (MAD_TO_SIGMA * median(&mut sizes)?).max(floor_us);
-            let now: Vec<bool> = residuals
+            let size = |(r, p): (&f64, &Point)| r.abs() / p.spread;
+            let sizes: Vec<f64> = residuals.iter().zip(points).map(size).collect();
+            let mut inliers: Vec<f64> = picked(&sizes, &used).collect();
+            let sigma = (MAD_TO_SIGMA * median(&mut inliers)?).max(floor_us);
+            let now: Vec<bool> = sizes
                 .iter()
-                .map(|r| r.abs() <= OUTLIER_SIGMAS * sigma)
+                .map(|size| *size <= OUTLIER_SIGMAS * sigma)
                 .collect();
             let settled = now == used;
             found = Some((posterior, residuals, used));
@@ -344,7 +359,7 @@ struct Posterior {
 }
 
 impl Posterior {
-    fn new(points: &[(f64, f64)], step_us: f64) -> Option<Self> {
+    fn new(points: &[(f64, f64, f64)], step_us: f64) -> Option<Self> {
         let n = points.len();
         let (first, last) = (points.first()?.0, points.last()?.0);
         let span = last - first;
@@ -370,16 +385,17 @@ impl Posterior {
         let size = grid.size();
         let (mut information, mut right, mut squares) =
             (vec![[0.0; 4]; size], vec![0.0; size], 0.0);
-        for (x, y) in points {
+        for (x, y, spread) in points {
             let y = rest(*x, *y);
             let (k, w) = grid.weights(*x);
+            let counts = 1.0 / (spread * spread);
             for i in 0..4 {
-                right[k + i] += w[i] * y;
+                right[k + i] += counts * w[i] * y;
                 for j in i..4 {
-                    information[k + i][j - i] += w[i] * w[j];
+                    information[k + i][j - i] += counts * w[i] * w[j];
                 }
             }
-            squares += y * y;
+            squares += counts * y * y;
         }
         let ends = [grid.weights(first), grid.weights(last)];
         let mut chord = vec![0.0; size];
@@ -400,13 +416,14 @@ impl Posterior {
         let parabola = data.parabola()?.coefficients;
         data.right = vec![0.0; size];
         data.squares = 0.0;
-        for (x, y) in points {
+        for (x, y, spread) in points {
             let y = rest(*x, *y) - grid.value(&parabola, *x);
             let (k, w) = grid.weights(*x);
+            let counts = 1.0 / (spread * spread);
             for (right, weight) in data.right[k..].iter_mut().zip(w) {
-                *right += weight * y;
+                *right += counts * weight * y;
             }
-            data.squares += y * y;
+            data.squares += counts * y * y;
         }
         let mut candidates: Vec<Candidate> = data.parabola().into_iter().collect();
         let mean = data.information.iter().map(|r| r[0]).sum::<f64>() / size as f64;
@@ -646,10 +663,7 @@ mod tests {
         let point = |k: u32| {
             let x = f64::from(k) * 1e6;
             let noise = if k.is_multiple_of(2) { 1.0 } else { -1.0 };
-            Point {
-                from_us: x,
-                to_us: x + y(x) + noise,
-            }
+            Point::new(x, x + y(x) + noise)
         };
         (0..n).map(point).collect()
     }
@@ -694,9 +708,9 @@ mod tests {
 
     #[test]
     fn the_limit_of_smoothness_is_the_parabola() {
-        let all: Vec<(f64, f64)> = points(60, |x| 1e-13 * x * x)
+        let all: Vec<(f64, f64, f64)> = points(60, |x| 1e-13 * x * x)
             .iter()
-            .map(|p| (p.from_us, p.to_us - p.from_us))
+            .map(|p| (p.from_us, p.to_us - p.from_us, 1.0))
             .collect();
         let posterior = Posterior::new(&all, 10e6).unwrap();
         let size = posterior.grid.size();
@@ -708,7 +722,7 @@ mod tests {
             squares: 0.0,
             chord: vec![0.0; size],
         };
-        for (x, y) in &all {
+        for (x, y, _) in &all {
             let (k, w) = posterior.grid.weights(*x);
             for i in 0..4 {
                 data.right[k + i] += w[i] * y;
@@ -732,13 +746,7 @@ mod tests {
     #[test]
     fn too_little_gives_no_map() {
         assert_eq!(Smooth::fit(&points(2, |_| 0.0), 10e6, 1.0), None);
-        let same = vec![
-            Point {
-                from_us: 1.0,
-                to_us: 2.0
-            };
-            9
-        ];
+        let same = vec![Point::new(1.0, 2.0); 9];
         assert_eq!(Smooth::fit(&same, 10e6, 1.0), None);
     }
 }
