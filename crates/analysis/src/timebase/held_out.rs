@@ -4,13 +4,13 @@ use super::smooth::{Point, Smooth};
 use super::{FLOOR_US, STEP_US};
 
 /// (inside, of how many): each half of the points against the fit to the other half, in the interval stated for a point;
-/// `None` when a half allows no fit.
+/// `None` when a half allows no fit, or has too few points to state such an interval.
 pub(super) fn coverage(points: &[Point]) -> Option<(u32, u32)> {
     let halves = halves(points);
     let (mut inside, mut n) = (0, 0);
     for (half, other) in [(&halves[0], &halves[1]), (&halves[1], &halves[0])] {
         let fit = Smooth::fit(half, STEP_US, FLOOR_US)?;
-        let width = width_us(&fit, 0.95);
+        let width = width_us(&fit, 0.95)?;
         for p in other {
             n += 1;
             inside += u32::from((p.to_us - fit.value(p.from_us)).abs() <= width);
@@ -22,7 +22,8 @@ pub(super) fn coverage(points: &[Point]) -> Option<(u32, u32)> {
 /// Half width of the interval that holds this share of further points, µs: what holds it of the points used, each against the fit
 /// without it (Vovk, Gammerman and Shafer, "Algorithmic learning in a random world", 2005). Whatever the shape of the noise, and
 /// whether or not it is a multiple of a µs, no more than chance leaves a point outside; points that the fit left out widen nothing.
-fn width_us(fit: &Smooth, share: f64) -> f64 {
+/// `None` of fewer points than can hold that share: 19 for 95 %.
+fn width_us(fit: &Smooth, share: f64) -> Option<f64> {
     let sigma2 = fit.sigma_us * fit.sigma_us;
     let without = |(at, residual): &(f64, f64)| {
         let se = fit.standard_error(*at);
@@ -34,7 +35,7 @@ fn width_us(fit: &Smooth, share: f64) -> f64 {
     let mut sizes: Vec<f64> = used.map(|(p, _)| without(p)).collect();
     sizes.sort_by(f64::total_cmp);
     let k = (share * (sizes.len() + 1) as f64).ceil() as usize;
-    sizes[k.clamp(1, sizes.len()) - 1]
+    sizes.get(k.max(1) - 1).copied()
 }
 
 /// One of each two neighbours for either half, which one after Thue and Morse (the parity of the ones of its number).

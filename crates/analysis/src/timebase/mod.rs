@@ -14,7 +14,7 @@ mod smooth;
 mod wire;
 
 pub(crate) use self::edges::distance_us;
-pub use self::reading::Reading;
+pub use self::reading::{Drift, Reading};
 pub(crate) use self::smooth::{Point, Smooth};
 pub use self::wire::{Wire, WireTrain, wire};
 
@@ -244,6 +244,13 @@ impl TimeBase {
         } else {
             (Tie::Exchange, exchange)
         })
+    }
+
+    /// Mean rate of a camera's clock over the host's from its first train to its last, with its error: that of [`Self::clocks`],
+    /// whose standard error is made for 95 % alone.
+    #[must_use]
+    pub fn drift(&self, camera: usize) -> Option<Drift> {
+        best_drift(self.pieces.iter(), camera).map(Drift::new)
     }
 
     /// One line through camera over host time at the trains of one leg, 0 for the first.
@@ -491,15 +498,10 @@ fn clock<'a>(pieces: impl Iterator<Item = &'a Piece> + Clone, k: usize) -> Optio
         .reference_us;
     let mut trains = Vec::new();
     let mut contradicted = 0;
-    let mut legs: Vec<Vec<&Piece>> = Vec::new();
-    for piece in pieces {
+    for piece in pieces.clone() {
         let Some(camera) = &piece.cameras[k] else {
             continue;
         };
-        match legs.last_mut().filter(|of| of[0].leg == piece.leg) {
-            Some(of) => of.push(piece),
-            None => legs.push(vec![piece]),
-        }
         contradicted += camera.contradicted;
         let ahead = camera.reference_us.wrapping_sub(reference_us) as i64 as f64;
         for (box_us, at) in camera.sent_us.iter().zip(&camera.instants) {
@@ -512,8 +514,7 @@ fn clock<'a>(pieces: impl Iterator<Item = &'a Piece> + Clone, k: usize) -> Optio
         }
     }
     let line = line::fit(&trains, 1.0)?;
-    let drifts = legs.iter().filter_map(|leg| drift(leg, k));
-    let drift = drifts.min_by(|a, b| a.stated_se().total_cmp(&b.stated_se()))?;
+    let drift = best_drift(pieces, k)?;
     let off = |t: &Pair| t.camera_us - t.host_us - drift.value * t.host_us;
     let used = || trains.iter().zip(&line.used).filter(|(_, used)| **used);
     let n = line.n() as f64;
@@ -534,6 +535,19 @@ fn clock<'a>(pieces: impl Iterator<Item = &'a Piece> + Clone, k: usize) -> Optio
         fit,
         middle_us: sum / trains.len() as f64,
     })
+}
+
+/// The mean rate of camera over host time, of the leg in which it is known best.
+fn best_drift<'a>(pieces: impl Iterator<Item = &'a Piece>, k: usize) -> Option<Figure> {
+    let mut legs: Vec<Vec<&Piece>> = Vec::new();
+    for piece in pieces.filter(|p| p.cameras[k].is_some()) {
+        match legs.last_mut().filter(|of| of[0].leg == piece.leg) {
+            Some(of) => of.push(piece),
+            None => legs.push(vec![piece]),
+        }
+    }
+    let drifts = legs.iter().filter_map(|leg| drift(leg, k));
+    drifts.min_by(|a, b| a.stated_se().total_cmp(&b.stated_se()))
 }
 
 /// Mean rate of camera over host time in a leg, from the first train to the last. What the host's slope may be wrong by is most of it; a

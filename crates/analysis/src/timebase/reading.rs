@@ -16,6 +16,33 @@ pub struct Reading {
     pub bound_us: f64,
 }
 
+/// Mean rate of one clock over another, less 1.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Drift {
+    /// The rate difference, ppm.
+    pub ppm: f64,
+    /// Its standard error, ppm.
+    pub se_ppm: f64,
+    /// Degrees of freedom of that error.
+    pub free: f64,
+}
+
+impl Drift {
+    pub(super) fn new(figure: Figure) -> Self {
+        Self {
+            ppm: figure.value * 1e6,
+            se_ppm: figure.se * 1e6,
+            free: figure.free,
+        }
+    }
+
+    /// Half width of the interval that holds with this probability (0..1), ppm.
+    #[must_use]
+    pub fn half_width_ppm(&self, level: f64) -> f64 {
+        self.se_ppm * student_quantile(0.5 * (1.0 + level), self.free)
+    }
+}
+
 impl Reading {
     pub(super) const fn new(figure: Figure, bound_us: f64) -> Self {
         Self {

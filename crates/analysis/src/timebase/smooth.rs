@@ -26,6 +26,9 @@ pub const WANDER: f64 = 20e-6;
 /// noise, above the last nothing is left in 64 bits of what the points say.
 const LOWEST_POWER: f64 = -2.0;
 const HIGHEST_POWER: f64 = 12.0;
+/// Probability, before anything is known, that rates change evenly: larger, and wander that hardly shows is taken for none and
+/// intervals hold too rarely; smaller, and the intervals of rates that do not wander are too wide.
+const EVEN_SHARE: f64 = 0.125;
 /// Coefficients that no penalty holds: those of a parabola.
 const FREE: usize = 3;
 /// Of fewer points a straight line is made.
@@ -428,9 +431,10 @@ impl Posterior {
         let mut candidates: Vec<Candidate> = data.parabola().into_iter().collect();
         let mean = data.information.iter().map(|r| r[0]).sum::<f64>() / size as f64;
         let wandering = data.wandering(mean);
-        // A rate that changes evenly counts as much as all others together: of crystals left alone it is the rule.
+        // A rate that changes evenly is what crystals left alone do: it has its share before anything is known.
+        let odds = EVEN_SHARE / (1.0 - EVEN_SHARE) * wandering.len().max(1) as f64;
         for candidate in &mut candidates {
-            candidate.log_likelihood += libm::log(wandering.len().max(1) as f64);
+            candidate.log_likelihood += libm::log(odds);
         }
         candidates.extend(wandering);
         let best = candidates

@@ -95,8 +95,8 @@ impl Clock {
 pub enum Wander {
     /// Not.
     Even,
-    /// They swing by 1 ppm within 200 to 900 s.
-    Swings,
+    /// They swing by 1 ppm, in between so many and so many s.
+    Swings(f64, f64),
     /// They take random steps: standard deviation after a minute, as a fraction.
     Walks(f64),
 }
@@ -206,10 +206,12 @@ pub fn bench(seed: u64, c: &Conditions) -> Bench {
         drift: r.between(-c.most_drift, c.most_drift),
         // Up to 3 ppm per hour.
         wander: r.between(-3e-6, 3e-6) / 3.6e9,
-        swing: if c.wander == Wander::Swings {
-            (1e-6, std::f64::consts::TAU / r.between(2e8, 9e8))
-        } else {
-            (0.0, 1.0)
+        swing: match c.wander {
+            Wander::Swings(low, high) => {
+                let period_us = 1e6 * r.between(low, high);
+                (1e-6, std::f64::consts::TAU / period_us)
+            }
+            _ => (0.0, 1.0),
         },
         walk: walk(&mut r, c),
     };

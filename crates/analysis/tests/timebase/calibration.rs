@@ -1,5 +1,7 @@
 //! Calibration of every stated interval: how often it holds at each level, and whether ranks are uniform, over many benches.
 
+use std::ops::RangeInclusive;
+
 use rayon::prelude::*;
 use skinrig_analysis::result::AlignmentStatus;
 use skinrig_analysis::timebase::Reading;
@@ -8,33 +10,43 @@ use skinrig_model::AlignmentSettings;
 use crate::bench::{CLEAN, Conditions, Delay, NOISY, Wander, bench};
 
 /// Readings that state an interval.
-const READ: [&str; 6] = [
+const READ: [&str; 5] = [
     "camera from box",
     "camera 2 from camera 1",
     "host from box",
     "camera from host",
     "drift",
-    "drift of the box",
 ];
 
 /// One bench: what its certificate states, and how it really was.
 struct Judged {
     /// By the order of [`READ`]: what was read, and its error, µs (of the drift ppm).
-    read: [(Reading, f64); 6],
+    read: [(Reading, f64); 5],
     /// Held-out trains of all maps: within their interval, and all.
     held_out: (f64, f64),
     /// The certificate holds, errors lie within the bounds, no train has the name of another.
     valid: bool,
     bounded: bool,
     labelled: bool,
-    violations: Vec<String>,
 }
 
 /// Levels that intervals are judged at.
 const LEVELS: [f64; 5] = [0.5, 0.8, 0.9, 0.95, 0.99];
 
+/// Share of errors within an interval of 95 %.
+const STATED: RangeInclusive<f64> = 0.93..=0.97;
+
 /// Bins of the rank histogram.
 const BINS: usize = 20;
+
+/// Chi-square of even ranks is larger once in a thousand (19 degrees of freedom).
+const UNEVEN: f64 = 43.82;
+
+/// Sessions of 5 min and more, at most.
+const LONG: u64 = 500;
+
+/// What lies beyond [`STATED`], as `docs/time-base.md` says.
+const EXCEPTIONS: [(&str, &str); 0] = [];
 
 /// Error of each bench in one reading. Readings of a camera come late by a mean delay, the same on all benches: the
 /// bound is for it, not the interval.
@@ -67,10 +79,11 @@ fn unevenness(errors: &[(Reading, f64)]) -> f64 {
     each.sum::<f64>() / expected
 }
 
-fn held_out(judged: &[Judged]) -> f64 {
+/// Share of held-out trains within their interval; `None` when no bench states any.
+fn held_out(judged: &[Judged]) -> Option<f64> {
     let each = judged.iter().map(|j| j.held_out);
     let (inside, n) = each.fold((0.0, 0.0), |s, h| (s.0 + h.0, s.1 + h.1));
-    inside / n
+    (n > 0.0).then(|| inside / n)
 }
 
 fn judge(seed: u64, c: &Conditions) -> Judged {
@@ -104,10 +117,13 @@ fn judge(seed: u64, c: &Conditions) -> Judged {
     let fit = base.clocks[k].unwrap();
     let (first, last) = b.seen_us[k];
     let rate = (camera.at(last) - camera.at(first)) / (last - first) - 1.0;
-    let stated = Reading {
-        us: fit.drift_ppm,
-        se_us: fit.drift_se_ppm,
-        free: 1e9,
+    let drift = base.drift(k).unwrap();
+    let stated = 1.96 * fit.drift_se_ppm / drift.half_width_ppm(0.95);
+    assert!((stated - 1.0).abs() < 1e-3, "seed {seed}: {stated}");
+    let of_drift = Reading {
+        us: drift.ppm,
+        se_us: drift.se_ppm,
+        free: drift.free,
         bound_us: 0.0,
     };
     let held_out = a.maps.iter().fold((0.0, 0.0), |sum, m| {
@@ -120,16 +136,17 @@ fn judge(seed: u64, c: &Conditions) -> Judged {
             (between, between.us - b.cameras[1].at(shown_at)),
             (host, host_off),
             (of_host, of_host_off),
-            (stated, fit.drift_ppm - 1e6 * rate),
-            (stated, fit.drift_ppm - 1e6 * rate),
+            (of_drift, drift.ppm - 1e6 * rate),
         ],
         held_out,
         valid: a.status == AlignmentStatus::Valid,
         bounded,
         labelled,
-        violations: a.violations.clone(),
     }
 }
+
+/// Rates that change by up to 2 ppm in a minute: beyond what the certificate takes a crystal to do.
+const FAST: &str = "rates that swing in 200 to 900 s, 5 min";
 
 fn conditions() -> Vec<(&'static str, Conditions)> {
     let decaying = Conditions {
@@ -144,10 +161,10 @@ fn conditions() -> Vec<(&'static str, Conditions)> {
         ("nothing lost, 40 s", CLEAN),
         ("decaying edges, 40 s", decaying),
         (
-            "a fifth of the trains lost, 40 s",
+            "a tenth of the trains lost, 40 s",
             Conditions {
                 lost: 0.05,
-                lost_trains: 0.2,
+                lost_trains: 0.1,
                 ..NOISY
             },
         ),
@@ -173,6 +190,13 @@ fn conditions() -> Vec<(&'static str, Conditions)> {
             },
         ),
         (
+            "host busy for a third, 2 min",
+            Conditions {
+                delay: Delay::Loaded,
+                ..c(120.0)
+            },
+        ),
+        (
             "an exchange each 4 s, 40 s",
             Conditions {
                 exchange_s: 4.0,
@@ -181,9 +205,16 @@ fn conditions() -> Vec<(&'static str, Conditions)> {
         ),
         ("noisy, 5 min", c(300.0)),
         (
-            "rates that swing, 5 min",
+            "rates that swing in 20 to 60 min, 5 min",
             Conditions {
-                wander: Wander::Swings,
+                wander: Wander::Swings(1200.0, 3600.0),
+                ..c(300.0)
+            },
+        ),
+        (
+            FAST,
+            Conditions {
+                wander: Wander::Swings(200.0, 900.0),
                 ..c(300.0)
             },
         ),
@@ -195,11 +226,11 @@ fn conditions() -> Vec<(&'static str, Conditions)> {
             },
         ),
         (
-            "a train each 4 s, 1 h",
+            "a train each 4 s, swinging rates, 1 h",
             Conditions {
                 sync_s: 4,
                 exchange_s: 1.0,
-                wander: Wander::Swings,
+                wander: Wander::Swings(1200.0, 3600.0),
                 ..c(3600.0)
             },
         ),
@@ -208,44 +239,96 @@ fn conditions() -> Vec<(&'static str, Conditions)> {
 
 /// Prints the table of `docs/time-base.md`.
 #[test]
-#[ignore = "minutes"]
+#[ignore = "half an hour: BENCHES=2000 cargo test -p skinrig-analysis --test timebase intervals_hold_in_every_condition -- --ignored --nocapture"]
 fn intervals_hold_in_every_condition() {
-    let n: u64 = std::env::var("BENCHES").map_or(500, |n| n.parse().unwrap());
-    let from: u64 = std::env::var("FROM").map_or(1000, |n| n.parse().unwrap());
+    let number = |name: &str, usual: u64| -> u64 {
+        std::env::var(name).map_or(usual, |n| n.parse().unwrap())
+    };
+    let (from, benches) = (number("FROM", 1000), number("BENCHES", 500));
     let only = std::env::var("ONLY").unwrap_or_default();
+    let mut beyond = Vec::new();
     for (name, c) in conditions() {
         if !name.contains(&only) {
             continue;
         }
-        let n = if c.span_s > 1000.0 { n.min(500) } else { n };
+        let n = if c.span_s < 200.0 {
+            benches
+        } else {
+            benches.min(LONG)
+        };
         let judged: Vec<Judged> = (from..from + n)
             .into_par_iter()
             .map(|seed| judge(seed, &c))
             .collect();
+        for j in &judged {
+            assert!(j.valid && j.bounded && j.labelled, "{name}");
+        }
         for (what, read) in READ.iter().enumerate() {
             let errors = errors(&judged, what);
-            let words = shares(&errors).map(|s| format!("{:.1}", 100.0 * s));
-            let mean = errors.iter().map(|e| e.1).sum::<f64>() / errors.len() as f64;
-            let sd = (errors.iter().map(|e| e.1 * e.1).sum::<f64>() / errors.len() as f64).sqrt();
-            let se = (errors.iter().map(|e| e.0.se_us * e.0.se_us).sum::<f64>()
-                / errors.len() as f64)
-                .sqrt();
-            println!(
-                "| {name} | {read} | {} | {:.0} | {mean:.3} {sd:.3} {se:.3}",
-                words.join(" | "),
-                unevenness(&errors)
-            );
+            let shares = shares(&errors);
+            let words = shares.map(|s| format!("{:.1}", 100.0 * s)).join(" | ");
+            let chi = unevenness(&errors);
+            println!("| {name} | {read} | {n} | {words} | {chi:.0} |");
+            if !STATED.contains(&shares[3]) && !EXCEPTIONS.contains(&(name, read)) {
+                beyond.push(format!("{name}, {read}: {}", shares[3]));
+            }
         }
-        let count = |of: fn(&Judged) -> bool| judged.iter().filter(|j| !of(j)).count();
-        println!(
-            "{name}: invalid {}, beyond the bound {}, mislabelled {}",
-            count(|j| j.valid),
-            count(|j| j.bounded),
-            count(|j| j.labelled)
-        );
-        println!(
-            "| {name} | held-out trains | | | | {:.1} | | |",
-            100.0 * held_out(&judged)
-        );
+        let share = held_out(&judged);
+        let words = share.map_or("-".to_owned(), |s| format!("{:.1}", 100.0 * s));
+        println!("| {name} | held-out trains | {n} | | | | {words} | | |");
+        if share.is_some_and(|s| !STATED.contains(&s)) {
+            beyond.push(format!("{name}, held out: {share:?}"));
+        }
+    }
+    assert!(beyond.is_empty(), "{beyond:#?}");
+}
+
+/// 500 benches with drifts up to 500 ppm, jitter, 20 % of the edges lost and 5 % spurious.
+#[test]
+fn labels_are_right_and_intervals_hold_as_often_as_they_say_on_500_noisy_benches() {
+    let judged: Vec<Judged> = (0..500u64)
+        .into_par_iter()
+        .map(|seed| judge(seed, &NOISY))
+        .collect();
+    assert!(judged.iter().all(|j| j.valid && j.bounded && j.labelled));
+    for (what, name) in READ.iter().enumerate() {
+        let errors = errors(&judged, what);
+        let shares = shares(&errors);
+        assert!(STATED.contains(&shares[3]), "{name}: {shares:?}");
+        for (level, share) in LEVELS.iter().zip(shares) {
+            // Three standard deviations of such a count.
+            let chance = 3.0 * (level * (1.0 - level) / 500.0).sqrt();
+            assert!((share - level).abs() < chance, "{name}, {level}: {share}");
+        }
+        let chi = unevenness(&errors);
+        assert!(chi < UNEVEN, "{name}: {chi}");
+    }
+    let share = held_out(&judged).unwrap();
+    assert!(STATED.contains(&share), "held out: {share}");
+    let of_box = judged.iter().map(|j| j.read[0]);
+    let (mut off, bounds): (Vec<f64>, Vec<f64>) =
+        of_box.map(|(r, off)| (off.abs(), r.bound_us)).unzip();
+    off.sort_by(f64::total_cmp);
+    assert!(off[250] < 2.0, "median error {} µs", off[250]);
+    assert!(bounds.iter().all(|b| *b < 5.0));
+}
+
+/// Ten seconds have too few trains for the interval that held-out trains are judged by; exchanges are few besides.
+#[test]
+fn short_sessions_state_no_coverage_of_trains_and_hold_their_other_intervals() {
+    let c = Conditions {
+        span_s: 10.0,
+        ..NOISY
+    };
+    let judged: Vec<Judged> = (0..500u64)
+        .into_par_iter()
+        .map(|seed| judge(seed, &c))
+        .collect();
+    assert!(judged.iter().all(|j| j.valid && j.bounded && j.labelled));
+    assert_eq!(held_out(&judged), None);
+    for (what, name) in READ.iter().enumerate() {
+        let shares = shares(&errors(&judged, what));
+        // Three standard deviations of such a count: 92.1 to 97.9 %.
+        assert!((shares[3] - 0.95).abs() < 0.0293, "{name}: {shares:?}");
     }
 }
