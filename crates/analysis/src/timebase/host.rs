@@ -44,13 +44,15 @@ pub struct HostFromBox {
     pub ties_us: Vec<f64>,
     /// False when exchanges contradict each other: the clock jumped, or an exchange is wrong.
     pub consistent: bool,
+    points: Vec<Point>,
     bounds: Bounds,
 }
 
 impl HostFromBox {
     /// From exchanges in order of box time; `None` below 3 or without spread in time.
     pub fn new(ties: &[Tie]) -> Option<Self> {
-        let fit = Smooth::fit(&quickest(ties), STEP_US, FLOOR_US)?;
+        let points = quickest(ties);
+        let fit = Smooth::fit(&points, STEP_US, FLOOR_US)?;
         let (first, last) = (ties.first()?.box_us, ties.last()?.box_us);
         let (bounds, consistent) = Bounds::new(ties, &fit);
         let steps = ((last - first) / STEP_US).ceil().max(1.0) as usize;
@@ -60,6 +62,7 @@ impl HostFromBox {
                 .map(|k| first + (last - first) * k as f64 / steps as f64)
                 .collect(),
             fit,
+            points,
             ties_us: ties.iter().map(|t| t.box_us).collect(),
             consistent,
             bounds,
@@ -93,6 +96,12 @@ impl HostFromBox {
             se: self.fit.standard_error(box_us),
             free: self.fit.free,
         }
+    }
+
+    /// Mean rate of host over box time, less 1, between two box times, µs, with its statistical error.
+    pub fn drift(&self, between_us: (f64, f64)) -> Option<Figure> {
+        let fit = Smooth::fit_with_drift(&self.points, STEP_US, FLOOR_US, Some(between_us))?;
+        Some(fit.drift)
     }
 
     /// Half width of the interval about [`Self::host_us`] that certainly holds the host time of a box time, µs.

@@ -564,7 +564,7 @@ fn drift(leg: &[&Piece], k: usize) -> Option<Figure> {
         return None;
     }
     let both = if leg.len() == 1 {
-        from.map.drift.less(first.host.fit.drift)
+        from.map.drift.less(first.host.drift((x0, x1))?)
     } else {
         // Each end errs by itself.
         let ends = from.at(x0).less(first.host.at(x0));

@@ -103,7 +103,7 @@ pub struct Smooth {
     pub used: Vec<bool>,
     /// For each point, when it was on the first clock and its residual, µs.
     pub residuals: Vec<(f64, f64)>,
-    /// Mean rate difference from the first point used to the last, and its standard error.
+    /// Mean rate difference between two times, the first point used and the last unless others are asked for.
     pub drift: Figure,
 }
 
@@ -111,6 +111,16 @@ impl Smooth {
     /// Fits `points`, which are in order of `from_us`, in steps of at least `step_us`. Residuals are never judged finer than
     /// `floor_us`. `None` below 3 points or without spread in time.
     pub fn fit(points: &[Point], step_us: f64, floor_us: f64) -> Option<Self> {
+        Self::fit_with_drift(points, step_us, floor_us, None)
+    }
+
+    /// As [`Self::fit`], with the drift between two times on the first clock, µs, instead of the first and last point used.
+    pub fn fit_with_drift(
+        points: &[Point],
+        step_us: f64,
+        floor_us: f64,
+        between_us: Option<(f64, f64)>,
+    ) -> Option<Self> {
         let pairs: Vec<Pair> = points
             .iter()
             .map(|p| Pair {
@@ -132,7 +142,7 @@ impl Smooth {
         let mut found = None;
         for _ in 0..ROUNDS {
             let chosen: Vec<(f64, f64, f64)> = picked(&deviations, &used).collect();
-            let posterior = Posterior::new(&chosen, step_us)?;
+            let posterior = Posterior::new(&chosen, step_us, between_us)?;
             let residuals: Vec<f64> = deviations
                 .iter()
                 .map(|(x, y, _)| y - posterior.grid.value(&posterior.mean, *x))
@@ -362,7 +372,11 @@ struct Posterior {
 }
 
 impl Posterior {
-    fn new(points: &[(f64, f64, f64)], step_us: f64) -> Option<Self> {
+    fn new(
+        points: &[(f64, f64, f64)],
+        step_us: f64,
+        between_us: Option<(f64, f64)>,
+    ) -> Option<Self> {
         let n = points.len();
         let (first, last) = (points.first()?.0, points.last()?.0);
         let span = last - first;
@@ -400,11 +414,12 @@ impl Posterior {
             }
             squares += counts * y * y;
         }
-        let ends = [grid.weights(first), grid.weights(last)];
+        let (from, to) = between_us.unwrap_or((first, last));
+        let ends = [grid.weights(from), grid.weights(to)];
         let mut chord = vec![0.0; size];
         for ((k, w), sign) in ends.iter().zip([-1.0, 1.0]) {
             for i in 0..4 {
-                chord[k + i] += sign * w[i] / span;
+                chord[k + i] += sign * w[i] / (to - from);
             }
         }
         let mut data = Data {
@@ -716,7 +731,7 @@ mod tests {
             .iter()
             .map(|p| (p.from_us, p.to_us - p.from_us, 1.0))
             .collect();
-        let posterior = Posterior::new(&all, 10e6).unwrap();
+        let posterior = Posterior::new(&all, 10e6, None).unwrap();
         let size = posterior.grid.size();
         let mut data = Data {
             free: FREE,
