@@ -11,8 +11,7 @@ use skinrig_model::TriggerEdge;
 use skinrig_model::pulse::{PulseTrain, ReadTrain, read_trains};
 
 use super::epochs::{Epoch, Sent};
-use super::smooth::{Figure, Point, Smooth, WANDER};
-use super::{FLOOR_US, STEP_US};
+use super::smooth::{FLOOR_US, Figure, Point, STEP_US, Smooth, WANDER};
 use crate::clock::line::median;
 use crate::result::LineCounts;
 

@@ -1,7 +1,6 @@
 //! How often trains that a fit has not seen lie in the interval that it states for them.
 
-use super::smooth::{Point, Smooth};
-use super::{FLOOR_US, STEP_US};
+use super::smooth::{FLOOR_US, Point, STEP_US, Smooth};
 
 /// (inside, of how many): each half of the points against the fit to the other half, in the interval stated for a point;
 /// `None` when a half allows no fit, or has too few points to state such an interval.

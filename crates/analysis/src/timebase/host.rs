@@ -7,7 +7,7 @@
 
 use super::edges::{beyond_us, distance_us};
 use super::epochs::Tie;
-use super::smooth::{Figure, Point, Smooth, WANDER};
+use super::smooth::{Figure, Point, STEP_US, Smooth, WANDER};
 use crate::clock::NO_CLOCK_DRIFT;
 use crate::clock::line::median;
 
@@ -30,8 +30,6 @@ const SHAPE: f64 = 0.05e-6;
 const FLOOR_US: f64 = 20.0;
 /// Rounds of a search that each leave a hundredth at most: no clock is off by more.
 const ROUNDS: usize = 9;
-/// Steps of the fit, and of the map along it, are at least this long, µs.
-const STEP_US: f64 = super::STEP_US;
 
 /// The map.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,6 +1,7 @@
 //! What each map leaves of its points, thinned so that it can be drawn.
 
-use super::{Piece, TimeBase};
+use super::base::TimeBase;
+use super::piece::Piece;
 use crate::result::{ClockResidual, ClockResiduals, MapName};
 use crate::timebase::smooth::Smooth;
 

@@ -54,6 +54,17 @@ pub struct Clock {
 const WALK_STEP_US: f64 = 1e6;
 
 impl Clock {
+    /// 20 ppm fast, with a rate that swings by `swing` (share, angular frequency per µs).
+    pub fn swinging(origin_us: f64, swing: (f64, f64)) -> Self {
+        Self {
+            origin_us,
+            drift: 20e-6,
+            wander: 0.0,
+            swing,
+            walk: Arc::new([]),
+        }
+    }
+
     /// What it shows at a host time.
     pub fn at(&self, host_us: f64) -> f64 {
         self.origin_us

@@ -33,6 +33,10 @@ struct Judged {
 /// Levels that intervals are judged at.
 const LEVELS: [f64; 5] = [0.5, 0.8, 0.9, 0.95, 0.99];
 
+/// Share of errors within the interval of each level.
+const BANDS: [RangeInclusive<f64>; 5] =
+    [0.45..=0.55, 0.76..=0.84, 0.87..=0.93, STATED, 0.98..=0.999];
+
 /// Share of errors within an interval of 95 %.
 const STATED: RangeInclusive<f64> = 0.93..=0.97;
 
@@ -283,10 +287,10 @@ fn intervals_hold_in_every_condition() {
     assert!(beyond.is_empty(), "{beyond:#?}");
 }
 
-/// 500 benches with drifts up to 500 ppm, jitter, 20 % of the edges lost and 5 % spurious.
+/// 1000 benches with drifts up to 500 ppm, jitter, 20 % of the edges lost and 5 % spurious.
 #[test]
-fn labels_are_right_and_intervals_hold_as_often_as_they_say_on_500_noisy_benches() {
-    let judged: Vec<Judged> = (0..500u64)
+fn labels_are_right_and_intervals_hold_as_often_as_they_say_on_1000_noisy_benches() {
+    let judged: Vec<Judged> = (0..1000u64)
         .into_par_iter()
         .map(|seed| judge(seed, &NOISY))
         .collect();
@@ -294,11 +298,8 @@ fn labels_are_right_and_intervals_hold_as_often_as_they_say_on_500_noisy_benches
     for (what, name) in READ.iter().enumerate() {
         let errors = errors(&judged, what);
         let shares = shares(&errors);
-        assert!(STATED.contains(&shares[3]), "{name}: {shares:?}");
-        for (level, share) in LEVELS.iter().zip(shares) {
-            // Three standard deviations of such a count.
-            let chance = 3.0 * (level * (1.0 - level) / 500.0).sqrt();
-            assert!((share - level).abs() < chance, "{name}, {level}: {share}");
+        for (band, share) in BANDS.iter().zip(shares) {
+            assert!(band.contains(&share), "{name}: {share} in {band:?}");
         }
         let chi = unevenness(&errors);
         assert!(chi < UNEVEN, "{name}: {chi}");
@@ -309,7 +310,7 @@ fn labels_are_right_and_intervals_hold_as_often_as_they_say_on_500_noisy_benches
     let (mut off, bounds): (Vec<f64>, Vec<f64>) =
         of_box.map(|(r, off)| (off.abs(), r.bound_us)).unzip();
     off.sort_by(f64::total_cmp);
-    assert!(off[250] < 2.0, "median error {} µs", off[250]);
+    assert!(off[500] < 2.0, "median error {} µs", off[500]);
     assert!(bounds.iter().all(|b| *b < 5.0));
 }
 

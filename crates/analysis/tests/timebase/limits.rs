@@ -4,7 +4,7 @@ use skinrig_analysis::result::AlignmentStatus;
 use skinrig_analysis::timebase::{Ties, TimeBase};
 use skinrig_model::{AlignmentSettings, BoxReport, HostTime};
 
-use crate::bench::{Bench, CLEAN, NOISY, bench};
+use crate::bench::{Bench, CLEAN, Clock, Conditions, NOISY, Random, bench, run};
 
 fn status(b: &Bench, limits: &AlignmentSettings) -> (AlignmentStatus, String) {
     let a = b.align(limits).alignment;
@@ -104,6 +104,43 @@ fn a_session_beyond_any_limit_is_invalid_and_says_which() {
         }
     }
     assert_eq!(status(&jumped, &limits).0, AlignmentStatus::Invalid);
+}
+
+/// Clocks whose rate changes faster than a clock's may: of a camera, of the box, and a jump. Their trains came, and are not called lost.
+#[test]
+fn a_clock_that_drifts_too_fast_is_told_from_a_wire_that_loses() {
+    let limits = AlignmentSettings::default();
+    let steady = Clock::swinging(5e8, (0.0, 1.0));
+    for period_s in [3.0, 7.0, 20.0] {
+        for ppm in [100.0, 300.0, 1_000.0] {
+            let swinging =
+                Clock::swinging(3e9, (ppm * 1e-6, std::f64::consts::TAU / (period_s * 1e6)));
+            for (of_box, name) in [(false, "camera 1"), (true, "trigger box")] {
+                let (boxed, one) = match of_box {
+                    true => (swinging.clone(), steady.clone()),
+                    false => (steady.clone(), swinging.clone()),
+                };
+                let b = run(Random(9), boxed, [one, steady.clone()], &CLEAN);
+                let (found, words) = status(&b, &limits);
+                let case = format!("{name}, {ppm} ppm in {period_s} s: {words}");
+                assert_eq!(found, AlignmentStatus::Invalid, "{case}");
+                assert!(words.contains(&format!("{name}, clock drift: ")), "{case}");
+                assert!(!words.contains("edges: expected"), "{case}");
+            }
+        }
+    }
+    // A wire that loses and invents edges is no clock's fault.
+    let worn = Conditions {
+        lost: 0.4,
+        spurious: 0.05,
+        ..CLEAN
+    };
+    let (found, words) = status(&bench(1, &worn), &limits);
+    assert_eq!(found, AlignmentStatus::Invalid);
+    assert!(
+        words.contains("lost edges") && !words.contains("clock drift"),
+        "{words}"
+    );
 }
 
 #[test]

@@ -1,0 +1,51 @@
+//! Clocks that drift faster than a clock may, told from wires that lose edges.
+
+use skinrig_model::AlignmentSettings;
+
+use super::base::TimeBase;
+use super::edges::{NEAR_US, OffLine};
+use crate::result::Alignment;
+
+impl TimeBase {
+    /// Trains that camera `k` saw away from the line of its clock, in all legs.
+    pub(super) fn off_line(&self, k: usize) -> OffLine {
+        let each = self.pieces.iter().filter_map(|p| p.cameras[k].as_ref());
+        each.fold(OffLine::default(), |sum, c| sum.and(c.off_line))
+    }
+}
+
+/// True when most of what camera `k` misses came, away from the line: the wire is well, and a clock is not.
+pub fn drifts(
+    k: usize,
+    off_line: OffLine,
+    alignment: &Alignment,
+    limits: &AlignmentSettings,
+) -> bool {
+    alignment.lines.get(k).is_some_and(|line| {
+        let missing = line.trains_sent - line.trains_seen;
+        line.share(line.lost) > limits.max_lost && 2 * off_line.trains > missing
+    })
+}
+
+/// Which clock drifts, in words: what both cameras see is the box's.
+pub fn drifting(
+    drifts: [bool; 2],
+    off_line: [OffLine; 2],
+    alignment: &Alignment,
+) -> Option<String> {
+    let (clock, k) = match drifts {
+        [true, true] => ("trigger box", 0),
+        [true, false] => ("camera 1", 0),
+        [false, true] => ("camera 2", 1),
+        [false, false] => return None,
+    };
+    Some(format!(
+        "{clock}, clock drift: expected the trains that camera {} saw within {:.0} µs of the line of a clock, found {} of {} up to {:.0} µs \
+         off it: they came, and this clock drifts faster than a clock may, or jumps",
+        k + 1,
+        NEAR_US[1],
+        off_line[k].trains,
+        alignment.lines[k].trains_sent,
+        off_line[k].most_us
+    ))
+}

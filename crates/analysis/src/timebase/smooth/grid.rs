@@ -1,0 +1,37 @@
+//! Cubic B-splines on equal steps of time.
+
+/// Equal steps of time, and the cubic B-splines on them: one more than steps to the left, two to the right.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Grid {
+    pub start_us: f64,
+    pub step_us: f64,
+    pub steps: usize,
+}
+
+impl Grid {
+    pub fn size(&self) -> usize {
+        self.steps + 3
+    }
+
+    /// Number of the first of the four splines that are not 0 at `x`, and their values there; beyond the ends the outer
+    /// polynomials go on.
+    pub fn weights(&self, x: f64) -> (usize, [f64; 4]) {
+        let at = (x - self.start_us) / self.step_us;
+        let k = (at.floor().max(0.0) as usize).min(self.steps - 1);
+        let u = at - k as f64;
+        let v = 1.0 - u;
+        let weights = [
+            v * v * v / 6.0,
+            (3.0 * u * u * u - 6.0 * u * u + 4.0) / 6.0,
+            (3.0 * v * v * v - 6.0 * v * v + 4.0) / 6.0,
+            u * u * u / 6.0,
+        ];
+        (k, weights)
+    }
+
+    pub fn value(&self, coefficients: &[f64], x: f64) -> f64 {
+        let (first, weights) = self.weights(x);
+        let near = coefficients[first..first + 4].iter().zip(weights);
+        near.map(|(c, w)| c * w).sum()
+    }
+}
