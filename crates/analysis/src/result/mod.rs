@@ -137,7 +137,8 @@ pub struct ClockFit {
     pub offset_us: f64,
     /// Rate difference, parts per million.
     pub drift_ppm: f64,
-    /// Standard error of the drift, ppm.
+    /// Standard error of the drift, ppm: 1.96 of it are half of the 95 % interval, for rates that change evenly or in small steps. Of
+    /// rates that swing it may be too small (`docs/time-base.md`).
     pub drift_se_ppm: f64,
     /// Root mean square residual, µs.
     pub residual_rms_us: f64,
