@@ -1,6 +1,5 @@
 //! The time base on emulated benches: labels, errors, intervals and limits, from edges and exchanges alone.
 
-#![expect(clippy::print_stdout, reason = "the table of the documentation")]
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 mod bench;
