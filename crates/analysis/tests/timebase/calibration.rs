@@ -275,7 +275,7 @@ fn conditions() -> Vec<(&'static str, Conditions)> {
 
 /// Prints the table of `docs/time-base.md`.
 #[test]
-#[ignore = "half an hour: BENCHES=2000 cargo test -p skinrig-analysis --test timebase intervals_hold_in_every_condition -- --ignored --nocapture"]
+#[ignore = "half an hour: SKINRIG_CI_LONG=1 .ci/run, or BENCHES=2000 cargo test -p skinrig-analysis --test timebase intervals_hold_in_every_condition -- --ignored --nocapture"]
 fn intervals_hold_in_every_condition() {
     let number = |name: &str, usual: u64| -> u64 {
         std::env::var(name).map_or(usual, |n| n.parse().unwrap())

@@ -132,7 +132,7 @@ fn what_was_let_pass_once_is_accepted_by_the_lines_that_were_proposed() {
         !told.contains("tolerated") && !told.contains("let pass"),
         "{told}"
     );
-    let reader = SessionReader::open(&the_only(&sessions, ".session.sqlite")).unwrap();
+    let reader = SessionReader::open(the_only(&sessions, ".session.sqlite")).unwrap();
     let name = reader.header().unwrap().rig_name;
     assert!(!name.contains("tolerated"), "{name}");
 }

@@ -100,8 +100,10 @@ impl Blocking {
         }
         let until = lock(&self.world).t.saturating_add(ms.saturating_mul(MS));
         self.until.store(until, Ordering::Release);
-        while ms == FOR_EVER_MS {
-            thread::park();
+        if ms == FOR_EVER_MS {
+            loop {
+                thread::park();
+            }
         }
         while lock(&self.world).t < until {
             thread::yield_now();
@@ -208,11 +210,14 @@ impl Indenter for WatchedIndenter {
     }
 }
 
+/// The calls of a device that are under way, and until when it is held in one, ns.
+type HeldDevice = (Calls, Arc<AtomicI64>);
+
 /// The rig's clock, which goes on when every device has answered or is held in a call.
 #[derive(Clone)]
 struct SettledClock {
     world: Shared,
-    devices: Arc<Mutex<Vec<(Calls, Arc<AtomicI64>)>>>,
+    devices: Arc<Mutex<Vec<HeldDevice>>>,
 }
 
 impl Clock for SettledClock {
