@@ -17,7 +17,7 @@ fn spoilt(folder: &Path) -> std::path::PathBuf {
     run.args(["--fault", "camera1-stalled@approach:10"]);
     let said = expect(run, 3);
     for part in [
-        "3 of 12 presses are invalid through the rig and not the skin: press 10: camera 1 sent no bytes",
+        "3 of 12 presses are invalid because of the rig, not the skin: press 10: camera 1 sent no bytes",
         "take these presses again with `skinrig resume ",
     ] {
         assert!(said.contains(part), "expected {part:?} in {said}");

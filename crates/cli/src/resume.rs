@@ -194,7 +194,7 @@ fn describe(session: &Path, found: &Unfinished, wanted: &[bool]) -> String {
         None => "cut off".to_owned(),
         Some(RunEnd::Stopped(reason)) => format!("stopped: {reason}"),
         Some(RunEnd::Faulted(reason)) => format!("faulted: {reason}"),
-        Some(RunEnd::Completed) => "completed, but the rig cost presses".to_owned(),
+        Some(RunEnd::Completed) => "completed, with presses spoiled by the rig".to_owned(),
     };
     let all = || found.plan.presses.iter().zip(&found.histories).zip(wanted);
     let valid = all().filter(|((_, h), _)| h.verdict == Some(PressVerdict::Valid));

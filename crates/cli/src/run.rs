@@ -329,7 +329,7 @@ fn cost_by_the_rig(session: &Path) -> Result<Option<String>, RecorderError> {
         return Ok(None);
     }
     let mut words = format!(
-        "all of the plan was done, but {} of {} presses are invalid through the rig and not the skin: {}",
+        "all of the plan was done, but {} of {} presses are invalid because of the rig, not the skin: {}",
         cost.len(),
         plan.presses.len(),
         cost.iter()

@@ -37,7 +37,7 @@ pub fn refuse_special_files(path: &Path) -> Result<(), RecorderError> {
             let what = if metadata.is_symlink() {
                 "a link"
             } else {
-                "something that is no file"
+                "something that is not a regular file"
             };
             return not(format!("{what} beside it, {}: remove it", file.display()));
         }

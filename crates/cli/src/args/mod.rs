@@ -59,7 +59,7 @@ pub enum Command {
         three times switches the motors off where the tip is. The session is closed and stays readable.")]
     Run(RunArgs),
 
-    /// Go on with a session that was cut off, stopped or broken off by a fault, or that the rig cost presses.
+    /// Go on with a session that was cut off, stopped or ended by a fault, or in which the rig spoiled presses.
     #[command(
         after_help = "Examples:\n  skinrig resume sessions/NAME.session.sqlite\n  \
         skinrig resume sessions/NAME.session.sqlite --rig hil/rigs/NAME.yaml\n\n\
