@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use skinrig_analysis::timebase::{Wire, wire};
+use skinrig_analysis::timebase::{Wire, WireTrain, wire};
 use skinrig_model::pulse::{MAX_MARKED_PRESS, PULSES_PER_TRAIN, decode_marks};
 use skinrig_model::{
     BoxReport, CameraId, HostDuration, Label, Mark, MarkKind, PressId, RawChunk, TriggerEdge,
@@ -85,7 +85,8 @@ pub fn trigger_loopback(check: &Check, bench: &mut dyn Bench, found: &mut Findin
         streams.pass(REST, see);
     }
     streams.pass(MARGIN, see);
-    let reports = streams.reports().to_vec();
+    let reports = among(streams.reports(), &sent);
+    let told_of_all = streams.box_was_heard_well() && !skips(&reports);
     let seen = streams.finish(found, METRICS, see);
     if reports.iter().any(|r| matches!(r, BoxReport::Reset { .. })) {
         let what = "expected the box's clock to go on, found that the box was reset";
@@ -100,9 +101,13 @@ pub fn trigger_loopback(check: &Check, bench: &mut dyn Bench, found: &mut Findin
             continue;
         }
         let subject = trouble::of_camera(camera);
-        if sent.len() < trains as usize {
+        // Of a train that the box's reports leave out nothing says whether it was lost or nobody sent it.
+        if sent.len() < trains as usize || !told_of_all {
             for metric in METRICS {
-                found.unmeasured(subject, metric);
+                let value = found.unmeasured(subject, metric);
+                if !told_of_all {
+                    value.noting("the box did not tell of every train that it sent");
+                }
             }
             continue;
         }
@@ -204,20 +209,76 @@ impl Line {
     }
 }
 
-/// Pulses that did not come through whole, of the marks that were sent and of what the box sent by itself among them. A mark that
-/// the box does not know of is lost as a whole.
-fn lost_pulses(wire: &Wire, sent: &[Mark]) -> u64 {
-    let marks: BTreeSet<Mark> = sent.iter().copied().collect();
-    let is_ours = |label: Label| matches!(label, Label::Mark(m) if marks.contains(&m));
-    let ours = || wire.trains.iter().filter(|t| is_ours(t.label));
-    let Some(first) = ours().map(|t| t.box_us).min() else {
-        return sent.len() as u64 * PULSES_PER_TRAIN;
-    };
-    let last = ours().map(|t| t.box_us).max().unwrap_or(first);
-    let among = wire
-        .trains
+/// The reports without the trains before the first of the marks that were sent, and without those after the last: the cameras may have
+/// seen a part of these only.
+fn among(reports: &[BoxReport], sent: &[Mark]) -> Vec<BoxReport> {
+    let is_ours = |r: &BoxReport| matches!(r, BoxReport::Mark { mark, .. } if sent.contains(mark));
+    let (first, last) = (
+        reports.iter().position(is_ours),
+        reports.iter().rposition(is_ours),
+    );
+    let within = |k: usize| first.is_some_and(|f| f <= k) && last.is_some_and(|l| k <= l);
+    let is_train = |r: &BoxReport| matches!(r, BoxReport::Mark { .. } | BoxReport::Sync { .. });
+    let kept = reports
         .iter()
-        .filter(|t| (first..=last).contains(&t.box_us));
-    let unknown = marks.len().saturating_sub(ours().count()) as u64;
-    among.map(|t| u64::from(t.lost_pulses)).sum::<u64>() + unknown * PULSES_PER_TRAIN
+        .enumerate()
+        .filter(|(k, r)| within(*k) || !is_train(r));
+    kept.map(|(_, r)| *r).collect()
+}
+
+/// Whether sync trains, which the box counts, are missing among `reports`.
+fn skips(reports: &[BoxReport]) -> bool {
+    let counts = reports.iter().filter_map(|r| match r {
+        BoxReport::Sync { count, .. } => Some(*count),
+        _ => None,
+    });
+    let counts: Vec<u32> = counts.collect();
+    counts
+        .windows(2)
+        .any(|c| c[1] != (c[0] + 1) & MAX_MARKED_PRESS)
+}
+
+/// Pulses that did not come through whole. A mark that the box does not know of is lost as a whole.
+fn lost_pulses(wire: &Wire, sent: &[Mark]) -> u64 {
+    let is_ours = |t: &&WireTrain| matches!(t.label, Label::Mark(m) if sent.contains(&m));
+    let known = wire.trains.iter().filter(is_ours).count();
+    let unknown = sent.len().saturating_sub(known) as u64;
+    let trains = wire.trains.iter();
+    trains.map(|t| u64::from(t.lost_pulses)).sum::<u64>() + unknown * PULSES_PER_TRAIN
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use skinrig_model::BoxTime;
+
+    #[test]
+    fn trains_between_the_first_mark_and_the_last_count_and_a_hole_among_them_shows() {
+        let sync = |count, us| BoxReport::Sync {
+            count,
+            at: BoxTime { us },
+        };
+        let marked = |n, us| BoxReport::Mark {
+            mark: mark(n),
+            at: BoxTime { us },
+        };
+        let sent = [mark(0), mark(1)];
+        let mut reports = vec![sync(MAX_MARKED_PRESS - 3, 0), marked(0, 1), marked(7, 2)];
+        reports.extend([
+            sync(MAX_MARKED_PRESS, 3),
+            sync(0, 4),
+            marked(1, 5),
+            sync(8, 6),
+        ]);
+        let within = among(&reports, &sent);
+        assert_eq!(within, reports[1..6]);
+        assert!(!skips(&within));
+        assert!(skips(&reports));
+        let reset = BoxReport::Reset {
+            noticed: skinrig_model::HostTime(9),
+        };
+        reports.push(reset);
+        assert_eq!(among(&reports, &sent).last(), Some(&reset));
+        assert_eq!(among(&reports[..1], &sent), []);
+    }
 }

@@ -130,6 +130,12 @@ impl<'a> Streams<'a> {
         &self.reports
     }
 
+    /// Whether everything that came from the box could be read, and the box says that it told everything.
+    #[must_use]
+    pub fn box_was_heard_well(&self) -> bool {
+        self.box_trouble.is_none() && self.box_noise.is_none()
+    }
+
     /// What becomes of the trigger box is no matter of this check: told here, it would excuse what is wrong with a camera.
     pub fn without_box(mut self) -> Self {
         self.box_matters = false;

@@ -299,7 +299,8 @@ impl Edges {
             }
         }
         counts.lost = counts.sent - counts.seen;
-        let within = first.start_us - NEAR_US[0]..=last.end_us;
+        // A train that nobody has told of may begin where the rest after the last one ends.
+        let within = first.start_us - NEAR_US[0]..=last.end_us - NEAR_US[0];
         let (mut rise, mut fall) = (None, None);
         for (edge, used) in self.all.iter().zip(&mut self.used) {
             let at_us = relative(edge.t_us, reference_us);

@@ -116,6 +116,16 @@ mod tests {
         let lost: Vec<u32> = worn.trains.iter().map(|t| t.lost_pulses).collect();
         assert_eq!(lost, [0, 1, 1, 0, 0, 0]);
         assert_eq!((worn.counts.doubled, worn.counts.spurious), (0, 1));
+        // The train after the last one that was told of, as early as the box can send it.
+        let (reports, mut edges) = sent(6);
+        let next_us = 77_000 + ((5.0 * 40_000.0 + PulseTrain::DURATION_US as f64) * 1.0003) as u64;
+        edges.push(TriggerEdge {
+            t_us: next_us,
+            channel: 6,
+            rising: true,
+        });
+        let cut = wire(&reports, &edges, 6).unwrap();
+        assert_eq!((cut.counts.doubled, cut.counts.spurious), (0, 0));
         assert!(wire(&reports, &edges, 0).is_err());
         assert!(wire(&[], &edges, 6).is_err());
     }

@@ -214,6 +214,10 @@ impl<'a> Producer<'a> {
         } = self.camera;
         let delay_ns = i64::from(config.trigger_delay_ns);
         for mut edge in world.take_edges(&config.serial, until_ns - delay_ns) {
+            // Told only now, by a source that lags behind: it came before the camera looked.
+            if edge.at_ns < self.run.from_ns {
+                continue;
+            }
             let jitter = self.random.below(u64::from(config.trigger_jitter_ns) + 1);
             edge.at_ns += delay_ns + jitter as i64;
             self.edges.push(edge);
