@@ -233,7 +233,16 @@ fn faults_in_each_device_make_the_right_checks_fail() {
 fn healthy(nights: &Nights) {
     let all = "identity,settings,disk,trigger_loopback,noise_dark,noise_lit,test_pattern,robot_state,repeatability,step_response,depth,force_ceiling,\
                watchdog_drill,stop_drill";
-    let seen = nights.night(all);
+    let mut seen = nights.night(all);
+    // A machine too busy to run the emulated devices in time says so, and is asked again.
+    for _ in 0..2 {
+        let checks = seen.night["checks"].as_array().unwrap();
+        if !checks.iter().any(|c| c["cause"] == "infrastructure") {
+            break;
+        }
+        eprintln!("once more: {}", seen.said);
+        seen = nights.night(all);
+    }
     for name in all.split(',') {
         let verdict = &seen.check(name)["verdict"];
         assert_eq!(verdict, "PASS", "{:#}\n{}", seen.check(name), seen.said);
