@@ -4,9 +4,10 @@
 use std::ops::Range;
 
 use skinrig::results::{Choices, analyze_session};
+use skinrig_analysis::Analysis;
 use skinrig_analysis::result::{Fault as Accused, Finding};
-use skinrig_model::{CameraId, RunEnd, SimLevel};
-use skinrig_sim::{Fault, SimConfig, simulated_rig};
+use skinrig_model::{CameraId, HostTime, RunEnd, SimLevel};
+use skinrig_sim::{Fault, SimConfig, When, simulated_rig};
 use skinrig_tests::{planned, record};
 
 /// Twelve places, twice: enough for every law of the audit.
@@ -28,20 +29,118 @@ analysis: {bootstrap_resamples: 20, study_presses: 0}
 
 /// What the audit finds in a session of [`PROTOCOL`] on a rig drawn from `seed`.
 fn findings(seed: u64, faults: Vec<Fault>) -> Vec<Finding> {
-    let (protocol, plan) = planned(PROTOCOL).unwrap();
-    let mut config = SimConfig::new(seed, SimLevel::Geometric);
-    config.faults = faults;
-    let lab = tempfile::tempdir().unwrap();
-    let path = lab.path().join("audit.session.sqlite");
-    let report = record(&protocol, &plan, simulated_rig(&config), &path, |_, _| {}).unwrap();
-    assert_eq!(report.end, RunEnd::Completed, "seed {seed}: {report:?}");
-    let analysis = analyze_session(&path, Choices::default()).unwrap().analysis;
+    let analysis = analysed(PROTOCOL, SimLevel::Geometric, seed, faults);
     assert_eq!(analysis.counts.planned, 24);
     assert!(
         analysis.calibration.is_some(),
         "seed {seed}: not calibrated"
     );
     analysis.findings
+}
+
+fn analysed(protocol: &str, level: SimLevel, seed: u64, faults: Vec<Fault>) -> Analysis {
+    let (protocol, plan) = planned(protocol).unwrap();
+    let mut config = SimConfig::new(seed, level);
+    config.faults = faults;
+    let lab = tempfile::tempdir().unwrap();
+    let path = lab.path().join("audit.session.sqlite");
+    let report = record(&protocol, &plan, simulated_rig(&config), &path, |_, _| {}).unwrap();
+    assert_eq!(report.end, RunEnd::Completed, "seed {seed}: {report:?}");
+    analyze_session(&path, Choices::default()).unwrap().analysis
+}
+
+/// From the start the tip is so much higher than the robot reports, µm.
+fn higher(by_um: i32) -> Vec<Fault> {
+    let when = When::At(HostTime::ZERO);
+    vec![Fault::HeightOff { when, by_um }]
+}
+
+fn accused(analysis: &Analysis) -> Vec<Accused> {
+    analysis.findings.iter().map(|f| f.fault).collect()
+}
+
+/// Presses that do not reach half a millimetre.
+fn shallow() -> String {
+    PROTOCOL.replace("depth: 2 mm", "depth: 0.4 mm")
+}
+
+#[test]
+fn a_tip_lower_than_the_robot_reports_is_named() {
+    for seed in 0..3 {
+        let analysis = analysed(PROTOCOL, SimLevel::Geometric, seed, higher(-500));
+        assert_eq!(accused(&analysis), [Accused::HeightOff], "seed {seed}");
+        assert!(analysis.is_valid());
+        let found = &analysis.findings[0];
+        assert!(found.advice.contains("--only depth"), "{found:#?}");
+    }
+}
+
+#[test]
+fn a_tip_that_never_reaches_the_skin_is_no_blind_camera() {
+    let sound = analysed(&shallow(), SimLevel::Geometric, 1, Vec::new());
+    assert_eq!(accused(&sound), []);
+    let off = analysed(&shallow(), SimLevel::Geometric, 1, higher(500));
+    assert_eq!(accused(&off), [Accused::NotTouched], "{:#?}", off.findings);
+    assert!(!off.is_valid());
+    let found = &off.findings[0];
+    assert_eq!(found.camera, None);
+    assert!(found.advice.contains("--only depth"), "{found:#?}");
+}
+
+/// In one camera the same silence is that camera.
+#[test]
+fn one_camera_that_sees_no_press_is_blind() {
+    let camera = CameraId::Two;
+    let dead = (0..24).map(|contact| Fault::DeadPress { camera, contact });
+    let analysis = analysed(PROTOCOL, SimLevel::Geometric, 1, dead.collect());
+    assert_eq!(accused(&analysis), [Accused::CameraBlind]);
+}
+
+#[test]
+#[ignore = "minutes: SKINRIG_CI_LONG=1 .ci/run, or cargo test --release -p skinrig-tests --test audit heights -- --ignored --nocapture"]
+fn how_often_heights_that_are_off_are_named() {
+    let long: u64 = std::env::var("SKINRIG_HEIGHT_SEEDS")
+        .map_or(Ok(40), |n| n.parse())
+        .unwrap();
+    println!(
+        "| level | tip against the report | named `height off` | named something else | median above the surface |"
+    );
+    for (level, seeds) in [
+        (SimLevel::Kinematic, long / 8),
+        (SimLevel::Geometric, long),
+        (SimLevel::Optical, long / 8),
+    ] {
+        for by_um in [0, -100, -200, -500, -1000, 500] {
+            let all: Vec<Analysis> = (0..seeds)
+                .map(|seed| analysed(PROTOCOL, level, seed, higher(by_um)))
+                .collect();
+            let named = |a: &&Analysis| accused(a).contains(&Accused::HeightOff);
+            let else_named = |a: &&Analysis| {
+                let other = |f: &Accused| !matches!(f, Accused::HeightOff | Accused::NoEvents);
+                accused(a).iter().any(other)
+            };
+            let (named, others) = (
+                all.iter().filter(named).count() as u64,
+                all.iter().filter(else_named).count(),
+            );
+            let evidence = all
+                .iter()
+                .flat_map(|a| &a.findings)
+                .find(|f| f.fault == Accused::HeightOff);
+            println!(
+                "| {} | {:+} mm | {named} of {seeds} | {others} | {}",
+                level.name(),
+                f64::from(by_um) * 1e-3,
+                evidence.map_or("-", |f| &f.evidence)
+            );
+            let sees = level != SimLevel::Kinematic;
+            match by_um {
+                ..=-500 if sees => assert_eq!(named, seeds),
+                0.. => assert_eq!(named, 0),
+                _ => {}
+            }
+        }
+    }
 }
 
 /// Seeds whose sound session is accused of something.

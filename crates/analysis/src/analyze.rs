@@ -12,6 +12,7 @@ use crate::judge::{Judged, Seen, judge};
 use crate::keeper::KeepPlan;
 use crate::kept::{Keep, Kept, KeptPress};
 use crate::metrics::{Exclusions, metrics, penalised};
+use crate::onsets::{Onset, onsets};
 use crate::rates::RateHistogram;
 use crate::reading::{Reading, Readings, spans};
 use crate::result::{
@@ -130,6 +131,7 @@ pub fn analyze_and_keep(
     }
     let [mut one, mut two] = cameras;
     let streams = Streams {
+        onsets: [&mut one, &mut two].map(|c| std::mem::take(&mut c.onsets)),
         silences: [&mut one, &mut two].map(|c| std::mem::take(&mut c.silences)),
         contacts_s: [&mut one, &mut two].map(|c| std::mem::take(&mut c.contacts_s)),
     };
@@ -280,6 +282,7 @@ struct CameraResult {
     silences: Silences,
     /// Contacts that stand out of the counts, s on the host's clock, where a schedule lists the presses.
     contacts_s: Vec<f64>,
+    onsets: Vec<Onset>,
     pictures: Vec<PressPicture>,
     zooms: Vec<RateZoom>,
     kept: Vec<KeepPlan>,
@@ -424,6 +427,10 @@ fn camera_pass(
         ));
     }
     let (silences, contacts_s) = stream(input, &collected, clock.as_ref());
+    let onsets = match (&collected.rates, &clock) {
+        (Some(rates), Some(clock)) => onsets(input, rates, clock),
+        _ => Vec::new(),
+    };
     let lost = [&input.gaps[k][..], &silences.spans()].concat();
     let series = collected
         .rates
@@ -436,6 +443,7 @@ fn camera_pass(
         data_lost: lost_rows(input.planned.len(), &list, &lost),
         silences,
         contacts_s,
+        onsets,
         untimed,
         pictures: collected.pictures,
         zooms: collected.zooms,

@@ -16,6 +16,39 @@ pub struct EarlierAttempt {
     pub clear: Option<HostTime>,
 }
 
+/// The measured way of a tip down to the height at which the surface is taken to be.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Descent {
+    /// When the tip was last above 1, 2, 3 and so on times [`Descent::STEP_MM`] before its contact: the later, the lower. As far
+    /// up as was measured.
+    pub last_above: Vec<HostTime>,
+}
+
+impl Descent {
+    /// Heights of the way down are so far apart, mm.
+    pub const STEP_MM: f64 = 0.1;
+    /// It begins so many steps above the surface, at most.
+    pub const STEPS: usize = 20;
+
+    /// The height above the surface at `t`, mm, on straight lines between the heights; that of the beginning for what is
+    /// earlier, 0 from `contact` on.
+    #[must_use]
+    pub fn height_mm(&self, contact: HostTime, t: HostTime) -> f64 {
+        let mut below = (contact, 0.0);
+        for (k, above) in self.last_above.iter().enumerate() {
+            let above = (*above, (k + 1) as f64 * Self::STEP_MM);
+            if t >= above.0 {
+                let share = (below.0 - t).as_secs_f64() / (below.0 - above.0).as_secs_f64();
+                // At equal times both heights are right.
+                let share = if share.is_finite() { share } else { 0.0 };
+                return below.1 + share.clamp(0.0, 1.0) * (above.1 - below.1);
+            }
+            below = above;
+        }
+        below.1
+    }
+}
+
 /// Everything but the events.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SessionInput {
@@ -40,6 +73,9 @@ pub struct SessionInput {
     pub pose_interval_us: Option<f64>,
     /// RMS standard error of the instant at which the measured pose crossed the surface, µs; `None` when not known.
     pub crossing_se_us: Option<f64>,
+    /// The way down to each contact, in plan order; `None` where the surface was told by its touch, and where poses were not
+    /// measured or not read. May end early: what is beyond its end is `None`.
+    pub descents: Vec<Option<Descent>>,
     /// Where further legs begin, in order; empty for a session in one.
     pub legs: Vec<LegStart>,
     /// The rig.

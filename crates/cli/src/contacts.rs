@@ -1,5 +1,6 @@
-//! How well the measured contacts of a session are timed by its pose stream.
+//! What the pose stream of a session says of its contacts: how well they are timed, and the way down to them.
 
+use skinrig_analysis::Descent;
 use skinrig_model::{HostDuration, HostTime, PoseSample, PressOutcome};
 use skinrig_recorder::{RecorderError, SessionReader};
 
@@ -7,6 +8,8 @@ use skinrig_recorder::{RecorderError, SessionReader};
 const MOST: usize = 100;
 /// The pose is read this far to either side of a contact, ms.
 const SIDE_MS: i64 = 20;
+/// A way down is looked at over so long a time before its contact, at most.
+const LONGEST_DESCENT: HostDuration = HostDuration::from_millis(2_000);
 /// The tip's path is taken as straight this far to either side of a contact, ms.
 const STRAIGHT_MS: i64 = 5;
 
@@ -38,6 +41,43 @@ pub fn timing(
         }
     }
     Ok((intervals.rms(), errors.rms()))
+}
+
+/// The ways down to the contacts whose height was taken from the frame; those of at most [`MOST`] presses, evenly spread.
+///
+/// # Errors
+/// When the poses cannot be read.
+pub fn descents(
+    reader: &SessionReader,
+    outcomes: &[Option<PressOutcome>],
+) -> Result<Vec<Option<Descent>>, RecorderError> {
+    let of_frame = |o: &PressOutcome| {
+        let told_by_touch = o.scheduled || o.touched_mm.is_some();
+        o.timing.filter(|_| !told_by_touch)
+    };
+    let mut found = vec![None; outcomes.len()];
+    let rows = outcomes.iter().enumerate();
+    let ways: Vec<_> = rows
+        .filter_map(|(row, o)| Some((row, of_frame(o.as_ref()?)?)))
+        .collect();
+    for (row, timing) in ways.iter().step_by(ways.len().div_ceil(MOST).max(1)) {
+        let begin = timing.approach.max(timing.contact - LONGEST_DESCENT);
+        let poses = reader.poses(begin, timing.contact)?;
+        found[*row] = Some(descent(&poses));
+    }
+    Ok(found)
+}
+
+/// The way down that these poses end with.
+fn descent(poses: &[PoseSample]) -> Descent {
+    let heights = (1..=Descent::STEPS).map(|k| k as f64 * Descent::STEP_MM);
+    let last_above = heights.map_while(|mm| {
+        let above = poses.iter().rfind(|p| p.measured.z_mm > mm)?;
+        Some(above.t)
+    });
+    Descent {
+        last_above: last_above.collect(),
+    }
 }
 
 /// Standard error of the instant at which a straight line through the heights about `contact` is at the line's height

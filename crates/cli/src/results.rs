@@ -250,6 +250,7 @@ fn session_input(
         earlier.extend(attempts.iter().filter_map(earlier_attempt));
     }
     let (pose_interval_us, crossing_se_us) = crate::contacts::timing(reader, &outcomes)?;
+    let descents = crate::contacts::descents(reader, &outcomes)?;
     let [one, two] = CameraId::ALL;
     let further = reader.legs()?.into_iter().skip(1);
     let legs = further.map(|leg| LegStart::recorded(leg.origin, leg.camera_origin_us));
@@ -272,6 +273,7 @@ fn session_input(
         recorded: [reader.recorded(one)?, reader.recorded(two)?],
         pose_interval_us,
         crossing_se_us,
+        descents,
         legs,
         rig,
         settings,

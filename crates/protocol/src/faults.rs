@@ -50,6 +50,10 @@ pub enum FaultKind {
     RobotStalled,
     /// The robot follows its set point too slowly.
     RobotSlow,
+    /// The robot reports its tip higher than it is: presses are deeper than asked for.
+    RobotZHigh,
+    /// The robot reports its tip lower than it is: presses are less deep than asked for.
+    RobotZLow,
     /// The robot reports a force beyond every limit for a moment.
     RobotForceSpike,
     /// No pose comes any more, and no error.
@@ -63,7 +67,7 @@ pub enum FaultKind {
 }
 
 /// Every kind by its name.
-const KINDS: [(&str, FaultKind); 25] = {
+const KINDS: [(&str, FaultKind); 27] = {
     use CameraId::{One, Two};
     use FaultKind as K;
     [
@@ -87,6 +91,8 @@ const KINDS: [(&str, FaultKind); 25] = {
         ("robot-lost", K::RobotLost),
         ("robot-stalled", K::RobotStalled),
         ("robot-slow", K::RobotSlow),
+        ("robot-z-high", K::RobotZHigh),
+        ("robot-z-low", K::RobotZLow),
         ("robot-force-spike", K::RobotForceSpike),
         ("robot-stale", K::RobotStale),
         ("recorder-slow", K::RecorderSlow),

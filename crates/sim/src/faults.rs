@@ -44,6 +44,13 @@ pub enum Fault {
         /// 1 to 100.
         percent: u32,
     },
+    /// From then on the tip is so much higher than the robot reports (negative: lower); it gets there at [`HEIGHT_OFF_MM_S`].
+    HeightOff {
+        /// When it begins.
+        when: When,
+        /// How much higher, µm.
+        by_um: i32,
+    },
     /// The tip stays where it is, whatever the robot is told; its pose stream goes on.
     IndenterStuck(When),
     /// For [`SPIKE_NS`] the robot reports [`SPIKE_N`] more than it feels.
@@ -169,6 +176,8 @@ pub const DELAY_NS: i64 = 20_000_000;
 pub const SPIKE_NS: i64 = 50_000_000;
 /// How high it is, N: more than the robot can push.
 pub const SPIKE_N: f64 = 20.0;
+/// How fast the true height leaves the reported one, mm/s: slow enough for the skin's viscous force to stay small.
+pub const HEIGHT_OFF_MM_S: f64 = 10.0;
 /// How many pixels take part in a storm.
 pub const STORM_PIXELS: u16 = 40;
 /// Events of each of them per millisecond.

@@ -12,7 +12,7 @@ use skinrig_model::{HostTime, Point3, RigidTransform, Robot, Skin};
 
 use crate::clock::SimClock;
 use crate::config::SimConfig;
-use crate::faults::{Fault, SPIKE_N, SPIKE_NS, When};
+use crate::faults::{Fault, HEIGHT_OFF_MM_S, SPIKE_N, SPIKE_NS, When};
 use crate::line::Line;
 use crate::moments::Moments;
 use crate::motion::Motion;
@@ -42,6 +42,8 @@ pub struct World {
     moments: Moments,
     touching: bool,
     last_z_mm: f64,
+    /// How much higher the tip is than the robot reports, by a fault, mm.
+    height_off_mm: f64,
     force_limit_n: f64,
     /// The robot has stopped by itself; the next rise releases it.
     tripped: bool,
@@ -69,6 +71,7 @@ impl World {
             moments: Moments::default(),
             touching: false,
             last_z_mm: config.start.z_mm,
+            height_off_mm: 0.0,
             force_limit_n: f64::INFINITY,
             tripped: false,
             overloaded: false,
@@ -97,6 +100,11 @@ impl World {
                     self.motion.sluggish = f64::from(percent) / 100.0;
                 }
                 Fault::IndenterLost(when) if self.has_struck(when) => self.motion.power_off(),
+                Fault::HeightOff { when, by_um } if self.has_struck(when) => {
+                    let most_mm = HEIGHT_OFF_MM_S * GRID_NS as f64 * 1e-9;
+                    let left_mm = f64::from(by_um) * 1e-3 - self.height_off_mm;
+                    self.height_off_mm += left_mm.clamp(-most_mm, most_mm);
+                }
                 Fault::IndenterStuck(when) if self.has_struck(when) => self.motion.stuck = true,
                 Fault::TriggerBoxNoisy(when) if self.has_struck(when) => self.line.get_noisy(),
                 Fault::Mark { fate, when } if self.has_struck(when) => self.line.doom(n, fate),
@@ -105,9 +113,16 @@ impl World {
         }
     }
 
+    /// Where the tip truly is on the skin, whatever the robot reports.
+    fn true_tip(&self) -> Point3<Skin> {
+        let mut tip = self.skin_from_robot.apply(self.motion.tip());
+        tip.z_mm += self.height_off_mm;
+        tip
+    }
+
     fn observe(&mut self) {
         let t_ns = self.grid * GRID_NS;
-        let position = self.skin_from_robot.apply(self.motion.tip());
+        let position = self.true_tip();
         let rate = (self.last_z_mm - position.z_mm) / (GRID_NS as f64 * 1e-9);
         // When the straight path from the last grid point to this one went through a height.
         let passed = |z_mm: f64| {
@@ -234,7 +249,7 @@ impl World {
         self.wanted[index] = Some(self.grid);
         let present = TipSample {
             t_ns: self.grid * GRID_NS,
-            position: self.skin_from_robot.apply(self.motion.tip()),
+            position: self.true_tip(),
         };
         if self.tips.is_empty() {
             self.tips_from = self.grid;

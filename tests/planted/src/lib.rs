@@ -42,6 +42,7 @@ pub fn session(rig: RigGeometry, settings: AnalysisSettings) -> SessionInput {
         box_reports: Vec::new(),
         pose_interval_us: None,
         crossing_se_us: None,
+        descents: Vec::new(),
         legs: Vec::new(),
         rig,
         settings,

@@ -64,6 +64,18 @@ pub const fn of(fault: Fault) -> &'static str {
         Fault::JournalContradictory => {
             "the journal's times or rows cannot all be true: check where the press times come from, and their unit"
         }
+        Fault::HeightOff => {
+            "either may be off, and the cameras cannot tell which. On the bench `skinrig hil run hil/nightly.yaml --rig NAME.yaml \
+             --only depth` touches the surface: when it FAILs, calibrate the robot and touch the frame off again (`skinrig jog --rig \
+             NAME.yaml`); when it PASSes, mend the skin's frame in the protocol, or look at what was mounted for this run. Events \
+             come early as well when poses are stamped late"
+        }
+        Fault::NotTouched => {
+            "both cameras send noise, so this is neither a camera nor its cable. Either the tip did not reach the skin (surface lower \
+             than the frame says, no skin, or the robot reports its tip lower than it is), or there was no light. On the bench \
+             `skinrig hil run hil/nightly.yaml --rig NAME.yaml --only depth,noise_lit` tells which: a FAIL of `depth` is the height, \
+             one of `noise_lit` the light"
+        }
         Fault::RobotOff => {
             "check the robot's calibration, its limits and the skin frame before using the positions as truth"
         }

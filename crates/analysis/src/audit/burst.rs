@@ -34,9 +34,14 @@ pub fn findings(analysis: &Analysis, touches: &[Touch<'_>]) -> Vec<Finding> {
     if let [Some(a), Some(b)] = blind {
         let bursts = CameraId::ALL.map(|c| has_bursts(&analysis.rates[c.index()]));
         let (fault, but) = if bursts == [true; 2] {
-            (Fault::ClockWrong, "; both cameras burst at other times")
+            (
+                Fault::ClockWrong,
+                "; both cameras burst at other times".to_owned(),
+            )
+        } else if let Some(noise) = noise(touches) {
+            (Fault::NotTouched, format!("; {noise}{}", forces(touches)))
         } else {
-            (Fault::CameraBlind, "")
+            (Fault::CameraBlind, String::new())
         };
         let evidence = format!(
             "expected events to burst in presses, found {:.1} standard errors above idle in the median of {} (camera 1) and {:.1} of {} (camera 2){but}",
@@ -65,17 +70,19 @@ pub fn findings(analysis: &Analysis, touches: &[Touch<'_>]) -> Vec<Finding> {
     let stretches = [&one, &two].map(|seen| stretch(seen));
     match stretches {
         [Some(a), Some(b)] if a.first <= b.last && b.first <= a.last => {
+            // Presses that were measured were made.
+            let (fault, but) = match noise(touches) {
+                Some(noise) if touches.iter().all(|t| !t.outcome.scheduled) => {
+                    (Fault::NotTouched, format!("; {noise}"))
+                }
+                _ => (Fault::PressesMissing, String::new()),
+            };
             let evidence = format!(
-                "expected a burst of events in each press, found none in either camera from {} to {}",
+                "expected a burst of events in each press, found none in either camera from {} to {}{but}",
                 a.first.max(b.first),
                 a.last.min(b.last)
             );
-            found.push(finding(
-                Law::BurstWithMotion,
-                Fault::PressesMissing,
-                None,
-                evidence,
-            ));
+            found.push(finding(Law::BurstWithMotion, fault, None, evidence));
         }
         stretches => {
             for (camera, stretch) in CameraId::ALL.into_iter().zip(stretches) {
@@ -95,6 +102,32 @@ pub fn findings(analysis: &Analysis, touches: &[Touch<'_>]) -> Vec<Finding> {
         }
     }
     found
+}
+
+/// That both cameras send noise between the presses, in words; `None` when one does not.
+fn noise(touches: &[Touch<'_>]) -> Option<String> {
+    let [one, two] = CameraId::ALL.map(|camera| {
+        let idle = touches
+            .iter()
+            .filter_map(|t| Some(t.sights[camera.index()].rates?.1));
+        median(idle.collect()).filter(|rate| *rate > 0.0)
+    });
+    let (one, two) = (one?, two?);
+    Some(format!(
+        "both cameras send noise ({one:.0} and {two:.0} events/s)"
+    ))
+}
+
+/// The usual peak of the force, where the robot reports forces.
+fn forces(touches: &[Touch<'_>]) -> String {
+    let peaks: Vec<f64> = touches
+        .iter()
+        .filter_map(|t| t.outcome.peak_force_n)
+        .collect();
+    let n = peaks.len();
+    median(peaks).map_or_else(String::new, |usual| {
+        format!("; largest force of a press {usual:.2} N in the median (n {n})")
+    })
 }
 
 /// (median response, presses) when the camera sees nothing.

@@ -11,6 +11,7 @@ mod covered;
 mod drift;
 mod follow;
 mod frames;
+mod height;
 mod order;
 mod pattern;
 mod readings;
@@ -22,6 +23,7 @@ mod touch;
 mod worth;
 
 use crate::input::SessionInput;
+use crate::onsets::Onset;
 use crate::result::{Analysis, Fault, Finding, Law};
 use crate::stream::Silences;
 use skinrig_model::CameraId;
@@ -33,6 +35,8 @@ pub struct Streams {
     pub silences: [Silences; 2],
     /// Contacts that stand out of their counts, s on the host's clock; empty when nobody asks for them.
     pub contacts_s: [Vec<f64>; 2],
+    /// When the events of the presses began.
+    pub onsets: [Vec<Onset>; 2],
 }
 
 /// The laws that the session breaks, the most certain finding first; empty for a plausible session.
@@ -47,6 +51,13 @@ pub fn audit(input: &SessionInput, analysis: &Analysis, streams: &Streams) -> Ve
         complete::findings(input, analysis),
         covered::findings(input, analysis, [one, two]),
         commanded::findings(input, &touches),
+        height::findings(
+            input,
+            analysis,
+            streams.onsets.each_ref().map(Vec::as_slice),
+        )
+        .into_iter()
+        .collect(),
         pattern::findings(&touches, streams.contacts_s.each_ref().map(Vec::as_slice)),
         burst::findings(analysis, &touches),
         follow::findings(analysis, &touches),

@@ -26,22 +26,24 @@ const fn place(fault: Fault) -> u8 {
         Fault::PressesMissing => 5,
         Fault::OneCameraTwice => 6,
         Fault::UnitOfPositions => 7,
-        Fault::CameraBlind => 8,
-        Fault::IndexShifted => 9,
-        Fault::OrderOfPresses => 10,
-        Fault::AxesExchanged => 11,
-        Fault::AxisMirrored => 12,
-        Fault::PictureTurned => 13,
-        Fault::CamerasSwapped => 14,
-        Fault::PositionsDisplaced => 15,
-        Fault::ClockWrong => 16,
-        Fault::SyncPattern => 17,
-        Fault::PressesUnlisted => 18,
-        Fault::RobotOff => 19,
-        Fault::RigMoved => 20,
-        Fault::GeometryOff => 21,
-        Fault::NoTriggers => 22,
-        Fault::Unknown => 23,
+        Fault::NotTouched => 8,
+        Fault::CameraBlind => 9,
+        Fault::IndexShifted => 10,
+        Fault::OrderOfPresses => 11,
+        Fault::AxesExchanged => 12,
+        Fault::AxisMirrored => 13,
+        Fault::PictureTurned => 14,
+        Fault::CamerasSwapped => 15,
+        Fault::PositionsDisplaced => 16,
+        Fault::ClockWrong => 17,
+        Fault::SyncPattern => 18,
+        Fault::PressesUnlisted => 19,
+        Fault::HeightOff => 20,
+        Fault::RobotOff => 21,
+        Fault::RigMoved => 22,
+        Fault::GeometryOff => 23,
+        Fault::NoTriggers => 24,
+        Fault::Unknown => 25,
     }
 }
 
@@ -94,6 +96,16 @@ fn explains(a: &Finding, b: &Finding) -> bool {
             Fault::RobotOff => true,
             _ => false,
         },
+        Fault::NotTouched => matches!(
+            b.fault,
+            Fault::CameraBlind
+                | Fault::ClockWrong
+                | Fault::PressesMissing
+                | Fault::HeightOff
+                | Fault::RobotOff
+                | Fault::RigMoved
+                | Fault::Unknown
+        ),
         Fault::CameraBlind => match b.fault {
             Fault::ClockWrong => same_camera,
             Fault::RigMoved | Fault::Unknown => true,
@@ -102,13 +114,15 @@ fn explains(a: &Finding, b: &Finding) -> bool {
         Fault::ClockWrong => {
             matches!(
                 b.fault,
-                Fault::CameraBlind | Fault::RigMoved | Fault::Unknown
+                Fault::CameraBlind | Fault::HeightOff | Fault::RigMoved | Fault::Unknown
             )
         }
         Fault::RigMoved | Fault::RobotOff => matches!(b.fault, Fault::Unknown),
-        Fault::NoTriggers | Fault::GeometryOff | Fault::PressesUnlisted | Fault::SyncPattern => {
-            false
-        }
+        Fault::NoTriggers
+        | Fault::GeometryOff
+        | Fault::HeightOff
+        | Fault::PressesUnlisted
+        | Fault::SyncPattern => false,
         // One law that nothing explains is enough.
         Fault::Unknown => b.fault == Fault::Unknown,
     }

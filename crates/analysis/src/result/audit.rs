@@ -68,6 +68,10 @@ pub enum Fault {
     /// The journal contradicts itself: moments out of order or before the session, presses that overlap or are
     /// listed twice.
     JournalContradictory,
+    /// The surface is not where the frame and the height that the robot reports say.
+    HeightOff,
+    /// Both cameras work and saw no press: the tip did not touch the skin, or there was no light.
+    NotTouched,
     /// The robot did not do what was commanded.
     RobotOff,
     /// Skin, camera or light moved between repetitions.
@@ -102,6 +106,8 @@ impl Fault {
             Self::PressesMissing => "presses missing",
             Self::ClockWrong => "clock wrong",
             Self::JournalContradictory => "journal contradictory",
+            Self::HeightOff => "height off",
+            Self::NotTouched => "not touched",
             Self::RobotOff => "robot off",
             Self::RigMoved => "rig moved",
             Self::Unknown => "unknown",

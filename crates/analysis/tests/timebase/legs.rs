@@ -91,6 +91,7 @@ fn input(s: &InLegs) -> SessionInput {
         ],
         pose_interval_us: None,
         crossing_se_us: None,
+        descents: Vec::new(),
         legs: vec![s.leg],
         rig: RigGeometry {
             outline: SkinOutline::PAPER,

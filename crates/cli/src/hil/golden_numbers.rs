@@ -108,12 +108,14 @@ const fn witness(fault: Fault, camera: &'static str) -> (EvidenceKind, &'static 
         | Fault::RigMoved => (EvidenceKind::OtherDevice, camera),
         Fault::NoTriggers | Fault::ClockWrong => (EvidenceKind::TriggerFault, "trigger box"),
         Fault::RobotOff
+        | Fault::HeightOff
         | Fault::NoTruth
         | Fault::UnitOfPositions
         | Fault::AxisMirrored
         | Fault::AxesExchanged
         | Fault::PositionsDisplaced => (EvidenceKind::State, "robot"),
-        Fault::IndexShifted
+        Fault::NotTouched
+        | Fault::IndexShifted
         | Fault::OrderOfPresses
         | Fault::PressesUnlisted
         | Fault::SyncPattern

@@ -13,6 +13,8 @@ const LOST_WORDS: u64 = 2_000;
 const CLOCK_STEP_US: u32 = 300_000;
 /// The share of its usual swiftness that a slow robot keeps, percent.
 const SLOW_PERCENT: u32 = 4;
+/// How far the height that the robot reports is off, µm.
+const HEIGHT_OFF_UM: i32 = 500;
 /// How long a slow recorder holds the run up, ms.
 const HELD_UP_MS: u32 = 800;
 
@@ -50,6 +52,14 @@ fn of_device(fault: &PlantedFault) -> Option<Fault> {
         FaultKind::RobotSlow => Fault::Sluggish {
             when,
             percent: SLOW_PERCENT,
+        },
+        FaultKind::RobotZHigh => Fault::HeightOff {
+            when,
+            by_um: -HEIGHT_OFF_UM,
+        },
+        FaultKind::RobotZLow => Fault::HeightOff {
+            when,
+            by_um: HEIGHT_OFF_UM,
         },
         FaultKind::RobotForceSpike => Fault::ForceSpike(when),
         FaultKind::RobotStale => Fault::PosesStale(when),

@@ -1,0 +1,125 @@
+//! Law: events begin at the touch of the surface, and not above it.
+
+use skinrig_model::PressVerdict;
+
+use super::finding;
+use super::statistics::median;
+use crate::input::SessionInput;
+use crate::onsets::Onset;
+use crate::result::{Analysis, ClockMethod, Fault, Finding, Law, MapName};
+
+/// A statement needs this many presses: of fewer no two of them enclose the median with 95 %.
+const LEAST_PRESSES: usize = 6;
+/// Events that begin less than this above the surface are no offset: twice the tolerance within which a tip is taken to have
+/// arrived, mm.
+const MOST_HEIGHT_MM: f64 = 0.1;
+/// Nor those that begin less than this before the contact, beyond what the clocks leave open: two bins of the event rate, ms.
+const MOST_BEFORE_MS: f64 = 20.0;
+
+pub fn findings(
+    input: &SessionInput,
+    analysis: &Analysis,
+    onsets: [&[Onset]; 2],
+) -> Option<Finding> {
+    // A clock that was fitted to the events themselves says nothing of when they began.
+    let measured = |c: &_| matches!(c, Some(fit) if is_measured(fit));
+    if !analysis.clocks.iter().all(measured) || !analysis.alignment.is_usable() {
+        return None;
+    }
+    let [one, two] = onsets.map(|onsets| Height::of(input, onsets));
+    let (one, two) = (one?, two?);
+    // Late poses shift all contacts alike.
+    let bound_us = analysis.alignment.bound_us(MapName::RobotFromHost);
+    let most_ms = MOST_BEFORE_MS + 1e-3 * bound_us.unwrap_or(0.0);
+    // What only one camera says is a matter of its clock, or of its noise.
+    let early = |h: &Height| h.low_mm > MOST_HEIGHT_MM && h.before_ms > most_ms;
+    (early(&one) && early(&two)).then(|| {
+        let evidence = format!(
+            "expected events to begin when the tip reaches the surface, found them begin above it in the median: {one} (camera 1), \
+             {two} (camera 2). Presses were that much deeper than is stated: the robot reports its tip higher than it is, or the \
+             surface lies higher than z = 0 of the skin's frame"
+        );
+        finding(Law::AsCommanded, Fault::HeightOff, None, evidence)
+    })
+}
+
+fn is_measured(fit: &crate::result::ClockFit) -> bool {
+    fit.method != ClockMethod::EventRates
+}
+
+/// How high above the surface the events of a camera begin.
+struct Height {
+    n: usize,
+    median_mm: f64,
+    /// 95 % interval of the median.
+    low_mm: f64,
+    high_mm: f64,
+    /// Median time before the contact, ms.
+    before_ms: f64,
+}
+
+impl Height {
+    /// Over the presses that the journal calls valid.
+    fn of(input: &SessionInput, onsets: &[Onset]) -> Option<Self> {
+        let valid = |o: &&Onset| {
+            let outcome = input.outcomes.get(o.row).and_then(Option::as_ref);
+            outcome.is_some_and(|outcome| outcome.verdict == PressVerdict::Valid)
+        };
+        let onsets: Vec<&Onset> = onsets.iter().filter(valid).collect();
+        let mut heights: Vec<f64> = onsets.iter().map(|o| o.height_mm).collect();
+        heights.sort_by(f64::total_cmp);
+        let n = heights.len();
+        let (low, high) = rank_interval(n)?;
+        Some(Self {
+            n,
+            median_mm: median(heights.clone())?,
+            low_mm: heights[low],
+            high_mm: heights[high],
+            before_ms: median(onsets.iter().map(|o| o.before_ms).collect())?,
+        })
+    }
+}
+
+impl std::fmt::Display for Height {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(
+            f,
+            "{:.2} mm (95 %: {:.2} to {:.2}), {:.0} ms before the contact, n {}",
+            self.median_mm, self.low_mm, self.high_mm, self.before_ms, self.n
+        )
+    }
+}
+
+/// Places in order of the two of `n` values that enclose the median of what they were drawn from with at least 95 % (sign test);
+/// `None` for too few.
+fn rank_interval(n: usize) -> Option<(usize, usize)> {
+    if n < LEAST_PRESSES {
+        return None;
+    }
+    // Chances that exactly k of n lie below the median, from k = 0 on; for large n they underflow, and add nothing.
+    let mut chance = libm::exp(-(n as f64) * core::f64::consts::LN_2);
+    let (mut below, mut low) = (0.0, 0);
+    for k in 0..n / 2 {
+        below += chance;
+        if below > 0.025 {
+            break;
+        }
+        low = k;
+        chance *= (n - k) as f64 / (k + 1) as f64;
+    }
+    Some((low, n - 1 - low))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::rank_interval;
+
+    /// Ranks of the sign test's 95 % interval, counted from 1, as tables give them (Conover, Practical Nonparametric Statistics).
+    #[test]
+    fn the_interval_of_a_median_is_the_sign_test_s() {
+        assert_eq!(rank_interval(5), None);
+        for (n, ranks) in [(6, (1, 6)), (10, (2, 9)), (20, (6, 15)), (100, (40, 61))] {
+            assert_eq!(rank_interval(n), Some((ranks.0 - 1, ranks.1 - 1)), "{n}");
+        }
+    }
+}

@@ -1,0 +1,121 @@
+//! How high above the surface the tip still was when the events of a press began: events cannot begin before the touch.
+
+use skinrig_model::{HostDuration, HostTime};
+
+use crate::input::{Descent, SessionInput};
+use crate::rates::RateHistogram;
+use crate::result::ClockFit;
+
+/// The idle rate is counted over so long a time before the way down, at most.
+const LONGEST_IDLE: HostDuration = HostDuration::from_millis(1_000);
+/// A shorter idle time gives no rate, s.
+const LEAST_IDLE_S: f64 = 0.1;
+/// An idle time is taken to hold half an event at least: silence gives no odds.
+const LEAST_EVENTS: f64 = 0.5;
+/// Events have begun before the contact when a rise is likelier than the idle rate by this many nats (400 to 1).
+const CLEARLY: f64 = 6.0;
+
+/// When the events of a press began in one camera, if that was before the contact.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Onset {
+    /// Row of the press.
+    pub row: usize,
+    /// So long before the measured contact, ms; 0 when not before.
+    pub before_ms: f64,
+    /// The measured height of the tip above the surface then, mm; 0 when not before.
+    pub height_mm: f64,
+}
+
+/// The onsets of the presses with a known way down, in plan order.
+///
+/// In each press the time from the begin of the way down to the contact is split where a higher rate from there on is most likely
+/// (Poisson, against the rate before the way down; maximum of `n ln(n / e) - (n - e)` for `n` events where `e` were expected).
+/// Events of a press before only ever make the idle rate too high, and the onset late.
+pub fn onsets(input: &SessionInput, rates: &RateHistogram, clock: &ClockFit) -> Vec<Onset> {
+    let timings = || input.outcomes.iter().flatten().filter_map(|o| o.timing);
+    let earlier = input.earlier.iter().filter_map(|e| e.clear);
+    let mut clears: Vec<HostTime> = timings().map(|t| t.clear).chain(earlier).collect();
+    clears.sort_unstable();
+    let counts = Counts { rates, clock };
+    let rows = input.descents.iter().zip(&input.outcomes).enumerate();
+    rows.filter_map(|(row, (descent, outcome))| {
+        let (descent, timing) = (descent.as_ref()?, outcome.as_ref()?.timing?);
+        let before = clears.partition_point(|clear| *clear <= timing.approach);
+        let clear = before.checked_sub(1).map(|k| clears[k]);
+        let long = timing.approach - LONGEST_IDLE;
+        let idle = counts.idle_per_bin(clear.map_or(long, |c| c.max(long)), timing.approach)?;
+        let begun = counts.rise(timing.approach, timing.contact, idle);
+        Some(begun.map_or(Onset::at_contact(row), |t| Onset {
+            row,
+            before_ms: (timing.contact - t).as_secs_f64() * 1e3,
+            height_mm: Descent::height_mm(descent, timing.contact, t),
+        }))
+    })
+    .collect()
+}
+
+impl Onset {
+    const fn at_contact(row: usize) -> Self {
+        Self {
+            row,
+            before_ms: 0.0,
+            height_mm: 0.0,
+        }
+    }
+}
+
+/// The counts of a camera by host time.
+struct Counts<'a> {
+    rates: &'a RateHistogram,
+    clock: &'a ClockFit,
+}
+
+impl Counts<'_> {
+    fn bin_us(&self) -> f64 {
+        self.rates.bin_us() as f64
+    }
+
+    /// Where a host time lies, in bins; `None` before the first.
+    fn position(&self, t: HostTime) -> Option<f64> {
+        let bins = (self.clock.camera_us_of_host(t) - self.rates.start_us() as f64) / self.bin_us();
+        (bins >= 0.0).then_some(bins)
+    }
+
+    /// The whole bins between two times; `None` unless all were counted.
+    fn between(&self, from: HostTime, to: HostTime) -> Option<(usize, &[u32])> {
+        let (from, to) = (self.position(from)?.ceil(), self.position(to)?.floor());
+        let (from, to) = (from as usize, to as usize);
+        let bins = self.rates.counts().get(from..to)?;
+        Some((from, bins))
+    }
+
+    /// Events per bin in an idle time.
+    fn idle_per_bin(&self, from: HostTime, to: HostTime) -> Option<f64> {
+        let (_, bins) = self.between(from, to)?;
+        let events: u64 = bins.iter().map(|c| u64::from(*c)).sum();
+        let long_enough = bins.len() as f64 * self.bin_us() * 1e-6 >= LEAST_IDLE_S;
+        long_enough.then(|| (events as f64).max(LEAST_EVENTS) / bins.len() as f64)
+    }
+
+    /// The middle of the bin from which on the rate is most likely higher than the idle one; `None` when it is not.
+    fn rise(&self, from: HostTime, contact: HostTime, idle: f64) -> Option<HostTime> {
+        let (first, bins) = self.between(from, contact)?;
+        let (mut n, mut expected, mut best) = (0.0, 0.0, (CLEARLY, None));
+        for (k, count) in bins.iter().enumerate().rev() {
+            n += f64::from(*count);
+            expected += idle;
+            let nats = if n > expected {
+                n * libm::log(n / expected) - (n - expected)
+            } else {
+                0.0
+            };
+            if nats > best.0 {
+                best = (nats, Some(first + k));
+            }
+        }
+        let bin = best.1?;
+        let camera_us = self.rates.start_us() as f64 + (bin as f64 + 0.5) * self.bin_us();
+        let host_s = self.clock.host_us_of_camera(camera_us) * 1e-6;
+        Some(HostTime::from_secs_f64(host_s))
+    }
+}
