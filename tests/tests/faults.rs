@@ -70,7 +70,7 @@ const PHASES: [(&str, &str); 10] = [
 ];
 
 /// The faults, in the order of the table.
-const FAULTS: [&str; 21] = [
+const FAULTS: [&str; 19] = [
     "camera1-unplugged",
     "camera1-stalled",
     "camera1-drops",
@@ -85,8 +85,6 @@ const FAULTS: [&str; 21] = [
     "robot-lost",
     "robot-stalled",
     "robot-slow",
-    "robot-z-high",
-    "robot-z-low",
     "robot-force-spike",
     "robot-stale",
     "recorder-slow",

@@ -119,3 +119,97 @@ impl Counts<'_> {
         Some(HostTime::from_secs_f64(host_s))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::result::ClockMethod;
+    use crate::seeded;
+    use rand_xoshiro::rand_core::Rng as _;
+
+    const CLOCK: ClockFit = ClockFit {
+        method: ClockMethod::TriggerMarks,
+        offset_us: 5e6,
+        drift_ppm: 20.0,
+        drift_se_ppm: 0.0,
+        residual_rms_us: 0.0,
+        residual_max_us: 0.0,
+        n: 30,
+        rejected: 0,
+    };
+
+    /// Noise of `idle` events per bin on average, and `more` from `from_ms` to the contact at 3 s.
+    fn counted(seed: u64, idle: f64, more: f64, from_ms: i64) -> RateHistogram {
+        let mut random = seeded::generator(seed, 0);
+        let mut rates = RateHistogram::new(10_000);
+        for ms in 0..4_000i64 {
+            let mean = idle / 10.0 + if ms >= from_ms { more / 10.0 } else { 0.0 };
+            // Ten chances per millisecond are near enough to Poisson.
+            for _ in 0..10 {
+                let unit = (random.next_u64() >> 11) as f64 / (1u64 << 53) as f64;
+                if unit < mean / 10.0 {
+                    let t = HostTime(ms * 1_000_000 + 500_000);
+                    rates.add(CLOCK.camera_us_of_host(t) as u64);
+                }
+            }
+        }
+        rates
+    }
+
+    fn rise_ms(rates: &RateHistogram) -> Option<f64> {
+        let counts = Counts {
+            rates,
+            clock: &CLOCK,
+        };
+        let at = |ms: i64| HostTime(ms * 1_000_000);
+        let idle = counts.idle_per_bin(at(1_000), at(2_000))?;
+        let begun = counts.rise(at(2_000), at(3_000), idle);
+        begun.map(|t| t.as_secs_f64() * 1e3)
+    }
+
+    #[test]
+    fn a_rise_before_the_contact_is_found_within_a_bin_or_two() {
+        let (mut off, mut found) = (0.0f64, 0);
+        for seed in 0..50 {
+            if let Some(ms) = rise_ms(&counted(seed, 10.0, 20.0, 2_900)) {
+                off += (ms - 2_900.0).abs();
+                found += 1;
+            }
+        }
+        assert!(found >= 49, "{found} of 50");
+        assert!(off / f64::from(found) < 15.0, "{off}");
+    }
+
+    /// Of noise alone at most one press in a hundred seems to begin early, and a median takes half of them.
+    #[test]
+    fn noise_alone_rarely_rises() {
+        for idle in [0.2, 2.0, 20.0] {
+            let false_ones = (0..200)
+                .filter(|seed| rise_ms(&counted(*seed, idle, 0.0, 9_000)).is_some())
+                .count();
+            assert!(false_ones <= 8, "{false_ones} of 200 at {idle}");
+        }
+    }
+
+    #[test]
+    fn heights_lie_on_the_measured_way() {
+        let contact = HostTime(1_000_000_000);
+        let ms = |ms: i64| HostTime(1_000_000_000 - ms * 1_000_000);
+        let way = Descent {
+            last_above: vec![ms(40), ms(50), ms(55)],
+        };
+        for (before, mm) in [
+            (-5, 0.0),
+            (0, 0.0),
+            (20, 0.05),
+            (40, 0.1),
+            (45, 0.15),
+            (55, 0.3),
+            (90, 0.3),
+        ] {
+            let found = way.height_mm(contact, ms(before));
+            assert!((found - mm).abs() < 1e-9, "{before} ms: {found} for {mm}");
+        }
+        assert_eq!(Descent::default().height_mm(contact, ms(30)), 0.0);
+    }
+}

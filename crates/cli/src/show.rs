@@ -123,6 +123,7 @@ fn analysis_rows(session: &std::path::Path, session_id: &str) -> serde_json::Val
             Ok(s) => {
                 row["rmse_mm"] = serde_json::json!(s.rmse_mm);
                 row["valid"] = s.valid.into();
+                row["faults"] = s.faults.into();
                 row["analysis_version"] = s.analysis_version.into();
                 row["changes"] = serde_json::json!(s.variant.map(|v| v.to_string()));
             }
@@ -140,13 +141,20 @@ fn print_analyses(rows: &serde_json::Value) {
     for row in rows.as_array().into_iter().flatten() {
         let name = row["name"].as_str().unwrap_or("official");
         let number = |key: &str| row["rmse_mm"][key].as_f64();
+        let faults: Vec<&str> = row["faults"]
+            .as_array()
+            .into_iter()
+            .flatten()
+            .filter_map(serde_json::Value::as_str)
+            .collect();
         let found = match (
             row["trouble"].as_str(),
             row["valid"].as_bool(),
             number("value"),
         ) {
             (Some(why), ..) => why.to_owned(),
-            (_, Some(false), _) => "INVALID: clocks not known".to_owned(),
+            (_, Some(false), _) if faults.is_empty() => "INVALID: clocks not known".to_owned(),
+            (_, Some(false), _) => "INVALID".to_owned(),
             (.., Some(rmse)) => format!(
                 "RMSE {rmse:.2} mm ({:.2} to {:.2}), n {}",
                 number("low").unwrap_or(f64::NAN),
@@ -159,6 +167,12 @@ fn print_analyses(rows: &serde_json::Value) {
             .as_u64()
             .map(|v| format!("  analysis version {v}"));
         outln!("analysis   {name}  {found}{}", version.unwrap_or_default());
+        if !faults.is_empty() {
+            outln!(
+                "           found: {}; the report says what to do",
+                faults.join(", ")
+            );
+        }
         if let Some(changes) = row["changes"].as_str() {
             outln!("           {changes}");
         }

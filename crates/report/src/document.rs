@@ -33,6 +33,9 @@ pub struct Summary {
     /// False when the numbers are not to be used: its clocks are not known well enough, or the audit found
     /// that positions, cameras or rows are others than they are taken for.
     pub valid: bool,
+    /// The likely faults that the audit found, the most certain first, as people read them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub faults: Vec<String>,
     /// How the presses ended.
     pub counts: PressCounts,
     /// RMSE of the scored presses.
@@ -53,6 +56,11 @@ impl Summary {
             overrides: input.provenance.overrides.clone(),
             results_hash: input.provenance.results_hash.clone(),
             valid: analysis.is_valid(),
+            faults: analysis
+                .findings
+                .iter()
+                .map(crate::page::findings::fault)
+                .collect(),
             counts: analysis.counts,
             rmse_mm: scored.rmse_mm,
             repeat_std_mm: scored.repeat_std_mm,

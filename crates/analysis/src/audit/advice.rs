@@ -72,7 +72,8 @@ pub const fn of(fault: Fault) -> &'static str {
         }
         Fault::NotTouched => {
             "both cameras send noise, so this is neither a camera nor its cable. Either the tip did not reach the skin (surface lower \
-             than the frame says, no skin, or the robot reports its tip lower than it is), or there was no light. On the bench \
+             than the frame says, no skin, or the robot reports its tip lower than it is), or there was no light, or the crop shows rows \
+             without the skin. On the bench \
              `skinrig hil run hil/nightly.yaml --rig NAME.yaml --only depth,noise_lit` tells which: a FAIL of `depth` is the height, \
              one of `noise_lit` the light"
         }

@@ -59,7 +59,7 @@ fn explains(a: &Finding, b: &Finding) -> bool {
         Fault::NoEvents => match b.fault {
             // A camera that is off sees no edges either.
             Fault::CameraBlind | Fault::NoTriggers | Fault::ClockWrong => same_camera,
-            Fault::Unknown | Fault::RigMoved => true,
+            Fault::NotTouched | Fault::Unknown | Fault::RigMoved => true,
             _ => false,
         },
         Fault::NoTruth => matches!(
@@ -68,7 +68,7 @@ fn explains(a: &Finding, b: &Finding) -> bool {
         ),
         Fault::PressesMissing => matches!(
             b.fault,
-            Fault::CameraBlind | Fault::RobotOff | Fault::RecordingGap
+            Fault::CameraBlind | Fault::NotTouched | Fault::RobotOff | Fault::RecordingGap
         ),
         // What is taken for something else: one of them is enough, and makes the rest look wrong.
         Fault::UnitOfPositions
@@ -88,19 +88,22 @@ fn explains(a: &Finding, b: &Finding) -> bool {
         }
         Fault::RecordingShort => match b.fault {
             Fault::CameraBlind | Fault::RecordingGap | Fault::NoTriggers => same_camera,
-            Fault::PressesMissing | Fault::RobotOff | Fault::RigMoved | Fault::Unknown => true,
+            Fault::PressesMissing
+            | Fault::NotTouched
+            | Fault::RobotOff
+            | Fault::RigMoved
+            | Fault::Unknown => true,
             _ => false,
         },
         Fault::RecordingGap => match b.fault {
             Fault::CameraBlind => same_camera,
-            Fault::RobotOff => true,
+            Fault::RobotOff | Fault::NotTouched => true,
             _ => false,
         },
         Fault::NotTouched => matches!(
             b.fault,
             Fault::CameraBlind
                 | Fault::ClockWrong
-                | Fault::PressesMissing
                 | Fault::HeightOff
                 | Fault::RobotOff
                 | Fault::RigMoved

@@ -70,7 +70,8 @@ pub enum Fault {
     JournalContradictory,
     /// The surface is not where the frame and the height that the robot reports say.
     HeightOff,
-    /// Both cameras work and saw no press: the tip did not touch the skin, or there was no light.
+    /// Both cameras work and saw no press: the tip did not touch the skin, there was no light, or the crop shows
+    /// no skin.
     NotTouched,
     /// The robot did not do what was commanded.
     RobotOff,

@@ -86,3 +86,43 @@ fn a_full_disk_keeps_what_was_written() {
             .contains("disk-full@press:5")
     );
 }
+
+/// A robot whose reported height is off by half a millimetre, in a run with presses of this depth: what the run says.
+fn with_height_off(fault: Option<&str>, depth: &str, code: i32) -> String {
+    let lab = Lab::new();
+    let folder = text(&lab.path("a"));
+    let depth = format!("depth={depth}");
+    let mut arguments = vec!["run", SMALL, "--sessions", &folder, "--set", &depth];
+    arguments.extend(fault.iter().flat_map(|f| ["--fault", f]));
+    let said = skinrig(&arguments).code(code);
+    let shown = skinrig(&["show", &text(&only(&lab.path("a"), ".session.sqlite"))]).code(0);
+    for fault in ["height off", "not touched"] {
+        let found = shown.out.contains(&format!("found: {fault}"));
+        assert_eq!(said.out.contains(fault), found, "{}", shown.out);
+    }
+    let words: Vec<&str> = said.out.split_whitespace().collect();
+    words.join(" ")
+}
+
+#[test]
+fn a_robot_whose_height_is_off_is_named_with_what_tells_it_from_the_surface() {
+    let check = "skinrig hil run hil/nightly.yaml --rig NAME.yaml --only depth";
+    let deep = with_height_off(Some("robot-z-high@preflight"), "1 mm", 0);
+    assert!(
+        deep.contains("height off") && deep.contains(check),
+        "{deep}"
+    );
+    let shallow = with_height_off(Some("robot-z-low@preflight"), "0.4 mm", 4);
+    assert!(
+        shallow.contains("not touched") && shallow.contains(check),
+        "{shallow}"
+    );
+    assert!(!shallow.contains("camera blind"), "{shallow}");
+    for depth in ["1 mm", "0.4 mm"] {
+        let sound = with_height_off(None, depth, 0);
+        assert!(
+            !sound.contains("height off") && !sound.contains("not touched"),
+            "{sound}"
+        );
+    }
+}
