@@ -276,7 +276,7 @@ pub fn conclude(
         }
     };
     match &report.end {
-        RunEnd::Completed => match cost_by_the_rig(session).map_err(Failure::internal)? {
+        RunEnd::Completed => match cost_by_the_rig(session)? {
             Some(cost) => {
                 also(analysed);
                 Err(Failure::rig(format!(
@@ -305,17 +305,21 @@ pub fn conclude(
 
 /// The presses of a completed session that the rig or the operator cost, in words; `None` when there are none, or when no rig can take
 /// them again.
-fn cost_by_the_rig(session: &Path) -> Result<Option<String>, RecorderError> {
+fn cost_by_the_rig(session: &Path) -> Result<Option<String>, Failure> {
     const NAMED: usize = 3;
-    let reader = SessionReader::open(session)?;
-    let header = reader.header()?;
-    let histories = reader.history()?;
-    let Ok(plan) = serde_json::from_str::<Plan>(&header.plan_json) else {
-        return Ok(None); // a session that was analysed; resuming it says what is wrong
-    };
+    let reader = SessionReader::open(session).map_err(Failure::session)?;
+    let header = reader.header().map_err(Failure::session)?;
+    let histories = reader.history().map_err(Failure::session)?;
     if !header.is_of_a_rig() {
         return Ok(None);
     }
+    let plan: Plan = serde_json::from_str(&header.plan_json).map_err(|e| {
+        Failure::rig(format!(
+            "{0}: expected the plan that was just carried out, found: {e}
+  next: `skinrig verify {0}`",
+            session.display()
+        ))
+    })?;
     let wanted = plan.wanted(&histories);
     let all = plan.presses.iter().zip(&histories).zip(wanted);
     let cost: Vec<_> = all

@@ -6,6 +6,8 @@
     reason = "a test that cannot run must fail, or say why it did not run"
 )]
 
+#[path = "emulated_bench/endurance.rs"]
+mod endurance;
 #[path = "emulated_bench/first_contact.rs"]
 mod first_contact;
 #[path = "emulated_bench/tolerant.rs"]

@@ -63,6 +63,8 @@ pub struct BenchConfig {
     pub box_ppm: f64,
     /// Stiffness of the skin, N/m.
     pub skin_n_m: f64,
+    /// Probability that a contact gives no events in a camera, 0 to 1.
+    pub dead_share: f64,
 }
 
 impl Default for BenchConfig {
@@ -77,6 +79,8 @@ impl Default for BenchConfig {
             camera_origin_us: [0, 7_000_000],
             box_ppm: 48.0,
             skin_n_m: 500.0,
+            // A sound skin answers to every press: what is missing in a night is then somebody's fault.
+            dead_share: 0.0,
         }
     }
 }
@@ -191,6 +195,7 @@ fn camera_of(config: &BenchConfig, camera: CameraId) -> Evk1Config {
             seed: config.seed,
             level: config.level,
             robot_from_skin: Some(config.robot_from_skin),
+            dead_share: Some(config.dead_share),
         })),
         ..Evk1Config::new(CAMERA_SERIALS[i])
     }

@@ -111,6 +111,9 @@ pub struct SceneContent {
     /// Where the skin lies in the robot's frame; absent: as in the simulated bench.
     #[serde(default)]
     pub robot_from_skin: Option<RigidTransform<Robot, Skin>>,
+    /// Probability that a contact gives no events, 0 to 1; absent: as in the simulated bench. For `geometric` only.
+    #[serde(default)]
+    pub dead_share: Option<f64>,
 }
 
 /// An EVK1. Defaults marked *assumed* are not known from public sources.

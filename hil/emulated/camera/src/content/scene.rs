@@ -38,7 +38,10 @@ impl Scene {
                     .to_owned(),
             ));
         }
-        let config = SimConfig::new(content.seed, content.level);
+        let mut config = SimConfig::new(content.seed, content.level);
+        if let Some(share) = content.dead_share {
+            config.geometric.dead_share = share;
+        }
         let robot_from_skin = content.robot_from_skin.unwrap_or(config.robot_from_skin);
         Ok(Self {
             scene: config.scene(content.camera),

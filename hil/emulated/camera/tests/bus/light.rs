@@ -20,6 +20,7 @@ fn noise_falls_when_the_lamps_are_off_and_comes_back() {
         seed: 1,
         level: SimLevel::Geometric,
         robot_from_skin: None,
+        dead_share: None,
     };
     let camera = Evk1Config {
         content: Content::Scene(Box::new(scene)),
