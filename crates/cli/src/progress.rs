@@ -166,18 +166,14 @@ fn streams(tracker: &ProgressTracker) -> String {
     } else {
         String::new()
     };
-    let retaken = if p.retaken > 0 {
-        format!("  {} taken again", p.retaken)
-    } else {
-        String::new()
+    let few = |n: usize, what: &str| match n {
+        0 => String::new(),
+        n => format!("  {n} {what}"),
     };
-    let invalid = if p.invalid > 0 {
-        format!("  {} invalid", p.invalid)
-    } else {
-        String::new()
-    };
+    let ended =
+        few(p.invalid, "invalid") + &few(p.excluded, "excluded") + &few(p.retaken, "taken again");
     format!(
-        "camera 1 {}, camera 2 {} kev/s  trigger {} sent, {}+{} seen{invalid}{retaken}{lost}",
+        "camera 1 {}, camera 2 {} kev/s  trigger {} sent, {}+{} seen{ended}{lost}",
         rate(CameraId::One),
         rate(CameraId::Two),
         p.marks_sent,

@@ -197,13 +197,14 @@ fn print_live(live: &Live) {
         format!(" ({block}, at ({x:.1}, {y:.1}) mm)")
     });
     outln!(
-        "press     {} of {}{press}; {} done: {} valid, {} invalid, {} missed; {} taken again",
+        "press     {} of {}{press}; {} done: {} valid, {} invalid, {} missed, {} excluded; {} taken again",
         live.press.as_ref().map_or(0, |p| p.number),
         live.planned,
         live.done,
         live.valid,
         live.invalid,
         live.missed,
+        live.excluded,
         live.retaken
     );
     let seconds = HostDuration::from_secs_f64;

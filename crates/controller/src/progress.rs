@@ -39,6 +39,8 @@ pub struct Progress {
     pub invalid: usize,
     /// How many of them were missed.
     pub missed: usize,
+    /// How many of them a rule leaves out.
+    pub excluded: usize,
     /// Attempts beyond the first at a press, by this process.
     pub retaken: usize,
     /// The press under way, or the last one.
@@ -65,6 +67,18 @@ enum Fate {
     Valid,
     Invalid,
     Missed,
+    Excluded,
+}
+
+impl From<&PressVerdict> for Fate {
+    fn from(verdict: &PressVerdict) -> Self {
+        match verdict {
+            PressVerdict::Valid => Self::Valid,
+            PressVerdict::Invalid(_) => Self::Invalid,
+            PressVerdict::Missed(_) => Self::Missed,
+            PressVerdict::Excluded(_) => Self::Excluded,
+        }
+    }
 }
 
 /// Follows a run by its records.
@@ -104,9 +118,8 @@ impl ProgressTracker {
         for ((fate, history), wanted) in self.fates.iter_mut().zip(histories).zip(wanted) {
             *fate = match &history.verdict {
                 _ if *wanted => None,
-                Some(PressVerdict::Valid | PressVerdict::Excluded(_)) => Some(Fate::Valid),
-                Some(PressVerdict::Invalid(_)) => Some(Fate::Invalid),
                 Some(PressVerdict::Missed(_)) | None => None,
+                Some(verdict) => Some(Fate::from(verdict)),
             };
         }
         self.count();
@@ -129,10 +142,10 @@ impl ProgressTracker {
 
     fn count(&mut self) {
         let n = |fate| self.fates.iter().filter(|f| **f == Some(fate)).count();
-        let [valid, invalid, missed] = [Fate::Valid, Fate::Invalid, Fate::Missed].map(n);
         let p = &mut self.progress;
-        (p.valid, p.invalid, p.missed) = (valid, invalid, missed);
-        p.done = valid + invalid + missed;
+        (p.valid, p.invalid) = (n(Fate::Valid), n(Fate::Invalid));
+        (p.missed, p.excluded) = (n(Fate::Missed), n(Fate::Excluded));
+        p.done = p.valid + p.invalid + p.missed + p.excluded;
     }
 
     /// The run as of the last record.
@@ -165,11 +178,7 @@ impl ProgressTracker {
             Record::BoxReports { t, .. } => self.reached(*t),
             Record::Chunk(chunk) => self.chunk(chunk),
             Record::Outcome(outcome) => {
-                let fate = match outcome.verdict {
-                    PressVerdict::Valid => Fate::Valid,
-                    _ => Fate::Invalid,
-                };
-                self.ended(outcome.attempt.press, fate);
+                self.ended(outcome.attempt.press, Fate::from(&outcome.verdict));
             }
             Record::Missed(attempt, _) => self.ended(attempt.press, Fate::Missed),
             Record::Interruption { kind, t, .. } => {

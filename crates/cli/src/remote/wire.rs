@@ -82,6 +82,9 @@ pub struct Live {
     pub invalid: usize,
     /// How many of them were missed.
     pub missed: usize,
+    /// How many of them a rule leaves out.
+    #[serde(default)]
+    pub excluded: usize,
     /// Attempts beyond the first at a press, in this leg.
     pub retaken: usize,
     /// The press under way, or the last one.
@@ -171,6 +174,7 @@ impl Live {
             valid: p.valid,
             invalid: p.invalid,
             missed: p.missed,
+            excluded: p.excluded,
             retaken: p.retaken,
             press: p.press.map(|press| LivePress {
                 number: press.id.number(),

@@ -268,3 +268,20 @@ fn the_sample_of_one_repetition_is_imported() {
         assert_eq!(results["analysis"]["clocks"][0]["method"], "event_rates");
     }
 }
+
+#[test]
+fn progress_and_summary_of_an_import_count_the_same() {
+    let lab = Lab::new();
+    let data = Dataset::new(&lab);
+    let mut arguments = data.arguments(&lab.path("s"));
+    arguments.extend(["--set".to_owned(), "presses_used=10".to_owned()]);
+    let said = skinrig(&arguments).code(0);
+    let last = said.err.lines().rfind(|l| l.starts_with("press ")).unwrap();
+    assert!(
+        last.starts_with("press 15/15") && last.ends_with("  2 excluded"),
+        "{said:?}"
+    );
+    assert!(!said.err.contains("invalid"), "{said:?}");
+    let summary = "12 planned = 10 valid + 0 missed + 0 invalid + 2 excluded";
+    assert!(said.out.contains(summary), "{said:?}");
+}
