@@ -19,6 +19,7 @@ mod presses;
 mod source;
 mod streams;
 pub mod table;
+mod tables;
 
 pub use bundle::{BundleReport, MANIFEST, seal_bundle, verify_bundle};
 pub use cameras::{write_hdf5, write_raw};

@@ -4,10 +4,6 @@ use skinrig_analysis::{Analysis, LegStart};
 use skinrig_model::{CameraId, RunHeader};
 use skinrig_recorder::SessionReader;
 
-use crate::error::ExportError;
-use crate::table::TableWriter;
-use crate::{metrics, presses, streams};
-
 /// A table of a session.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TableName {
@@ -60,19 +56,4 @@ pub struct Source<'a> {
     /// What was found in it, and its further legs as the analysis moved them. Without it the columns of the presses that stand on
     /// an analysis are empty, and so is the table of results.
     pub analysis: Option<(&'a Analysis, &'a [LegStart])>,
-}
-
-impl Source<'_> {
-    /// Hands a table over.
-    ///
-    /// # Errors
-    /// When the session cannot be read or the table not be written.
-    pub fn write(&self, table: TableName, to: &mut dyn TableWriter) -> Result<(), ExportError> {
-        match table {
-            TableName::Presses => presses::table(self)?.write(to),
-            TableName::Results => metrics::table(self)?.write(to),
-            TableName::Pose => streams::pose(self, to),
-            TableName::Events(camera) => streams::events(self, camera, table.name(), to),
-        }
-    }
 }

@@ -7,7 +7,22 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::settings::LensKind;
+/// How a column becomes an angle before distortion. See [`LensModel`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum LensKind {
+    /// The paper's: equidistant with an exponential falloff.
+    #[default]
+    Exponential,
+    /// Angle proportional to the distance from the middle (f-theta).
+    Equidistant,
+    /// Pinhole: tangent of the angle proportional to the distance.
+    Rectilinear,
+    /// Tangent of half the angle proportional to the distance.
+    Stereographic,
+    /// Sine of half the angle proportional to the distance.
+    Equisolid,
+}
 
 /// A lens: its projection, half of its horizontal field of view and its distortion.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

@@ -5,6 +5,7 @@
 //! `*_hz`, `*_deg`.
 
 pub mod camera;
+pub mod device_role;
 pub mod event;
 pub mod frame;
 pub mod id;
@@ -26,10 +27,11 @@ pub mod time;
 pub mod trigger_box;
 
 pub use camera::{CameraModel, SENSOR_HEIGHT, SENSOR_WIDTH, StereoGeometry};
+pub use device_role::DeviceRole;
 pub use event::{CdEvent, Polarity, TriggerEdge};
 pub use frame::{Point2, Point3, RigidTransform, Robot, Skin};
 pub use id::{AttemptId, CameraId, LocationId, PressId, RepetitionId, as_index};
-pub use lens::{LensAngle, LensModel};
+pub use lens::{LensAngle, LensKind, LensModel};
 pub use limit::{Limit, Side};
 pub use pose::PoseSample;
 pub use preflight::{CheckKind, CheckVerdict, PreflightCheck};
@@ -38,14 +40,14 @@ pub use press_fault::PressFaultKind;
 pub use pulse::{Label, Mark, MarkKind, PulseTrain, SeenMark, SeenSync, SentMark};
 pub use range::ValueRange;
 pub use record::{
-    DeviceIdentity, DeviceRole, InterruptionKind, MotionCommand, Record, ResumeHeader, RunEnd,
-    RunHeader, Setting,
+    DeviceIdentity, InterruptionKind, MotionCommand, Record, ResumeHeader, RunEnd, RunHeader,
+    Setting,
 };
 pub use scene::{SceneNeed, SimLevel};
 pub use settings::{
     AlignmentSettings, AnalysisSettings, Background, CalibrationModel, CentroidRule, CmreSettings,
-    Estimator, LatencySettings, LensKind, Precision, ReducedLatencySettings, ReductionSettings,
-    RigGeometry, ThresholdRule, WindowAnchor,
+    Estimator, LatencySettings, Precision, ReducedLatencySettings, ReductionSettings, RigGeometry,
+    ThresholdRule, WindowAnchor,
 };
 pub use skin::SkinOutline;
 pub use stream::{ChunkFacts, LostTime, RawChunk, StreamFormat};

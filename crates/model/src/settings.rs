@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::camera::StereoGeometry;
 use crate::id::PressId;
+use crate::lens::LensKind;
 use crate::skin::SkinOutline;
 
 /// Which clustered events make the centroid of a press.
@@ -61,23 +62,6 @@ pub enum CalibrationModel {
     /// explains.
     #[default]
     Auto,
-}
-
-/// How a column becomes an angle before distortion. See [`crate::LensModel`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum LensKind {
-    /// The paper's: equidistant with an exponential falloff.
-    #[default]
-    Exponential,
-    /// Angle proportional to the distance from the middle (f-theta).
-    Equidistant,
-    /// Pinhole: tangent of the angle proportional to the distance.
-    Rectilinear,
-    /// Tangent of half the angle proportional to the distance.
-    Stereographic,
-    /// Sine of half the angle proportional to the distance.
-    Equisolid,
 }
 
 /// How the least number of cluster events for a press to count is found.

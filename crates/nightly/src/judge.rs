@@ -1,8 +1,9 @@
 //! From measured parts and evidence to verdicts: of an attempt, and of a check after its repeats.
 
+use crate::cause::Cause;
 use crate::evidence::Evidence;
 use crate::night::{Attempt, Part};
-use crate::rules::{Case, Cause, Ruling, rule};
+use crate::rules::{Case, Ruling, rule};
 use crate::verdict::Verdict;
 
 /// The computer runs every check: what is seen of it concerns every device.

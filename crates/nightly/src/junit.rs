@@ -7,8 +7,9 @@ use std::fmt::Write as _;
 
 use skinrig_model::text::visible;
 
+use crate::cause::Cause;
 use crate::night::{CheckResult, Night};
-use crate::rules::{Cause, GOLDEN_ON_A_BAD_RIG, RULES};
+use crate::rules::{GOLDEN_ON_A_BAD_RIG, RULES};
 use crate::verdict::Verdict;
 
 /// How a check is told in JUnit's words.

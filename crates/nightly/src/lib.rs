@@ -5,6 +5,7 @@
 //! ([`Verdict`]). What kept something from being measured, and what else was seen, is [`Evidence`]; [`rules`] tell from
 //! it whether the skin, the rig, the computer or the software is to be looked at.
 
+mod cause;
 pub mod evidence;
 pub mod judge;
 pub mod junit;
@@ -13,7 +14,8 @@ pub mod rules;
 pub mod trend;
 pub mod verdict;
 
+pub use cause::Cause;
 pub use evidence::{Evidence, EvidenceKind};
 pub use night::{Attempt, CheckResult, Golden, Measurement, Night, Part, Versions};
-pub use rules::{Cause, Rule, Ruling};
+pub use rules::{Rule, Ruling};
 pub use verdict::{NightExit, Verdict};

@@ -3,8 +3,8 @@
 use serde::{Deserialize, Serialize};
 use skinrig_model::Limit;
 
+use crate::cause::Cause;
 use crate::evidence::Evidence;
-use crate::rules::Cause;
 use crate::verdict::{NightExit, Verdict};
 
 /// Version of the JSON form.

@@ -1,37 +1,9 @@
 //! Where to look when something is not good: rules over the evidence, each with its name and its reason.
 
-use serde::{Deserialize, Serialize};
-
+use crate::cause::Cause;
 use crate::evidence::{Evidence, EvidenceKind};
 use crate::night::CheckResult;
 use crate::verdict::Verdict;
-
-/// What is at fault.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Cause {
-    /// The computer: its disk, cables, permissions, load; or another program.
-    Infrastructure,
-    /// A device of the rig.
-    Rig,
-    /// The skin on the bench.
-    Skin,
-    /// This program.
-    Software,
-}
-
-impl Cause {
-    /// As people read it.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Infrastructure => "infrastructure",
-            Self::Rig => "rig",
-            Self::Skin => "skin",
-            Self::Software => "software",
-        }
-    }
-}
 
 /// What the rules make of a verdict.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

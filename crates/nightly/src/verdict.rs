@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use skinrig_model::{Limit, Side};
 
-use crate::rules::Cause;
+use crate::cause::Cause;
 
 /// What is said of a measurement, of everything above it, and of the night. In the order of their weight: of several, the last
 /// one holds.

@@ -1,6 +1,6 @@
 //! Owns the arithmetic of the causes: parts of a mean square error, and the change of each.
 
-use super::Factor;
+use super::factor::Factor;
 use super::presses::{One, Pressed};
 
 /// A change of the logarithm of the clusters' excess that is none.

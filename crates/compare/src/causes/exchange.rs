@@ -4,7 +4,7 @@ use serde::Serialize;
 use skinrig_analysis::triangulate::locate;
 use skinrig_model::StereoGeometry;
 
-use super::Again;
+use super::factor::Again;
 use crate::places::Places;
 use crate::subject::Subject;
 

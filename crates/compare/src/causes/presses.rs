@@ -8,7 +8,7 @@ use skinrig_analysis::sets::CalibrationSet;
 use skinrig_analysis::triangulate::locate;
 use skinrig_model::{CalibrationModel, PressRole, StereoGeometry};
 
-use super::Measured;
+use super::factor::Measured;
 use crate::places::{Attempt, Places};
 use crate::subject::{Session, Subject};
 

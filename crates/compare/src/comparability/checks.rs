@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 
 use skinrig_analysis::result::AlignmentStatus;
 
+use super::difference::{Difference, Weight, difference};
 use super::sights::{ambient, cameras};
-use super::{Difference, Weight};
 use crate::places::Places;
 use crate::subject::{Session, Subject, joined};
 
@@ -22,24 +22,6 @@ pub(super) fn all(subjects: &[Subject], places: &Places) -> Vec<Difference> {
     found.extend(ambient(subjects, places));
     found.extend(cameras(subjects));
     found
-}
-
-pub(super) fn difference(
-    key: &'static str,
-    what: &str,
-    weight: Weight,
-    values: Vec<String>,
-    reason: &str,
-) -> Difference {
-    Difference {
-        key,
-        what: what.to_owned(),
-        values,
-        weight,
-        reason: reason.to_owned(),
-        next: None,
-        lifted: false,
-    }
 }
 
 fn blocked(mut by: Difference, next: &str) -> Difference {

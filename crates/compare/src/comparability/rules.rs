@@ -1,6 +1,6 @@
 //! Owns the table of rules: which fact is worth what, and why. The first rule whose prefix fits a fact's path holds.
 
-use super::Weight::{self, Blocking, Confounding, Harmless};
+use super::difference::Weight::{self, Blocking, Confounding, Harmless};
 
 /// What a difference of a kind of fact is worth.
 #[derive(Debug, Clone, Copy)]

@@ -1,7 +1,6 @@
 //! Owns the checks of what the cameras saw: events between presses, and where calibrations put the cameras.
 
-use super::checks::difference;
-use super::{Difference, Weight};
+use super::difference::{Difference, Weight, difference};
 use crate::places::{Attempt, Places};
 use crate::subject::Subject;
 

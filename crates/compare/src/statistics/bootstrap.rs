@@ -7,7 +7,7 @@
 
 use skinrig_analysis::seeded;
 
-use super::measure::Ratio;
+use super::influence::Ratio;
 
 /// Sums of one sample in a draw.
 #[derive(Default, Clone, Copy)]

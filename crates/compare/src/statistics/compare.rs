@@ -1,8 +1,9 @@
 //! Compares two samples.
 
-use super::comparison::{Comparison, Design, Interval, Tost, Verdict};
+use super::comparison::{Comparison, Design, Interval, Tost, Verdict, direction};
 use super::inference::Inference;
-use super::measure::{Measure, measure};
+use super::influence::Measure;
+use super::measure::measure;
 use super::question::{Better, Pairing, Question, Settings};
 use super::refusal::{Refusal, Side};
 use super::sample::{Data, Kind, Sample};
@@ -104,20 +105,6 @@ pub(super) fn verdict(
         direction(a, b, question.better)
     } else {
         Verdict::Undecided
-    }
-}
-
-/// Better or worse by the values alone.
-pub(super) fn direction(a: f64, b: f64, better: Better) -> Verdict {
-    let gain = match better {
-        Better::Lower => a - b,
-        Better::Higher => b - a,
-        Better::NearerZero => a.abs() - b.abs(),
-    };
-    if gain > 0.0 {
-        Verdict::Better
-    } else {
-        Verdict::Worse
     }
 }
 

@@ -2,7 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Kind, Pairing, Side};
+use super::question::{Better, Pairing};
+use super::{Kind, Side};
 
 /// A number with its interval (1 - alpha).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -146,4 +147,18 @@ pub struct Comparison {
     pub needed: Needed,
     /// What to keep in mind.
     pub notes: Vec<Note>,
+}
+
+/// Better or worse by the values alone.
+pub(super) fn direction(a: f64, b: f64, better: Better) -> Verdict {
+    let gain = match better {
+        Better::Lower => a - b,
+        Better::Higher => b - a,
+        Better::NearerZero => a.abs() - b.abs(),
+    };
+    if gain > 0.0 {
+        Verdict::Better
+    } else {
+        Verdict::Worse
+    }
 }

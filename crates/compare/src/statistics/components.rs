@@ -1,7 +1,7 @@
 //! Where the variance of a difference comes from: between locations, and between repetitions at one location.
 
 use super::comparison::Components;
-use super::measure::Measure;
+use super::influence::Measure;
 use super::question::Pairing;
 
 /// Components by the method of moments (analysis of variance with locations as groups; Searle, Casella and McCulloch

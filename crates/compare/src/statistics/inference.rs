@@ -2,13 +2,10 @@
 
 use super::bootstrap;
 use super::comparison::Interval;
-use super::measure::{Measure, Ratio, Shape, correlation, error};
+use super::influence::{BOOTSTRAP_FROM, Measure, Ratio, Shape, correlation, error};
 use super::mover::{Limits, recovered};
 use super::question::{Pairing, Settings};
 use skinrig_analysis::distributions::{student_cdf, student_quantile};
-
-/// Fewer locations than this leave too few different draws: Student's distribution serves instead.
-pub(super) const BOOTSTRAP_FROM: usize = 8;
 
 /// An estimate and how it errs.
 pub(super) struct Inference {

@@ -1,7 +1,7 @@
 //! Limits of a difference from the limits of its parts.
 
-use super::measure::{Measure, Shape, error};
-use super::quantiles::Ranked;
+use super::influence::{Measure, Shape, error};
+use super::ranked::Ranked;
 use super::scores;
 
 /// Limits of one metric at so many standard errors.

@@ -1,8 +1,7 @@
 //! How many more presses would decide.
 
-use super::compare::direction;
-use super::comparison::{Components, Enough, Needed, Verdict};
-use super::measure::Measure;
+use super::comparison::{Components, Enough, Needed, Verdict, direction};
+use super::influence::Measure;
 use super::question::{Better, Question, Settings};
 use skinrig_analysis::distributions::student_quantile;
 

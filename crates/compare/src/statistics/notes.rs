@@ -1,8 +1,7 @@
 //! What a reader of a comparison must keep in mind.
 
 use super::comparison::Note;
-use super::inference::BOOTSTRAP_FROM;
-use super::measure::{Measure, Shape};
+use super::influence::{BOOTSTRAP_FROM, Measure, Shape};
 use super::refusal::Side;
 use super::sample::Data;
 use super::spread::Repeats;

@@ -4,59 +4,12 @@
 //! they are without a model of the misses. Limits are those of Woodruff (1952): the share of trials up to the percentile
 //! has an interval, and its ends are read off the times.
 
-use super::measure::{ByPlace, Measure, Shape, correlation, error};
+use super::influence::{ByPlace, Measure, Shape, correlation, error};
+use super::ranked::{Ranked, between};
 use super::refusal::{Refusal, Side};
 use super::sample::{Clusters, late};
 use super::scores;
 use skinrig_analysis::distributions::normal_quantile;
-
-/// A percentile among sorted times.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Ranked {
-    /// Its value.
-    pub value: f64,
-    /// Its rank, 0..1.
-    q: f64,
-    /// Times, ascending, misses infinite.
-    sorted: Vec<f64>,
-    /// Independent trials that the trials are worth.
-    effective: f64,
-}
-
-impl Ranked {
-    /// Limits at so many standard errors; infinite where misses begin or trials end.
-    pub fn limits(&self, c: f64) -> (f64, f64) {
-        let (low, high) = scores::wilson(self.q, self.effective, c);
-        (self.at(low), self.at(high))
-    }
-
-    /// Trials missed.
-    pub fn missed(&self) -> u32 {
-        let times = self.sorted.partition_point(|t| t.is_finite());
-        (self.sorted.len() - times) as u32
-    }
-
-    /// The time at rank `p` as the mean rank of order statistics has it (type 6 of Hyndman and Fan 1996): nothing is
-    /// known beyond the first and the last.
-    fn at(&self, p: f64) -> f64 {
-        let position = p * (self.sorted.len() as f64 + 1.0) - 1.0;
-        if position < 0.0 {
-            return f64::NEG_INFINITY;
-        }
-        let index = position.floor() as usize;
-        let time = |i: usize| self.sorted.get(i).copied().unwrap_or(f64::INFINITY);
-        between(time(index), time(index + 1), position - index as f64)
-    }
-}
-
-/// `share` of the way from `low` to `high`, which may be infinite.
-fn between(low: f64, high: f64, share: f64) -> f64 {
-    if share > 0.0 && low < high {
-        low + share * (high - low)
-    } else {
-        low
-    }
-}
 
 /// The value at rank `q` of sorted values (type 7 of Hyndman and Fan 1996).
 fn at_rank(sorted: &[f64], q: f64) -> f64 {

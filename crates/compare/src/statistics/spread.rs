@@ -1,6 +1,6 @@
 //! The standard deviation between repetitions, mean over series.
 
-use super::measure::{Measure, Scale, from_terms};
+use super::influence::{Measure, Scale, from_terms};
 use super::sample::{Clusters, Data, Position};
 
 /// How the standard deviation of a series is made.

@@ -25,6 +25,20 @@ const DELIVERED_ROWS: usize = 1024;
 /// `2^52`: the sum of this and a number from 0 to `2^52` has the number, rounded, in its lower 52 bits.
 const ROUNDING: f64 = 4_503_599_627_370_496.0;
 
+impl Container {
+    /// Reads the events of the dictionary called `choice`, or of the only one.
+    ///
+    /// # Errors
+    /// As [`Self::choose`], and when a dataset has a type that events cannot have.
+    pub fn events(
+        &self,
+        choice: Option<&str>,
+        geometry: Geometry,
+    ) -> Result<EventReader, FormatsError> {
+        EventReader::new(self, self.choose(choice)?, geometry)
+    }
+}
+
 /// Reads the events of one sensor. Every value is checked before it is delivered.
 pub struct EventReader {
     path: PathBuf,

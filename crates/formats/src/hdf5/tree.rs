@@ -5,9 +5,7 @@ use std::path::{Path, PathBuf};
 
 use rust_hdf5::{DatatypeMessage, H5Dataset, H5File};
 
-use super::read::EventReader;
 use crate::error::FormatsError;
-use crate::stream::Geometry;
 
 /// The fields that make a dvs dictionary.
 pub(super) const FIELDS: [&str; 4] = ["ts", "x", "y", "pol"];
@@ -153,18 +151,6 @@ impl Container {
                 })
             }
         }
-    }
-
-    /// Reads the events of the dictionary called `choice`, or of the only one.
-    ///
-    /// # Errors
-    /// As [`Self::choose`], and when a dataset has a type that events cannot have.
-    pub fn events(
-        &self,
-        choice: Option<&str>,
-        geometry: Geometry,
-    ) -> Result<EventReader, FormatsError> {
-        EventReader::new(self, self.choose(choice)?, geometry)
     }
 }
 

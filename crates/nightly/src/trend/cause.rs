@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::history::NightHead;
-use crate::rules::Cause;
+use crate::cause::Cause;
 
 /// What is said of an alarm.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]

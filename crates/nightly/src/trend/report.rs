@@ -8,7 +8,7 @@ use super::derived::ratios;
 use super::history::{History, NightHead};
 use super::reference::FEWEST;
 use super::run_length::{Rule, rules};
-use crate::rules::Cause;
+use crate::cause::Cause;
 
 /// Nights between two false alarms of all series together, were references known, scores normal and nights strangers to each other.
 /// None of it holds: what comes out is one in more than 100 nights (`docs/trends.md`).

@@ -9,7 +9,7 @@
 mod nights;
 
 use nights::{Bench, Planted};
-use skinrig_nightly::rules::Cause;
+use skinrig_nightly::Cause;
 use skinrig_nightly::trend::report::NIGHTS_PER_FALSE_ALARM;
 use skinrig_nightly::trend::run_length::rules;
 use skinrig_nightly::trend::{Acceptance, Chart, History, Report, judge};

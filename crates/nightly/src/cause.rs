@@ -1,0 +1,30 @@
+//! Where a fault lies.
+
+use serde::{Deserialize, Serialize};
+
+/// What is at fault.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Cause {
+    /// The computer: its disk, cables, permissions, load; or another program.
+    Infrastructure,
+    /// A device of the rig.
+    Rig,
+    /// The skin on the bench.
+    Skin,
+    /// This program.
+    Software,
+}
+
+impl Cause {
+    /// As people read it.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Infrastructure => "infrastructure",
+            Self::Rig => "rig",
+            Self::Skin => "skin",
+            Self::Software => "software",
+        }
+    }
+}
