@@ -124,7 +124,9 @@ impl RecordSink for Sink {
         }
         self.saboteur.before(&record)?;
         match &mut self.writer {
-            Some(writer) => writer.accept(record).map_err(|e| SinkFault(e.to_string())),
+            Some(writer) => writer
+                .accept(record)
+                .map_err(|e| skinrig_tests::fault_of(&e)),
             None => Ok(()),
         }
     }

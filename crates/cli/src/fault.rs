@@ -62,7 +62,7 @@ impl Saboteur {
             }
         }
         if self.full {
-            return Err(SinkFault(full()));
+            return Err(SinkFault::Refused(full()));
         }
         Ok(())
     }

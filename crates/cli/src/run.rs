@@ -123,7 +123,7 @@ pub(crate) fn close(
             RecorderError::Lost { .. } => lost = Some(error.to_string()),
             _ => {}
         }
-        let error = ControllerError::from(SinkFault(error.to_string()));
+        let error = ControllerError::from(SinkFault::Refused(error.to_string()));
         if report.end == RunEnd::Completed && !is_complete {
             report.end = RunEnd::Faulted(error.to_string());
             report.causes.push(error);

@@ -139,13 +139,20 @@ impl SessionSink {
         );
         self.view.say(&format!("note: {text}"));
         let note = self.writer.accept(Record::Note { t, text });
-        note.map_err(|e| SinkFault(e.to_string()))
+        note.map_err(|e| fault_of(&e))
+    }
+}
+
+fn fault_of(error: &RecorderError) -> SinkFault {
+    match error {
+        RecorderError::Late(_) => SinkFault::Late(error.to_string()),
+        _ => SinkFault::Refused(error.to_string()),
     }
 }
 
 impl RecordSink for SessionSink {
     fn check(&mut self) -> Result<(), SinkFault> {
-        self.writer.check().map_err(|e| SinkFault(e.to_string()))
+        self.writer.check().map_err(|e| fault_of(&e))
     }
 
     fn free_bytes(&mut self) -> Option<u64> {
@@ -174,9 +181,7 @@ impl RecordSink for SessionSink {
         } else {
             Some(record.clone())
         };
-        self.writer
-            .accept(record)
-            .map_err(|e| SinkFault(e.to_string()))?;
+        self.writer.accept(record).map_err(|e| fault_of(&e))?;
         if let Some(record) = shown {
             self.view.update(&record);
         }
@@ -187,7 +192,7 @@ impl RecordSink for SessionSink {
             self.view.say(&format!("note: {text}"));
             let t = HostTime::ZERO;
             let note = self.writer.accept(Record::Note { t, text });
-            note.map_err(|e| SinkFault(e.to_string()))?;
+            note.map_err(|e| fault_of(&e))?;
         }
         Ok(())
     }

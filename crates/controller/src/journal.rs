@@ -96,7 +96,7 @@ impl<'a> Journal<'a> {
         match catch_unwind(AssertUnwindSafe(|| self.sink.accept(record))) {
             Ok(Ok(())) => {}
             Ok(Err(fault)) => self.problem("", fault),
-            Err(_) => self.problem("", SinkFault("panicked".to_owned())),
+            Err(_) => self.problem("", SinkFault::Refused("panicked".to_owned())),
         }
         Ok(())
     }
@@ -113,12 +113,14 @@ impl<'a> Journal<'a> {
         attempt: AttemptId,
         t: skinrig_model::HostTime,
     ) -> Result<(), ControllerError> {
-        self.emit(Record::Intent { attempt, t })?;
-        if let Some(attempts) = self.attempts.get_mut(attempt.press.index() as usize) {
-            *attempts = attempt.number;
+        let told = self.emit(Record::Intent { attempt, t });
+        if !was_refused(&told) {
+            if let Some(attempts) = self.attempts.get_mut(attempt.press.index() as usize) {
+                *attempts = attempt.number;
+            }
+            self.set(attempt.press, Fate::Under);
         }
-        self.set(attempt.press, Fate::Under);
-        Ok(())
+        told
     }
 
     /// A press ended.
@@ -128,9 +130,11 @@ impl<'a> Journal<'a> {
             _ => Fate::Invalid,
         };
         let press = outcome.attempt.press;
-        self.emit(Record::Outcome(outcome))?;
-        self.set(press, fate);
-        Ok(())
+        let told = self.emit(Record::Outcome(outcome));
+        if !was_refused(&told) {
+            self.set(press, fate);
+        }
+        told
     }
 
     /// Every press that was never attempted is missed, for this reason.
@@ -165,4 +169,9 @@ impl<'a> Journal<'a> {
             n(Fate::Missed),
         ]
     }
+}
+
+/// Whether a record is certainly not in the session: one that is late may come there yet, and must not be followed by another of its kind.
+pub(crate) const fn was_refused(told: &Result<(), ControllerError>) -> bool {
+    matches!(told, Err(ControllerError::Sink(SinkFault::Refused(_))))
 }

@@ -6,6 +6,7 @@ use skinrig_protocol::plan::PressStep;
 
 use crate::core::{Collect, Core, OpenPress};
 use crate::error::{ControllerError, Halt};
+use crate::journal::was_refused;
 use crate::moments::PressTracker;
 use crate::press_fault::PressFault;
 use crate::touch::Probe;
@@ -239,8 +240,11 @@ impl Core<'_> {
         self.invalid_run.attempt(&judged.faults);
         self.press_faults
             .extend(judged.faults.into_iter().map(|f| (open.attempt, f)));
-        self.journal.outcome(judged.outcome)?;
-        self.open = None;
+        let told = self.journal.outcome(judged.outcome);
+        if !was_refused(&told) {
+            self.open = None;
+        }
+        told?;
         Ok(again)
     }
 }

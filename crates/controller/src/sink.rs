@@ -4,8 +4,14 @@ use skinrig_model::Record;
 
 /// A consumer of records failed; the run must end safely.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("recorder: {0}")]
-pub struct SinkFault(pub String);
+pub enum SinkFault {
+    /// The record was not taken.
+    #[error("recorder: {0}")]
+    Refused(String),
+    /// The record was taken and is late on its way to the disk: it may be there already, or come there yet.
+    #[error("recorder: {0}")]
+    Late(String),
+}
 
 /// Takes every record of a run, in order.
 pub trait RecordSink {

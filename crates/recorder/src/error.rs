@@ -107,6 +107,9 @@ pub enum RecorderError {
     /// An earlier write failed; the session takes nothing more.
     #[error("the session is no longer written: {0}")]
     Failed(String),
+    /// A record was taken, and not on the disk in time: it may come there yet.
+    #[error("the session is written too slowly: {0}")]
+    Late(String),
     /// Another program kept the session open for so long that it could not be sealed. It is complete.
     #[error("{}: complete, but not sealed: expected every other program to close it, found it open in one for {} s ({found}); \
         close that program, and `skinrig resume` seals it", path.display(), waited.as_secs())]

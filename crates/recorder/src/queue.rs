@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 
 use skinrig_model::Record;
 
+use crate::error::RecorderError;
 use crate::held::Refuge;
 use crate::prepare::Ready;
 use crate::query::Fault;
@@ -126,17 +127,21 @@ impl Shared {
 
     /// Takes a record when there is room for it, and returns when it is durable if it has to be; or says why
     /// nothing is written any more.
-    pub fn accept(&self, record: Record) -> Result<(), String> {
+    ///
+    /// # Errors
+    /// [`RecorderError::Failed`] when it was not taken, [`RecorderError::Late`] when it was, and is not known to be durable.
+    pub fn accept(&self, record: Record) -> Result<(), RecorderError> {
         let (bytes, durable) = (size_of(&record), is_durable(&record));
         let mut queue = self.lock();
         let full = |q: &Queue| q.failed.is_none() && q.bytes > 0 && q.bytes + bytes > QUEUE_BYTES;
         queue.waits += u64::from(full(&queue));
         let since = Instant::now();
         while full(&queue) {
-            queue = self.wait_for_disk(queue, since)?;
+            let waited = self.wait_for_disk(queue, since);
+            queue = waited.map_err(RecorderError::Failed)?;
         }
         if let Some(detail) = &queue.failed {
-            return Err(detail.clone());
+            return Err(RecorderError::Failed(detail.clone()));
         }
         queue.accepted.push_back((record, bytes));
         queue.bytes += bytes;
@@ -146,9 +151,10 @@ impl Shared {
         self.changed.notify_all();
         while durable && queue.durable < mine {
             if let Some(detail) = &queue.failed {
-                return Err(detail.clone());
+                return Err(RecorderError::Failed(detail.clone()));
             }
-            queue = self.wait_for_disk(queue, since)?;
+            let waited = self.wait_for_disk(queue, since);
+            queue = waited.map_err(RecorderError::Late)?;
         }
         Ok(())
     }
@@ -319,7 +325,7 @@ mod tests {
     fn who_finds_no_room_waits_and_is_counted() {
         let shared = Shared::default();
         let most = QUEUE_BYTES / 4 * 3;
-        assert_eq!(shared.accept(chunk(most)), Ok(()));
+        assert!(shared.accept(chunk(most)).is_ok());
         let before = shared.load();
         assert!(before.most_bytes >= most && before.waits == 0, "{before:?}");
         std::thread::scope(|scope| {
@@ -350,9 +356,7 @@ mod tests {
         };
         let refused = shared.accept(end);
         assert!(
-            refused
-                .as_ref()
-                .is_err_and(|e| e.contains("expected the disk")),
+            matches!(&refused, Err(RecorderError::Late(e)) if e.contains("expected the disk")),
             "{refused:?}"
         );
     }

@@ -219,14 +219,22 @@ impl SessionWriter {
     /// # Errors
     /// [`RecorderError::Record`] for a record out of order or a header whose digests are not those of its texts
     /// (nothing of it is written, the session goes on); [`RecorderError::Failed`] when this or an earlier
-    /// record could not be written, from then on always.
+    /// record could not be written, from then on always; [`RecorderError::Late`] when this one was taken and is not known to be on the
+    /// disk.
     pub fn accept(&mut self, record: Record) -> Result<(), RecorderError> {
         let next = self.next_phase(&record)?;
         if let Record::Resumed(header) = &record {
             self.begin_leg(header)?;
         } else {
             let record = self.joint.join(record)?;
-            self.shared.accept(record).map_err(RecorderError::Failed)?;
+            match self.shared.accept(record) {
+                Ok(()) => {}
+                Err(late @ RecorderError::Late(_)) => {
+                    self.phase = next; // it was taken
+                    return Err(late);
+                }
+                Err(refused) => return Err(refused),
+            }
         }
         self.phase = next;
         Ok(())

@@ -107,7 +107,12 @@ fn press(bench: &EmulatedBench, folder: &Path, presses: usize) -> Tally {
                 tally.presses += outcomes.iter().filter(made).count();
             }
         }
-        eprintln!("{} presses, {:?}", tally.presses, tally.ended.last());
+        eprintln!(
+            "{} presses, {} refused, {} runs ended early",
+            tally.presses,
+            tally.refused,
+            tally.ended.len()
+        );
         fs::remove_dir_all(&sessions).unwrap();
     }
     tally

@@ -2,6 +2,8 @@
 
 use crate::course::*;
 use crate::mock::*;
+use std::collections::BTreeSet;
+
 use skinrig_model::*;
 
 #[test]
@@ -33,7 +35,12 @@ fn every_device_call_may_fail() {
 #[test]
 fn every_record_may_be_refused() {
     let total = run(faults()).records.len();
-    for failure in [SinkFailure::Once, SinkFailure::Forever, SinkFailure::Panic] {
+    for failure in [
+        SinkFailure::Once,
+        SinkFailure::Forever,
+        SinkFailure::Panic,
+        SinkFailure::Late,
+    ] {
         for k in 0..total {
             let sink = Sink {
                 fail: Some((k, failure)),
@@ -48,13 +55,32 @@ fn every_record_may_be_refused() {
                 told.report
             );
             // A sink that recovers has every press once; a lost outcome is told again as invalid.
-            let ends = told.records.iter();
-            let ends = ends.filter(|r| matches!(r, Record::Outcome(_) | Record::Missed(..)));
-            let ends = ends.count();
+            let records = || told.records.iter();
+            let ends = records().filter_map(|r| match r {
+                Record::Outcome(outcome) => Some(outcome.attempt),
+                Record::Missed(attempt, _) => Some(*attempt),
+                _ => None,
+            });
+            let ends: Vec<AttemptId> = ends.collect();
+            let begun = records().filter_map(|r| match r {
+                Record::Intent { attempt, .. } | Record::Missed(attempt, _) => Some(*attempt),
+                _ => None,
+            });
+            let begun: Vec<AttemptId> = begun.collect();
+            let n = |all: &[AttemptId]| all.iter().collect::<BTreeSet<_>>().len();
+            assert_eq!(
+                (n(&ends), n(&begun)),
+                (ends.len(), begun.len()),
+                "{case}: twice"
+            );
+            let is_begin = matches!(told.records.get(k), Some(Record::Intent { .. }));
             if failure == SinkFailure::Forever {
-                assert!(ends <= 3 && told.records.len() == k, "{case}");
+                assert!(ends.len() <= 3 && told.records.len() == k, "{case}");
+            } else if failure == SinkFailure::Late && is_begin {
+                // The press was not made, and its intent stands.
+                assert_eq!((ends.len(), begun.len()), (2, 3), "{case}");
             } else {
-                assert_eq!(ends, 3, "{case}");
+                assert_eq!(ends.len(), 3, "{case}");
             }
         }
     }

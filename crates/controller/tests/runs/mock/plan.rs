@@ -88,6 +88,8 @@ pub enum SinkFailure {
     Once,
     Forever,
     Panic,
+    /// Takes the record, and says that it is late.
+    Late,
 }
 
 /// Keeps records; fails at the record with this number (from 0) when asked to.
@@ -110,10 +112,16 @@ impl RecordSink for Sink {
             lock(world).t += ms * MS;
         }
         match self.fail {
-            Some((k, SinkFailure::Once)) if n == k => Err(SinkFault("disk full".into())),
-            Some((k, SinkFailure::Forever)) if n >= k => Err(SinkFault("disk full".into())),
+            Some((k, SinkFailure::Once)) if n == k => Err(SinkFault::Refused("disk full".into())),
+            Some((k, SinkFailure::Forever)) if n >= k => {
+                Err(SinkFault::Refused("disk full".into()))
+            }
             Some((k, SinkFailure::Panic)) if n == k => {
                 std::panic::panic_any("sink panics".to_owned())
+            }
+            Some((k, SinkFailure::Late)) if n == k => {
+                self.records.push(record);
+                Err(SinkFault::Late("disk slow".into()))
             }
             _ => {
                 self.records.push(record);
