@@ -43,7 +43,7 @@ pub fn timing(
     Ok((intervals.rms(), errors.rms()))
 }
 
-/// The ways down to the contacts whose height was taken from the frame; those of at most [`MOST`] presses, evenly spread.
+/// The ways down to the contacts whose height was taken from the frame; those of at most 100 presses, evenly spread.
 ///
 /// # Errors
 /// When the poses cannot be read.
