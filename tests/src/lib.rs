@@ -8,7 +8,7 @@ use skinrig_controller::{ControlHandle, RecordSink, RunReport, SinkFault, execut
 use skinrig_device::Rig;
 use skinrig_model::{CameraId, Record, RunHeader};
 use skinrig_protocol::{Plan, Protocol};
-use skinrig_recorder::{RecorderError, SessionWriter};
+use skinrig_recorder::SessionWriter;
 
 /// What a helper fails with: a test only shows it.
 pub type Fault = Box<dyn Error>;
@@ -91,15 +91,8 @@ struct Watched<W> {
 impl<W: FnMut(&Record, &ControlHandle)> RecordSink for Watched<W> {
     fn accept(&mut self, record: Record) -> Result<(), SinkFault> {
         (self.watch)(&record, &self.control);
-        self.writer.accept(record).map_err(|e| fault_of(&e))
-    }
-}
-
-/// What a recorder's error means to the controller.
-#[must_use]
-pub fn fault_of(error: &RecorderError) -> SinkFault {
-    match error {
-        RecorderError::Late(_) => SinkFault::Late(error.to_string()),
-        _ => SinkFault::Refused(error.to_string()),
+        self.writer
+            .accept(record)
+            .map_err(|e| skinrig::sink::fault_of(&e))
     }
 }

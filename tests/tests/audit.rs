@@ -87,6 +87,24 @@ fn a_tip_that_never_reaches_the_skin_is_no_blind_camera() {
     assert!(found.advice.contains("--only depth"), "{found:#?}");
 }
 
+/// The same for a part of the session, by its own noise: presses 13 to 24 of the path after the sync presses.
+#[test]
+fn presses_that_neither_camera_sees_are_not_touched_while_both_send_noise() {
+    let both = |contact| CameraId::ALL.map(|camera| Fault::DeadPress { camera, contact });
+    let analysis = analysed(
+        PROTOCOL,
+        SimLevel::Geometric,
+        1,
+        (12..24).flat_map(both).collect(),
+    );
+    assert_eq!(accused(&analysis), [Accused::NotTouched]);
+    let found = &analysis.findings[0];
+    assert!(
+        found.evidence.contains("both cameras send noise"),
+        "{found:#?}"
+    );
+}
+
 /// In one camera the same silence is that camera.
 #[test]
 fn one_camera_that_sees_no_press_is_blind() {

@@ -126,7 +126,7 @@ impl RecordSink for Sink {
         match &mut self.writer {
             Some(writer) => writer
                 .accept(record)
-                .map_err(|e| skinrig_tests::fault_of(&e)),
+                .map_err(|e| skinrig::sink::fault_of(&e)),
             None => Ok(()),
         }
     }

@@ -143,7 +143,9 @@ impl SessionSink {
     }
 }
 
-fn fault_of(error: &RecorderError) -> SinkFault {
+/// What an error of the recorder means to the controller.
+#[must_use]
+pub fn fault_of(error: &RecorderError) -> SinkFault {
     match error {
         RecorderError::Late(_) => SinkFault::Late(error.to_string()),
         _ => SinkFault::Refused(error.to_string()),

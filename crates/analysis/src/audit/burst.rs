@@ -38,7 +38,9 @@ pub fn findings(analysis: &Analysis, touches: &[Touch<'_>]) -> Vec<Finding> {
                 Fault::ClockWrong,
                 "; both cameras burst at other times".to_owned(),
             )
-        } else if let Some(noise) = noise(touches) {
+        } else if bursts == [false; 2]
+            && let Some(noise) = noise(touches.iter())
+        {
             (Fault::NotTouched, format!("; {noise}{}", forces(touches)))
         } else {
             (Fault::CameraBlind, String::new())
@@ -70,15 +72,15 @@ pub fn findings(analysis: &Analysis, touches: &[Touch<'_>]) -> Vec<Finding> {
     let stretches = [&one, &two].map(|seen| stretch(seen));
     match stretches {
         [Some(a), Some(b)] if a.first <= b.last && b.first <= a.last => {
+            let (first, last) = (a.first.max(b.first), a.last.min(b.last));
             // Presses that were measured were made.
-            let (fault, but) = match noise(touches) {
+            let there = |t: &&Touch<'_>| (first..=last).contains(&t.press);
+            let (fault, but) = match noise(touches.iter().filter(there)) {
                 Some(noise) => (Fault::NotTouched, format!("; {noise}")),
                 None => (Fault::PressesMissing, String::new()),
             };
             let evidence = format!(
-                "expected a burst of events in each press, found none in either camera from {} to {}{but}",
-                a.first.max(b.first),
-                a.last.min(b.last)
+                "expected a burst of events in each press, found none in either camera from {first} to {last}{but}"
             );
             found.push(finding(Law::BurstWithMotion, fault, None, evidence));
         }
@@ -102,14 +104,14 @@ pub fn findings(analysis: &Analysis, touches: &[Touch<'_>]) -> Vec<Finding> {
     found
 }
 
-/// That both cameras send noise between the presses, in words; `None` when one does not, or when nobody measured the presses.
-fn noise(touches: &[Touch<'_>]) -> Option<String> {
-    if touches.iter().any(|t| t.outcome.scheduled) {
+/// That both cameras send noise before these presses, in words; `None` when one does not, or when nobody measured the presses.
+fn noise<'a>(touches: impl Iterator<Item = &'a Touch<'a>> + Clone) -> Option<String> {
+    if touches.clone().any(|t| t.outcome.scheduled) {
         return None;
     }
     let [one, two] = CameraId::ALL.map(|camera| {
         let idle = touches
-            .iter()
+            .clone()
             .filter_map(|t| Some(t.sights[camera.index()].rates?.1));
         median(idle.collect()).filter(|rate| *rate > 0.0)
     });
