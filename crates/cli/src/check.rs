@@ -68,7 +68,7 @@ pub fn check(args: &ProtocolArgs, json: bool) -> Outcome {
     let checked = match read(&args.protocol, &args.overrides)? {
         Ok(checked) => checked,
         Err(refused) if json => {
-            crate::print_json(&serde_json::json!({
+            crate::terminal::print_json(&serde_json::json!({
                 "protocol": args.protocol, "findings": refused.found.list(),
             }));
             return Ok(Exit::Input);
@@ -77,7 +77,7 @@ pub fn check(args: &ProtocolArgs, json: bool) -> Outcome {
     };
     let summary = checked.plan.summary();
     if json {
-        crate::print_json(&serde_json::json!({
+        crate::terminal::print_json(&serde_json::json!({
             "protocol": args.protocol, "sha256": checked.protocol.sha256,
             "plan_sha256": checked.plan.digest(), "summary": summary,
         }));
@@ -113,7 +113,7 @@ pub fn plan(args: &PlanArgs, json: bool) -> Outcome {
     let checked = read.map_err(|refused| Failure::findings(&refused.found))?;
     let summary = checked.plan.summary();
     if json {
-        crate::print_json(&serde_json::json!({
+        crate::terminal::print_json(&serde_json::json!({
             "sha256": checked.plan.digest(), "summary": summary, "plan": as_read(&checked.plan)?,
         }));
         return Ok(Exit::Ok);

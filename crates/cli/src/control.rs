@@ -7,7 +7,8 @@ use skinrig_recorder::{SessionReader, writer_of};
 
 use crate::args::{ControlArgs, NoteArgs};
 use crate::exit::{Exit, Failure, Outcome};
-use crate::remote::{Live, MOST_NAME_CHARS, Reply, Request, Silence, What, ask};
+use crate::host::user_name;
+use crate::remote::{Live, Reply, Request, Silence, What, ask};
 use crate::sessions;
 
 /// The controller hears a request at its next tick; one that takes this long hangs.
@@ -46,7 +47,7 @@ pub fn control(args: &ControlArgs, json: bool) -> Outcome {
         Waited::Ended => return ended(args.what, &session, json),
     };
     if json {
-        crate::print_json(&serde_json::json!({
+        crate::terminal::print_json(&serde_json::json!({
             "session": session, "request": args.what, "heard": true, "state": state,
         }));
     } else {
@@ -64,7 +65,7 @@ fn ended(what: What, session: &Path, json: bool) -> Outcome {
         )));
     }
     if json {
-        crate::print_json(&serde_json::json!({
+        crate::terminal::print_json(&serde_json::json!({
             "session": session, "request": what, "heard": true, "state": "finished",
         }));
     } else {
@@ -99,7 +100,7 @@ pub fn note(args: &NoteArgs, json: bool) -> Outcome {
     };
     let number = handed(&session, &request)?;
     match wait(&session, HEARD_WITHIN, |live| live.noted >= number)? {
-        Waited::Until(_) if json => crate::print_json(&serde_json::json!({
+        Waited::Until(_) if json => crate::terminal::print_json(&serde_json::json!({
             "session": session, "by": by, "note": text, "written": true,
         })),
         Waited::Until(_) => outln!("{}: noted", session.display()),
@@ -121,18 +122,6 @@ pub fn note(args: &NoteArgs, json: bool) -> Outcome {
 fn is_noted(session: &Path, note: &str) -> bool {
     let notes = SessionReader::open(session).and_then(|reader| reader.notes());
     notes.is_ok_and(|notes| notes.iter().any(|n| n.text == note))
-}
-
-/// The name under which somebody is logged in.
-pub(crate) fn user_name() -> String {
-    let name = ["USER", "LOGNAME", "USERNAME"]
-        .into_iter()
-        .find_map(|key| std::env::var(key).ok().filter(|v| !v.is_empty()));
-    let name = name.unwrap_or_else(|| "operator".to_owned());
-    name.chars()
-        .filter(|c| !c.is_control())
-        .take(MOST_NAME_CHARS)
-        .collect()
 }
 
 /// Hands `request` to the run; its number.

@@ -54,7 +54,7 @@ pub fn devices(args: &DevicesArgs, json: bool) -> Outcome {
     let rig = args.rig.as_deref().map(bench::load).transpose()?;
     let lines = survey(rig.as_ref());
     if json {
-        crate::print_json(&serde_json::json!({
+        crate::terminal::print_json(&serde_json::json!({
             "rig": rig.as_ref().map(|r| &r.name),
             "kind": rig.as_ref().map(|r| r.kind.name()),
             "devices": lines,

@@ -34,7 +34,9 @@ pub fn export(args: &ExportArgs, json: bool) -> Outcome {
         files(args, &reader, &header, &folder)?
     };
     if json {
-        crate::print_json(&serde_json::json!({ "folder": folder.path(), "written": written }));
+        crate::terminal::print_json(
+            &serde_json::json!({ "folder": folder.path(), "written": written }),
+        );
     } else {
         for path in &written {
             outln!("{}", path.display());

@@ -28,7 +28,7 @@ pub fn inspect(args: &InspectArgs, as_json: bool) -> Outcome {
         _ => inspect_events(&args.file, gap_us).map_err(Failure::input)?,
     };
     if as_json {
-        crate::print_json(&document(&args.file, &found));
+        crate::terminal::print_json(&document(&args.file, &found));
     } else {
         print(&args.file, &found, args.gap);
     }

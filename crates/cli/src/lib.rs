@@ -16,6 +16,7 @@ pub mod exit;
 pub mod export;
 pub mod fault;
 pub mod hil;
+mod host;
 pub mod import;
 pub mod inspect;
 pub mod jog;
@@ -28,6 +29,7 @@ pub mod remote;
 pub mod results;
 pub mod resume;
 pub mod rig;
+mod rig_document;
 pub mod run;
 pub mod salvage;
 pub mod sample_size;
@@ -41,6 +43,7 @@ pub mod status;
 pub mod supervise;
 pub mod tag;
 pub mod tradeoff;
+mod tradeoff_file;
 pub mod verify;
 pub mod version;
 pub mod watch;
@@ -125,13 +128,4 @@ fn command_line(arguments: &[OsString]) -> String {
         .map(|a| a.to_string_lossy())
         .collect();
     format!("skinrig {}", words.join(" "))
-}
-
-/// Prints a JSON value for programs, and its end of line.
-pub(crate) fn print_json(value: &serde_json::Value) {
-    // Pretty printing of a `Value` cannot fail.
-    outln!(
-        "{}",
-        serde_json::to_string_pretty(value).unwrap_or_default()
-    );
 }

@@ -70,7 +70,7 @@ pub fn prototypes(args: &PrototypesArgs, json: bool) -> Outcome {
         errln!("note: {copy}");
     }
     if json {
-        crate::print_json(&serde_json::to_value(&all).map_err(Failure::internal)?);
+        crate::terminal::print_json(&serde_json::to_value(&all).map_err(Failure::internal)?);
     } else if all.is_empty() {
         outln!("no sessions in {}", args.folder.display());
     } else {

@@ -3,64 +3,20 @@
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 
-use serde::{Deserialize, Serialize};
 use skinrig_analysis::motion::MotionCourse;
 use skinrig_analysis::reference_code::reference_code;
 use skinrig_analysis::result::{Motion, PressResult};
 use skinrig_analysis::tradeoff::Tradeoff;
 use skinrig_analysis::{Analysis, EarlierAttempt, Keep, LegStart, SessionInput};
-use skinrig_model::{
-    AnalysisSettings, CameraId, HostTime, PressId, RigGeometry, RunHeader, TriggerEdge,
-};
+use skinrig_model::{AnalysisSettings, CameraId, HostTime, RigGeometry, RunHeader, TriggerEdge};
 use skinrig_recorder::{AttemptRow, RecorderError, SessionReader};
 use skinrig_report::{Provenance, ReportInput, Variant};
 
 use crate::analyses;
 use crate::args::{AnalyzeArgs, ReportArgs};
 use crate::exit::{Exit, Failure, Outcome};
+use crate::rig_document::RigDocument;
 use crate::source::SessionEvents;
-
-/// What `RunHeader::rig_json` holds.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-#[serde(try_from = "RecordedRig")]
-pub struct RigDocument {
-    /// What an analysis needs to know of the rig.
-    pub geometry: RigGeometry,
-    /// The analysis settings of the protocol.
-    pub analysis: AnalysisSettings,
-    /// Everything worth keeping about the rig.
-    pub rig: serde_json::Value,
-}
-
-/// [`RigDocument`] as any version wrote it.
-#[derive(Deserialize)]
-struct RecordedRig {
-    geometry: RigGeometry,
-    analysis: serde_json::Value,
-    rig: serde_json::Value,
-}
-
-impl TryFrom<RecordedRig> for RigDocument {
-    type Error = serde_json::Error;
-
-    fn try_from(recorded: RecordedRig) -> Result<Self, Self::Error> {
-        let mut analysis = recorded.analysis;
-        // Earlier versions counted presses that are left out from 0, under another name.
-        if let Some(settings) = analysis.as_object_mut()
-            && let Some(indices) = settings.remove("exclude_presses")
-        {
-            let indices: Vec<u32> = serde_json::from_value(indices)?;
-            let presses: Vec<_> = indices.into_iter().map(PressId::from_index).collect();
-            let name = "exclude_press_numbers".to_owned();
-            settings.insert(name, serde_json::to_value(presses)?);
-        }
-        Ok(Self {
-            geometry: recorded.geometry,
-            analysis: serde_json::from_value(analysis)?,
-            rig: recorded.rig,
-        })
-    }
-}
 
 /// The results of one session.
 pub struct Results {
@@ -179,7 +135,7 @@ pub fn analyze_session(path: &Path, choices: Choices<'_>) -> Result<Results, Fai
         analysis,
         legs: session.input.legs,
         provenance,
-        tradeoff: crate::tradeoff::beside_session(path),
+        tradeoff: crate::tradeoff_file::beside_session(path),
     })
 }
 
@@ -349,7 +305,7 @@ pub fn print_results(results: &Results, json: bool, paths: &(PathBuf, PathBuf)) 
                 }),
             );
         }
-        crate::print_json(&document);
+        crate::terminal::print_json(&document);
     } else {
         let color = std::io::stdout().is_terminal();
         let table = skinrig_report::terminal_table(&results.report_input(), color);
@@ -468,7 +424,7 @@ pub fn report(args: &ReportArgs, json: bool) -> Outcome {
     let paths = write_results(&results, None, args.out.as_deref())?;
     older.iter().for_each(|note| errln!("{note}"));
     if json {
-        crate::print_json(&serde_json::json!({ "report": paths.1, "results": paths.0 }));
+        crate::terminal::print_json(&serde_json::json!({ "report": paths.1, "results": paths.0 }));
     } else {
         outln!("{}", paths.1.display());
     }

@@ -19,10 +19,12 @@ use crate::check;
 use crate::exit::{Exit, Failure, Outcome};
 use crate::fault::Saboteur;
 use crate::hil::lease;
+use crate::host::host_name;
 use crate::paths;
 use crate::progress::ProgressView;
-use crate::results::{self, RigDocument};
+use crate::results::{self};
 use crate::rig::{self, RepeatedOperator, bench, gates, planted};
+use crate::rig_document::RigDocument;
 use crate::signals::Operator;
 use crate::sink::{Foreknowledge, SessionSink};
 
@@ -218,17 +220,6 @@ fn header(
     })
 }
 
-/// The machine's name as the system gives it; `unknown` where it gives none.
-pub(crate) fn host_name() -> String {
-    std::fs::read_to_string("/etc/hostname")
-        .ok()
-        .or_else(|| std::env::var("HOSTNAME").ok())
-        .or_else(|| std::env::var("COMPUTERNAME").ok())
-        .map(|n| n.trim().to_owned())
-        .filter(|n| !n.is_empty())
-        .unwrap_or_else(|| "unknown".into())
-}
-
 /// `skinrig run`.
 ///
 /// # Errors
@@ -260,7 +251,7 @@ pub fn conclude(
     json: bool,
 ) -> Outcome {
     let analysed = if no_analysis && json {
-        crate::print_json(&serde_json::json!({ "files": { "session": session } }));
+        crate::terminal::print_json(&serde_json::json!({ "files": { "session": session } }));
         Ok(Exit::Ok)
     } else if no_analysis {
         outln!("{}", session.display());

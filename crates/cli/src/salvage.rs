@@ -18,7 +18,7 @@ pub fn salvage(args: &SalvageArgs, json: bool) -> Outcome {
         let mut value = serde_json::to_value(&report).map_err(Failure::internal)?;
         value["whole"] = report.is_whole().into();
         value["salvaged"] = serde_json::json!(to);
-        crate::print_json(&value);
+        crate::terminal::print_json(&value);
     } else {
         print(&report);
         outln!("\n{}", to.display());

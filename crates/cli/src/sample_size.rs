@@ -34,7 +34,7 @@ pub fn propose(difference_mm: f64, session: &Path, args: &DetectArgs, json: bool
     };
     let plan = power::plan(&measured, &target).map_err(|e| refused(&e))?;
     if json {
-        crate::print_json(
+        crate::terminal::print_json(
             &json!({ "session": session, "metric": "rmse", "unit": "mm", "plan": plan }),
         );
     } else {

@@ -22,7 +22,7 @@ pub fn sessions(args: &SessionsArgs, json: bool) -> Outcome {
     }
     found.retain(|s| args.tags.iter().all(|tag| s.has_tag(tag)));
     if json {
-        crate::print_json(&serde_json::to_value(&found).map_err(Failure::internal)?);
+        crate::terminal::print_json(&serde_json::to_value(&found).map_err(Failure::internal)?);
         return Ok(Exit::Ok);
     }
     if found.is_empty() {

@@ -15,7 +15,7 @@ use crate::rig::gates;
 pub fn show(args: &ShowArgs, json: bool) -> Outcome {
     let document = describe(args).map_err(Failure::session)?;
     if json {
-        crate::print_json(&document);
+        crate::terminal::print_json(&document);
     } else {
         print(&document);
     }

@@ -44,7 +44,7 @@ pub fn status(args: &StatusArgs, as_json: bool) -> Outcome {
         d.extend(filed);
     }
     if as_json {
-        crate::print_json(&d);
+        crate::terminal::print_json(&d);
     } else {
         print(&d, live.as_deref());
     }

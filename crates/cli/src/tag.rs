@@ -24,7 +24,7 @@ pub fn tag(args: &TagArgs, json: bool) -> Outcome {
         let saying = Saying {
             session_id,
             at: Utc::now().to_rfc3339_opts(SecondsFormat::Secs, true),
-            by: args.by.clone().unwrap_or_else(crate::control::user_name),
+            by: args.by.clone().unwrap_or_else(crate::host::user_name),
             add,
             remove,
             note: args.note.clone(),
@@ -35,7 +35,7 @@ pub fn tag(args: &TagArgs, json: bool) -> Outcome {
     };
     let all = all.map_err(Failure::session)?;
     if json {
-        crate::print_json(&serde_json::json!({
+        crate::terminal::print_json(&serde_json::json!({
             "session": session, "tags": all.tags, "notes": all.notes,
         }));
     } else {

@@ -73,6 +73,13 @@ macro_rules! errln {
     };
 }
 
+/// Prints a JSON value for programs, and its end of line.
+pub fn print_json(value: &serde_json::Value) {
+    // Pretty printing of a `Value` cannot fail.
+    let text = serde_json::to_string_pretty(value).unwrap_or_default();
+    out(format_args!("{text}\n"));
+}
+
 #[cfg(test)]
 mod tests {
     use super::harmless;

@@ -1,10 +1,8 @@
 //! `skinrig tradeoff`: what speed costs in accuracy, measured on a session.
 
 use std::io::IsTerminal;
-use std::path::Path;
 
 use rustix::time::{ClockId, clock_gettime};
-use serde::Deserialize;
 use skinrig_analysis::AnalysisError;
 use skinrig_analysis::tradeoff::{Cost, Plan, Row, Tradeoff, measure};
 use skinrig_report::tradeoff::{label, page, protocol_lines, terminal_table};
@@ -13,43 +11,7 @@ use crate::analyses::tradeoff_path;
 use crate::args::{CostKind, TradeoffArgs};
 use crate::exit::{Exit, Failure, Outcome};
 use crate::results::{Choices, Opened, not_official, open, write};
-
-/// Values of the document's `format` and `format_version`.
-const FORMAT: (&str, u32) = ("skinrig-tradeoff", 1);
-
-/// The tradeoff that an earlier `skinrig tradeoff` left beside a session: `None` where there is none, and why it cannot be read.
-pub(crate) fn beside_session(session: &Path) -> Option<Result<Tradeoff, String>> {
-    let path = tradeoff_path(session, None).with_extension("json");
-    let text = match std::fs::read_to_string(&path) {
-        Ok(text) => text,
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return None,
-        Err(e) => return Some(Err(format!("{}: {e}", path.display()))),
-    };
-    let parsed = serde_json::from_str::<Document>(&text).map_err(|e| e.to_string());
-    let fits = parsed.and_then(|d| {
-        if (d.format.as_str(), d.format_version) == FORMAT {
-            Ok(d.tradeoff)
-        } else {
-            Err(format!("found {} version {}", d.format, d.format_version))
-        }
-    });
-    Some(fits.map_err(|found| {
-        format!(
-            "{}: expected {} version {}, {found}; next: `skinrig tradeoff` writes it anew",
-            path.display(),
-            FORMAT.0,
-            FORMAT.1
-        )
-    }))
-}
-
-/// What is read of the document again.
-#[derive(Deserialize)]
-struct Document {
-    format: String,
-    format_version: u32,
-    tradeoff: Tradeoff,
-}
+use crate::tradeoff_file::FORMAT;
 
 /// CPU time of this thread, s.
 fn thread_cpu_s() -> f64 {
@@ -172,7 +134,7 @@ pub fn tradeoff(args: &TradeoffArgs, json: bool) -> Outcome {
     write(&json_path, text.as_bytes())?;
     if json {
         document["files"] = serde_json::json!({ "page": html_path, "results": json_path });
-        crate::print_json(&document);
+        crate::terminal::print_json(&document);
     } else {
         let table = terminal_table(&result, &rig, std::io::stdout().is_terminal());
         crate::terminal::out(format_args!("{table}"));

@@ -48,7 +48,7 @@ fn bundle(folder: &Path, json: bool) -> Outcome {
     if json {
         let mut shown = serde_json::to_value(&report).map_err(Failure::internal)?;
         shown["sound"] = (problems == 0).into();
-        crate::print_json(&shown);
+        crate::terminal::print_json(&shown);
     } else {
         for problem in &report.problems {
             outln!("{name}: {problem}");
@@ -148,7 +148,7 @@ fn session(path: &Path, json: bool) -> Outcome {
     let report = recheck(path, &mut Rescan::default()).map_err(Failure::session)?;
     let name = path.display();
     if json {
-        crate::print_json(&serde_json::json!({
+        crate::terminal::print_json(&serde_json::json!({
             "session": path, "sound": report.is_sound(), "sealed": report.sealed,
             "problems": report.problems, "more_problems": report.more_problems, "remarks": report.remarks,
             "totals": report.totals,

@@ -6,6 +6,9 @@ use std::path::{Path, PathBuf};
 
 use crate::error::RecorderError;
 
+/// How session files end.
+pub const SESSION_SUFFIX: &str = ".session.sqlite";
+
 /// The file that SQLite keeps beside a session: `-wal`, the write-ahead log, or `-journal`, what a transaction in rollback mode
 /// would be undone with.
 pub fn beside(path: &Path, ending: &str) -> PathBuf {

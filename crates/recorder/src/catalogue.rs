@@ -4,13 +4,11 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
+use crate::beside::SESSION_SUFFIX;
 use crate::error::RecorderError;
 use crate::reader::SessionReader;
 use crate::rows::{PressTally, SessionTotals};
 use crate::tags::{Sayings, sayings};
-
-/// How session files end.
-pub const SESSION_SUFFIX: &str = ".session.sqlite";
 
 /// One session file of a folder.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]

@@ -4,9 +4,10 @@ use sqlx::Row;
 use sqlx::sqlite::SqliteConnection;
 
 use crate::digest::{Earlier, TableDigest, digest_earlier, tree_of};
-use crate::query::{self, Fault, each_row, has_table, int, num, opt_int, sha, text};
+use crate::hex::hex;
+use crate::query::{Fault, each_row, has_table, int, num, opt_int, sha, text};
 use crate::rows::SessionTotals;
-use crate::writer::hex;
+use crate::totals;
 
 /// What the seal before a leg proves.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -118,11 +119,11 @@ async fn link(conn: &mut SqliteConnection, leg: &Leg) -> Result<Option<Link>, Fa
     }
     let schema = num(&row, "schema_version")?;
     let mut totals = SessionTotals {
-        presses: query::tally(&row, "")?,
-        sync: query::tally(&row, "sync_")?,
+        presses: totals::tally(&row, "")?,
+        sync: totals::tally(&row, "sync_")?,
         ..SessionTotals::default()
     };
-    query::sizes(&row, &mut totals)?;
+    totals::sizes(&row, &mut totals)?;
     let mut recorded = Vec::new();
     let sql = "SELECT name, rows, sha256 FROM previous_table_digest WHERE leg = ? ORDER BY name";
     each_row(sqlx::query(sql).bind(leg.number), conn, |row| {
@@ -164,7 +165,7 @@ async fn link(conn: &mut SqliteConnection, leg: &Leg) -> Result<Option<Link>, Fa
         ));
     }
     let poses = recorded.iter().find(|t| t.name == "pose_block");
-    let counted = query::totals_before(conn, &earlier, poses.map_or(0, |t| t.rows)).await?;
+    let counted = totals::totals_before(conn, &earlier, poses.map_or(0, |t| t.rows)).await?;
     if counted != totals {
         told.push(format!(
             "expected the counts of the seal before, {totals:?}, found {counted:?}"

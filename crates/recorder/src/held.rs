@@ -14,7 +14,7 @@ use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-use crate::beside::beside;
+use crate::beside::{SESSION_SUFFIX, beside};
 use crate::error::RecorderError;
 
 /// Sessions that this process writes.
@@ -159,7 +159,7 @@ impl Held {
     pub fn refuge(&self) -> Refuge {
         let name = self.path.file_name().unwrap_or_default().to_string_lossy();
         let stem = name
-            .strip_suffix(crate::SESSION_SUFFIX)
+            .strip_suffix(SESSION_SUFFIX)
             .unwrap_or(&name)
             .to_owned();
         let folders = self.path.ancestors().skip(1).map(Path::to_path_buf);
@@ -168,8 +168,8 @@ impl Held {
         let folders = folders.chain([std::env::temp_dir()]).filter(|f| f.is_dir());
         let copy_in = |folder: PathBuf| {
             let name = |n: u32| match n {
-                1 => format!("{stem}.rescued{}", crate::SESSION_SUFFIX),
-                n => format!("{stem}.rescued-{n}{}", crate::SESSION_SUFFIX),
+                1 => format!("{stem}.rescued{}", SESSION_SUFFIX),
+                n => format!("{stem}.rescued-{n}{}", SESSION_SUFFIX),
             };
             let paths = (1..1000).map(|n| folder.join(name(n)));
             paths.into_iter().find(|p| !p.exists())

@@ -11,7 +11,7 @@ use skinrig_model::{
 use sqlx::sqlite::SqliteConnection;
 
 use crate::pose;
-use crate::prepare::{PreparedChunk, Ready};
+use crate::prepared::{PreparedChunk, Ready};
 use crate::query::Fault;
 use crate::rows::SessionTotals;
 
@@ -504,7 +504,7 @@ impl Journal {
         if ends != 1 {
             return Ok(Err(("the run's end as last record".into(), "none".into())));
         }
-        let totals = crate::query::totals(&mut self.conn).await?;
+        let totals = crate::totals::totals(&mut self.conn).await?;
         let open = totals.presses.open() + totals.sync.open();
         if open > 0 {
             let first: u32 = sqlx::query_scalar(

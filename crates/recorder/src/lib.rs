@@ -29,11 +29,14 @@ mod held;
 #[cfg(not(target_os = "linux"))]
 #[path = "held_elsewhere.rs"]
 mod held;
+mod hex;
 mod insert;
+mod left;
 mod leg;
 mod lock;
 mod pose;
 mod prepare;
+mod prepared;
 mod query;
 mod queue;
 mod rescue;
@@ -41,11 +44,14 @@ mod resume;
 mod salvage;
 mod schema;
 mod seal;
+mod totals;
 mod worker;
 
-pub use catalogue::{SESSION_SUFFIX, SessionState, SessionSummary, list};
+pub use beside::SESSION_SUFFIX;
+pub use catalogue::{SessionState, SessionSummary, list};
 pub use codec::Codec;
 pub use error::RecorderError;
+pub use left::Sealed;
 pub use lock::writer_of;
 pub use queue::QueueLoad;
 pub use reader::SessionReader;
@@ -57,4 +63,4 @@ pub use salvage::{LostBytes, SalvageReport, SalvagedTable, salvage};
 pub use schema::SCHEMA_VERSION;
 pub use tags::{LaterNote, Saying, Sayings, TAGS_SUFFIX, is_tag, say, sayings, tags_path};
 pub use verify::{ChunkScanner, VerifyReport, verify};
-pub use writer::{Sealed, SessionWriter};
+pub use writer::SessionWriter;

@@ -8,8 +8,7 @@ use skinrig_model::Record;
 
 use crate::error::RecorderError;
 use crate::held::Refuge;
-use crate::prepare::Ready;
-use crate::query::Fault;
+use crate::prepared::{Prepared, is_durable};
 
 /// Bytes of records that may wait to be written; beyond, [`accept`](crate::SessionWriter::accept) waits.
 const QUEUE_BYTES: usize = 64 << 20;
@@ -19,9 +18,6 @@ const PATIENCE: Duration = Duration::from_secs(30);
 
 /// How long sealing waits for other programs that have the session open, unless told otherwise.
 const SEAL_PATIENCE: Duration = Duration::from_secs(60);
-
-/// A record that can be written, or why it cannot. It keeps its place in the order either way.
-pub type Prepared = Result<Ready, Fault>;
 
 /// What the caller, the preparing and the writing thread share.
 #[derive(Debug)]
@@ -278,14 +274,6 @@ impl Shared {
         self.lock().closed = Some(how);
         self.changed.notify_all();
     }
-}
-
-/// Whether a record must be on the disk before the caller goes on.
-pub fn is_durable(record: &Record) -> bool {
-    matches!(
-        record,
-        Record::Started(_) | Record::Intent { .. } | Record::Outcome(_) | Record::Ended { .. }
-    )
 }
 
 /// About how much memory a record takes.

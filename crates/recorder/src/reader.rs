@@ -9,10 +9,11 @@ use tokio::runtime::Runtime;
 
 use crate::error::RecorderError;
 use crate::from_row::{header_from, planned_from};
-use crate::query::{self, Fault, each_row, int, named, real, sha, text};
+use crate::query::{Fault, each_row, int, named, real, sha, text};
 use crate::rows::{DeviceRow, PressTally, Seal, SessionTotals};
 use crate::schema;
 use crate::seal::placeholder_of;
+use crate::totals;
 
 mod journal;
 mod legs;
@@ -194,11 +195,11 @@ impl SessionReader {
     pub(crate) fn seal_row(&self) -> Result<Option<Seal>, RecorderError> {
         let seals = self.all("reading its seal", "SELECT * FROM seal", |row| {
             let mut totals = SessionTotals {
-                presses: query::tally(row, "")?,
-                sync: query::tally(row, "sync_")?,
+                presses: totals::tally(row, "")?,
+                sync: totals::tally(row, "sync_")?,
                 ..SessionTotals::default()
             };
-            query::sizes(row, &mut totals)?;
+            totals::sizes(row, &mut totals)?;
             Ok(Seal {
                 totals,
                 tree_sha256: sha(row, "tree_sha256")?,
@@ -266,7 +267,7 @@ impl SessionReader {
     /// # Errors
     /// When the file is damaged.
     pub fn tallies(&self) -> Result<(PressTally, PressTally), RecorderError> {
-        self.ask("counting presses", query::tallies)
+        self.ask("counting presses", totals::tallies)
     }
 
     /// Counts and sizes, from the rows themselves.
@@ -274,6 +275,6 @@ impl SessionReader {
     /// # Errors
     /// When the file is damaged.
     pub fn totals(&self) -> Result<SessionTotals, RecorderError> {
-        self.ask("counting", query::totals)
+        self.ask("counting", totals::totals)
     }
 }

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use crate::catalogue::SESSION_SUFFIX;
+use crate::beside::SESSION_SUFFIX;
 use crate::error::RecorderError;
 
 /// How the names of these logs end.

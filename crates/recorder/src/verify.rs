@@ -11,16 +11,15 @@ use skinrig_model::{
 mod chain;
 mod gaps;
 mod legs;
+mod report;
 mod seal;
 
+pub use self::report::VerifyReport;
 use crate::error::RecorderError;
+use crate::hex::hex;
 use crate::query::{each_row, sha, text};
 use crate::reader::SessionReader;
 use crate::rows::{AttemptRow, SessionTotals};
-use crate::writer::hex;
-
-/// Problems that are told in full; more are only counted.
-const TOLD: usize = 100;
 
 /// Decodes camera bytes for the check. This crate knows no event encoding, so the caller brings one.
 pub trait ChunkScanner {
@@ -40,59 +39,6 @@ pub trait ChunkScanner {
     /// Bytes were lost between the previous chunk of `camera` and the next one: nothing that they may have changed carries over.
     /// Called before its `scan`, where the session tells the time that was lost.
     fn lost(&mut self, camera: CameraId, format: StreamFormat, bytes: u64);
-}
-
-/// What [`verify()`] found.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct VerifyReport {
-    /// Whether the file has a seal. Without one, hashes over the whole were not checked.
-    pub sealed: bool,
-    /// What is wrong, in words: nothing for a sound session.
-    pub problems: Vec<String>,
-    /// Problems found beyond those told in `problems`.
-    pub more_problems: u64,
-    /// What is worth knowing and no problem, in words.
-    pub remarks: Vec<String>,
-    /// Counts and sizes, from the rows; `None` when they cannot be read.
-    pub totals: Option<SessionTotals>,
-    /// The first thing that the machine, not the file, kept from being read.
-    unread: Option<String>,
-}
-
-impl VerifyReport {
-    /// True when nothing is wrong.
-    #[must_use]
-    pub fn is_sound(&self) -> bool {
-        self.problems.is_empty()
-    }
-
-    fn add(&mut self, problem: impl ToString) {
-        if self.problems.len() < TOLD {
-            self.problems.push(problem.to_string());
-        } else {
-            self.more_problems += 1;
-        }
-    }
-
-    /// Keeps the value, or tells the error.
-    fn take<T>(&mut self, result: Result<T, RecorderError>) -> Option<T> {
-        result.map_err(|e| self.add_error(e)).ok()
-    }
-
-    /// An error of the machine says nothing of the file.
-    fn add_error(&mut self, error: RecorderError) {
-        if error.is_of_the_machine() {
-            self.unread.get_or_insert(error.to_string());
-        } else {
-            self.add(error);
-        }
-    }
-
-    fn equal<T: PartialEq + std::fmt::Debug>(&mut self, what: &str, expected: &T, found: &T) {
-        if expected != found {
-            self.add(format!("{what}: expected {expected:?}, found {found:?}"));
-        }
-    }
 }
 
 /// Checks a session: SQLite's own integrity, foreign keys, protocol and plan digests, every chunk's checksum

@@ -10,10 +10,10 @@ use tokio::runtime::Runtime;
 
 use crate::error::RecorderError;
 use crate::insert::Journal;
+use crate::left::{Left, Sealed};
+use crate::prepared::Prepared;
 use crate::query::Fault;
-use crate::queue::{Close, Next, Prepared, Shared};
-use crate::writer::Left;
-use crate::writer::Sealed;
+use crate::queue::{Close, Next, Shared};
 use crate::{rescue, seal};
 
 /// What is not committed by a durable record or by its size is committed after this time.

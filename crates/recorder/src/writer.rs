@@ -11,30 +11,16 @@ use sqlx::sqlite::SqliteConnection;
 use tokio::runtime::Runtime;
 
 use crate::error::RecorderError;
+use crate::hex::hex;
 use crate::insert::Journal;
+use crate::left::{Left, Sealed};
 use crate::leg::Joint;
 use crate::lock::WriterLock;
 use crate::prepare::Preparer;
 use crate::queue::{Close, QueueLoad, Shared};
-use crate::rows::SessionTotals;
 use crate::verify::ChunkScanner;
 use crate::worker::Worker;
 use crate::{beside, prepare, resume, schema};
-
-/// A sealed session.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Sealed {
-    /// The file, now read-only.
-    pub path: PathBuf,
-    /// Its size.
-    pub bytes: u64,
-    /// Final counts.
-    pub totals: SessionTotals,
-    /// SHA-256 of the content.
-    pub tree_sha256: [u8; 32],
-    /// SHA-256 of the file, with the place of this hash taken as zero.
-    pub file_sha256: [u8; 32],
-}
 
 /// Writes one session file.
 ///
@@ -57,15 +43,6 @@ pub struct SessionWriter {
 const LOOK_AGAIN: Duration = Duration::from_millis(5);
 
 type Written = JoinHandle<Option<Left>>;
-
-/// How the writing thread left the session.
-#[derive(Debug)]
-pub(crate) enum Left {
-    /// Sealed, or why not.
-    Sealed(Result<Sealed, RecorderError>),
-    /// Brought to this path, or why not.
-    Saved(Result<PathBuf, String>),
-}
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Phase {
@@ -412,9 +389,4 @@ fn check_digests(header: &RunHeader) -> Result<(), RecorderError> {
         }
     }
     Ok(())
-}
-
-/// Lower-case hex.
-pub(crate) fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|b| format!("{b:02x}")).collect()
 }

@@ -1,6 +1,7 @@
 //! The command line as the user types it: the commands, and what several of them take.
 
 mod bench;
+mod doctor;
 mod evaluate;
 mod files;
 mod values;
@@ -13,12 +14,12 @@ pub use self::bench::{
     ControlArgs, DetectArgs, DevicesArgs, JogArgs, NoteArgs, PlanArgs, ResumeArgs, RunArgs,
     StatusArgs, WatchArgs,
 };
+pub use self::doctor::DoctorArgs;
 pub use self::evaluate::{AnalyzeArgs, CompareArgs, CostKind, ReportArgs, TradeoffArgs};
 pub use self::files::{
     ExportArgs, ExportKind, ExportTable, ImportArgs, InspectArgs, PrototypesArgs, SalvageArgs,
     SchemaArgs, SchemaKind, SessionsArgs, ShowArgs, TagArgs,
 };
-use crate::doctor::DoctorArgs;
 use crate::exit::Exit;
 use crate::hil::args::{HilArgs, HoldArmArgs};
 

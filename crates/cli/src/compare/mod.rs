@@ -44,7 +44,7 @@ pub fn compare(args: &CompareArgs, json: bool) -> Outcome {
         write(&results, text.as_bytes())?;
         if json {
             document["files"] = serde_json::json!({ "page": page, "results": results });
-            crate::print_json(&document);
+            crate::terminal::print_json(&document);
         } else {
             let table = report::terminal_table(&result, std::io::stdout().is_terminal());
             crate::terminal::out(format_args!("{table}"));
@@ -54,7 +54,7 @@ pub fn compare(args: &CompareArgs, json: bool) -> Outcome {
         return Ok(Exit::Ok);
     }
     if json {
-        crate::print_json(&document);
+        crate::terminal::print_json(&document);
     } else {
         let table = report::terminal_table(&result, std::io::stdout().is_terminal());
         crate::terminal::out(format_args!("{table}"));

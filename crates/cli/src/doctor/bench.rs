@@ -6,7 +6,7 @@ use skinrig_hil::lease::{self, Standing};
 use skinrig_omega3::enumerate::USB_VENDOR;
 use skinrig_recorder::writer_of;
 
-use super::Case;
+use super::case::Case;
 use super::finding::{Finding, check};
 use super::machine::Machine;
 use super::survey::name_of;

@@ -3,7 +3,7 @@
 use skinrig_omega3::enumerate::USB_VENDOR;
 use skinrig_protocol::rig::RigKind;
 
-use super::Case;
+use super::case::Case;
 use super::finding::{Finding, check};
 use super::survey::{LEFT_ALONE, Library, name_of};
 use super::usb::{self, UsbDevice};

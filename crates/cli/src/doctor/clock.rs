@@ -1,6 +1,6 @@
 //! The computer's clocks: the time of day by which nights are told apart, and the counter by which events are stamped.
 
-use super::Case;
+use super::case::Case;
 use super::finding::{Finding, check};
 
 const AREA: &str = "clock";

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::Case;
+use super::case::Case;
 use super::finding::{Finding, check};
 use crate::rig::gates::size;
 

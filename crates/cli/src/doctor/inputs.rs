@@ -1,6 +1,6 @@
 //! Whether what the rig file names on this computer is there: bias files, lamp programs.
 
-use super::Case;
+use super::case::Case;
 use super::finding::{Finding, check};
 
 /// A finding for each file and program that the rig file names.

@@ -6,6 +6,7 @@
 mod access;
 mod bench;
 mod cables;
+mod case;
 mod clock;
 mod disk;
 mod finding;
@@ -21,42 +22,15 @@ mod tests;
 mod usb;
 mod versions;
 
-use std::path::{Path, PathBuf};
-
-use clap::Args;
-use skinrig_protocol::rig::RigFile;
-
+use crate::args::DoctorArgs;
 use crate::exit::{Exit, Outcome};
 use crate::hil::lease;
 use crate::rig::bench as rig_bench;
-use crate::rig::inputs::{self as rig_inputs, Input};
+use crate::rig::inputs as rig_inputs;
+use case::Case;
 use finding::{Finding, Verdict};
 use machine::Machine;
 use survey::Survey;
-
-/// Arguments of `doctor`.
-#[derive(Debug, Args)]
-pub struct DoctorArgs {
-    /// Also hold what this rig file says against what is there.
-    #[arg(long, value_name = "FILE")]
-    pub rig: Option<PathBuf>,
-
-    /// The folder where sessions will be written.
-    #[arg(long, value_name = "DIR", default_value = "sessions")]
-    pub sessions: PathBuf,
-}
-
-/// What is examined.
-struct Case<'a> {
-    machine: &'a Machine,
-    rig: Option<&'a RigFile>,
-    /// What the rig file names on this computer.
-    inputs: &'a [Input],
-    survey: &'a Survey,
-    sessions: &'a Path,
-    /// The file of the bench's lease.
-    lease: Option<&'a Path>,
-}
 
 /// `skinrig doctor`.
 ///
@@ -80,7 +54,7 @@ pub fn doctor(args: &DoctorArgs, json: bool) -> Outcome {
         lease: lease.as_deref(),
     });
     if json {
-        crate::print_json(&finding::json(rig.as_ref(), &findings));
+        crate::terminal::print_json(&finding::json(rig.as_ref(), &findings));
     } else {
         crate::terminal::out(format_args!("{}", finding::table(rig.as_ref(), &findings)));
     }

@@ -4,8 +4,8 @@ use std::path::Path;
 
 use skinrig_omega3::enumerate::USB_VENDOR;
 
-use super::Case;
 use super::access::User;
+use super::case::Case;
 use super::finding::{Finding, check};
 use super::survey::{LEFT_ALONE, name_of};
 use super::usb;

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::Case;
+use super::case::Case;
 use super::finding::{Finding, check};
 
 const AREA: &str = "power";

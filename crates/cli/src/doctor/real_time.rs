@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use skinrig_evk1::Evk1Config;
 
-use super::Case;
 use super::access::{CAP_IPC_LOCK, CAP_SYS_NICE};
+use super::case::Case;
 use super::finding::{Check, Finding, check};
 use crate::rig::gates::size;
 

@@ -4,7 +4,7 @@ use skinrig_controller::says_version;
 use skinrig_protocol::rig::RigFile;
 use skinrig_trigger_box::protocol::{FIRMWARE_VERSION, PROTOCOL_VERSION};
 
-use super::Case;
+use super::case::Case;
 use super::finding::{Check, Finding, check};
 use super::survey::Library;
 use crate::devices::Line;
@@ -64,7 +64,7 @@ fn robot(case: &Case<'_>) -> Finding {
     let old = told
         .and_then(|v| v.parse().ok())
         .is_some_and(|v: f64| v < WATCHDOG_SINCE);
-    if old && finding.verdict == super::Verdict::Ok {
+    if old && finding.verdict == super::finding::Verdict::Ok {
         finding = check(AREA, "robot", format!("{WATCHDOG_SINCE:.1} or later, which has a watchdog")).warning(
             finding.found,
             "ask Force Dimension for an update: without the watchdog nothing in the device brakes the arm when this computer dies",

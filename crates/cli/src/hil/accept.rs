@@ -5,8 +5,8 @@ use skinrig_hil::history::{self, Filter};
 use skinrig_nightly::trend::Acceptance;
 
 use super::args::HilAcceptArgs;
-use crate::control::user_name;
 use crate::exit::{Exit, Failure, Outcome};
+use crate::host::user_name;
 
 /// `skinrig hil accept`.
 ///
@@ -30,7 +30,7 @@ pub fn accept(args: &HilAcceptArgs, json: bool) -> Outcome {
     };
     history::accept(&args.history, &history, &said).map_err(Failure::input)?;
     if json {
-        crate::print_json(&serde_json::to_value(&said).map_err(Failure::internal)?);
+        crate::terminal::print_json(&serde_json::to_value(&said).map_err(Failure::internal)?);
     } else {
         outln!(
             "{}: learnt anew from night {} on",

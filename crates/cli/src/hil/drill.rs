@@ -11,8 +11,8 @@ use skinrig_model::{Point3, Robot};
 use skinrig_nightly::{Evidence, EvidenceKind};
 use skinrig_omega3::Omega;
 
-use super::bench::RealBench;
 use super::hold::HOLDING;
+use super::real_bench::RealBench;
 use super::trouble;
 use crate::rig::bench;
 

@@ -10,8 +10,8 @@ use skinrig_model::RunEnd;
 use skinrig_nightly::{Evidence, EvidenceKind, Golden};
 use skinrig_protocol::{Plan, Protocol};
 
-use super::bench::RealBench;
 use super::golden_numbers::numbers;
+use super::real_bench::RealBench;
 use crate::exit::Failure;
 use crate::results::{self, Choices};
 use crate::rig::{bench, gates};

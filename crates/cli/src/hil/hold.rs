@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use skinrig_device::RealClock;
 
 use super::args::HoldArmArgs;
-use super::bench::patience;
+use super::real_bench::patience;
 use crate::exit::{Exit, Failure, Outcome};
 use crate::rig::bench;
 

@@ -8,8 +8,8 @@ use skinrig_protocol::rig::{RigFile, RigKind};
 
 use super::args::HilLeaseArgs;
 use crate::exit::{Exit, Failure, Outcome};
+use crate::host::host_name;
 use crate::rig::bench;
-use crate::run::host_name;
 
 /// Takes the bench of `rig`, to do `what` on it. Hold on to it until every device is closed.
 ///
@@ -70,7 +70,7 @@ pub fn lease(args: &HilLeaseArgs, json: bool) -> Outcome {
         }
     }
     if json {
-        crate::print_json(&serde_json::json!({ "leases": shown }));
+        crate::terminal::print_json(&serde_json::json!({ "leases": shown }));
     } else if paths.is_empty() {
         outln!("no lease was ever taken in {}", lease::folder().display());
     }

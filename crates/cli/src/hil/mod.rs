@@ -11,6 +11,7 @@ mod golden_numbers;
 pub mod hold;
 pub mod lease;
 mod live;
+mod real_bench;
 pub mod run;
 pub mod trend;
 mod trouble;

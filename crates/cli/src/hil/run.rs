@@ -16,14 +16,14 @@ use skinrig_report::night::{self, Trends, span};
 use skinrig_report::trend::sentence;
 
 use super::args::HilRunArgs;
-use super::bench::RealBench;
 use super::live::{self, Live};
+use super::real_bench::RealBench;
 use super::trend::After;
 use super::{folder, lease, trend};
 use crate::check;
 use crate::exit::{Exit, Failure, Outcome};
+use crate::host::host_name;
 use crate::rig::{bench, inputs};
-use crate::run::host_name;
 use crate::signals::Operator;
 
 /// `skinrig hil run`.
@@ -83,7 +83,7 @@ pub fn run(args: &HilRunArgs, command_line: &str, json: bool) -> Outcome {
     drop(bench);
     let trends = keep(&night, &folder, args.history.as_deref());
     if json {
-        crate::print_json(&serde_json::to_value(&night).map_err(Failure::internal)?);
+        crate::terminal::print_json(&serde_json::to_value(&night).map_err(Failure::internal)?);
     } else {
         let colour = live::colour(std::io::stdout().is_terminal());
         outln!("{}", night::tree(&night, colour).trim_end());

@@ -45,7 +45,7 @@ pub fn trend(args: &HilTrendArgs, json: bool) -> Outcome {
         value["accepted"] = serde_json::to_value(&history.accepted).map_err(Failure::internal)?;
         let sessions: Vec<_> = kept.iter().map(|k| k.session.as_ref().ok()).collect();
         value["sessions"] = serde_json::to_value(sessions).map_err(Failure::internal)?;
-        crate::print_json(&value);
+        crate::terminal::print_json(&value);
     } else {
         let links: Vec<Links> = kept.iter().map(|k| k.links(None)).collect();
         let style = Style {

@@ -19,8 +19,8 @@ use skinrig_protocol::Protocol;
 use skinrig_protocol::rig::{BoxSetup, CameraSetup, RigFile, RigKind, SyncRole};
 use skinrig_trigger_box::{SerialTriggerBox, TriggerBoxConfig};
 
-use super::evt3_camera;
 use super::tolerated::Tolerated;
+use super::{evt3_camera, requests};
 use crate::exit::Failure;
 
 /// Reads the rig file at `path`.
@@ -389,7 +389,7 @@ pub(crate) fn camera_settings(
         width,
         height,
     });
-    super::apply(&mut settings, request);
+    requests::apply(&mut settings, request);
     Ok(settings)
 }
 

@@ -5,20 +5,21 @@ pub mod evt3_camera;
 pub mod gates;
 pub mod inputs;
 pub mod planted;
+mod requests;
 pub mod tolerated;
 
 use std::path::Path;
 
 use skinrig_controller::ControlHandle;
-use skinrig_device::{CameraSettings, Clock, Rig, Roi};
+use skinrig_device::{CameraSettings, Clock, Rig};
 use skinrig_model::{HostTime, InterruptionKind, Point2, RunHeader, SimLevel};
-use skinrig_protocol::{CameraRequest, PlantedFault, Protocol};
+use skinrig_protocol::{PlantedFault, Protocol};
 use skinrig_sim::replay::{RecordedRig, replayed_rig};
 use skinrig_sim::{SimConfig, in_real_time, simulated_rig};
 
 use crate::exit::Failure;
 use crate::recording::SessionRecording;
-use crate::results::RigDocument;
+use crate::rig_document::RigDocument;
 
 /// The simulated rig for `protocol`, with those faults on purpose that meet devices; its name tells all of them.
 #[must_use]
@@ -51,22 +52,9 @@ pub fn simulated_after(
     let mut rig = simulated_rig(&config);
     planted::tell(&mut rig, faults);
     for (settings, request) in rig.camera_settings.iter_mut().zip(&protocol.cameras) {
-        apply(settings, request);
+        requests::apply(settings, request);
     }
     if real_time { in_real_time(rig) } else { rig }
-}
-
-/// The protocol's wishes on top of the rig's own settings.
-fn apply(settings: &mut CameraSettings, request: &CameraRequest) {
-    settings.biases.extend(request.biases.clone());
-    if let Some([x, y, width, height]) = request.roi {
-        settings.roi = Some(Roi {
-            x,
-            y,
-            width,
-            height,
-        });
-    }
 }
 
 /// A recorded session as a rig.

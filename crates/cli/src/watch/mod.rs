@@ -103,7 +103,7 @@ fn look(follower: &mut Follower, once: bool) -> Result<Option<Frame>, Failure> {
 fn show(frame: &Frame, json: bool, once: bool) -> Result<(), Failure> {
     if json {
         let value = serde_json::to_value(frame).map_err(Failure::internal)?;
-        crate::print_json(&value);
+        crate::terminal::print_json(&value);
         return Ok(());
     }
     let clear = if once || !std::io::stdout().is_terminal() {

@@ -10,8 +10,8 @@ use sqlx::sqlite::SqliteConnection;
 use super::cells::Value;
 use super::gather::{self, Found, Rows};
 use super::pages::Pages;
+use super::report::{self, LostBytes, SalvageReport, SalvagedTable};
 use super::shapes::{Part, Shape};
-use super::{LostBytes, SalvageReport, SalvagedTable};
 use crate::error::RecorderError;
 use crate::query::Fault;
 
@@ -55,7 +55,7 @@ impl Failed {
     /// The error for the user.
     pub fn at(self, from: &Path, to: &Path) -> RecorderError {
         match self {
-            Self::Reading(source) => super::io(from, "reading it", source),
+            Self::Reading(source) => report::io(from, "reading it", source),
             Self::Writing(fault) => fault.at(to, "writing what was salvaged"),
         }
     }

@@ -1,6 +1,6 @@
 //! The seals that further legs took off, held against the rows that they covered.
 
-use super::VerifyReport;
+use super::report::VerifyReport;
 use crate::chain::{self, Link};
 use crate::reader::SessionReader;
 

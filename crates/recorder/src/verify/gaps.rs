@@ -2,7 +2,7 @@
 
 use skinrig_model::CameraId;
 
-use super::VerifyReport;
+use super::report::VerifyReport;
 use crate::rows::ChunkMeta;
 
 /// A gap belongs to a chunk after lost bytes, begins with the last time before it or earlier, and ends with the first time after it in

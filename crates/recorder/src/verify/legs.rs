@@ -2,7 +2,7 @@
 
 use skinrig_model::{BoxReport, CameraId, HostTime};
 
-use super::VerifyReport;
+use super::report::VerifyReport;
 use crate::error::RecorderError;
 use crate::reader::SessionReader;
 use crate::rows::LegRow;

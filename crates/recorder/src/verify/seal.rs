@@ -2,13 +2,13 @@
 
 use std::path::Path;
 
-use super::VerifyReport;
+use super::report::VerifyReport;
 use crate::digest::{TableDigest, digest_tables, tree_of};
+use crate::hex::hex;
 use crate::lock::WriterLock;
 use crate::query::{each_row, int, num, sha, text};
 use crate::reader::SessionReader;
 use crate::seal::{self, Stamp};
-use crate::writer::hex;
 
 /// Checks counts, digests, tree hash and file hash. A seal whose file hash was not yet written seals nothing, but what it says of
 /// the rows must hold.

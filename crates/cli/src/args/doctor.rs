@@ -1,0 +1,17 @@
+//! Arguments of `doctor`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+/// Arguments of `doctor`.
+#[derive(Debug, Args)]
+pub struct DoctorArgs {
+    /// Also hold what this rig file says against what is there.
+    #[arg(long, value_name = "FILE")]
+    pub rig: Option<PathBuf>,
+
+    /// The folder where sessions will be written.
+    #[arg(long, value_name = "DIR", default_value = "sessions")]
+    pub sessions: PathBuf,
+}

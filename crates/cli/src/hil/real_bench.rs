@@ -1,0 +1,163 @@
+//! The bench of a rig file: its devices, opened when they are asked for.
+
+use super::trouble;
+use crate::exit::Failure;
+use crate::rig::bench;
+use crate::rig::tolerated::Tolerated;
+use crate::signals::Operator;
+use skinrig_device::{CameraSettings, EventCamera, RealClock, Rig};
+use skinrig_hil::lease::Lease;
+use skinrig_hil::{Bench, Devices, Slot, Trouble};
+use skinrig_model::{CameraId, HostDuration};
+use skinrig_nightly::{Evidence, EvidenceKind};
+use skinrig_protocol::Protocol;
+use skinrig_protocol::rig::{RigFile, RigKind};
+use std::path::PathBuf;
+
+/// A bench with drivers behind it.
+pub struct RealBench {
+    pub(super) rig: RigFile,
+    pub(super) folder: PathBuf,
+    pub(super) operator: Operator,
+    pub(super) command_line: String,
+    pub(super) clock: RealClock,
+    pub(super) devices: Option<Devices>,
+    pub(super) tolerated: Tolerated,
+    pub(super) firmware: Vec<(String, String)>,
+    // Last, so that it is released when every device is closed.
+    pub(super) lease: Option<Lease>,
+}
+
+impl RealBench {
+    /// The bench of `rig`, with nothing opened yet. What it records goes into `folder`.
+    #[must_use]
+    pub fn new(rig: RigFile, folder: PathBuf, operator: Operator, command_line: &str) -> Self {
+        Self {
+            rig,
+            folder,
+            operator,
+            command_line: command_line.to_owned(),
+            clock: RealClock::start(),
+            devices: None,
+            tolerated: Tolerated::default(),
+            firmware: Vec::new(),
+            lease: None,
+        }
+    }
+
+    /// The same, which is ours as long as this lease is.
+    #[must_use]
+    pub fn holding(self, lease: Lease) -> Self {
+        Self {
+            lease: Some(lease),
+            ..self
+        }
+    }
+
+    /// Whoever sits at this terminal.
+    #[must_use]
+    pub const fn operator(&self) -> &Operator {
+        &self.operator
+    }
+
+    /// The arguments as one line.
+    #[must_use]
+    pub fn command_line(&self) -> &str {
+        &self.command_line
+    }
+
+    /// Prints the lines of the rig file that accept what was let pass.
+    pub fn propose(&self) {
+        self.tolerated.propose(&self.rig);
+    }
+
+    /// Opens every device and puts them together as the rig of a run of `protocol`, with a clock that begins with it. Nothing is
+    /// left with the bench.
+    ///
+    /// # Errors
+    /// Why the first of them could not be opened.
+    pub fn take_rig(&mut self, protocol: &Protocol) -> Result<Rig, Trouble> {
+        self.close();
+        self.clock = RealClock::start();
+        let mut settings = Vec::new();
+        for (setup, request) in self.rig.cameras.iter().zip(&protocol.cameras) {
+            let one = bench::camera_settings(setup, request);
+            settings.push(one.map_err(|f| software("computer", &f))?);
+        }
+        let settings: [CameraSettings; 2] = settings
+            .try_into()
+            .map_err(|_| software("computer", &Failure::internal("two cameras")))?;
+        self.devices();
+        let Some(devices) = self.devices.take() else {
+            return Err(software("computer", &Failure::internal("no devices")));
+        };
+        let [one, two] = devices.cameras;
+        bench::assemble(
+            (&self.rig, protocol),
+            settings,
+            devices.robot?,
+            [one?, two?],
+            devices.trigger_box.transpose()?,
+            self.clock,
+        )
+        .map_err(|f| software("computer", &f))
+    }
+
+    pub(super) fn note_firmware(&mut self, device: &str, version: &str) {
+        if !self.firmware.iter().any(|(d, _)| d == device) {
+            self.firmware.push((device.to_owned(), version.to_owned()));
+        }
+    }
+
+    /// `held` cameras of this bench are open already: busy for everybody else.
+    pub(super) fn open_camera(&mut self, camera: CameraId, held: usize) -> Slot<dyn EventCamera> {
+        let setup = &self.rig.cameras[camera.index()];
+        let subject = subject(camera);
+        if setup.model == "evk1" {
+            let opened = bench::evk1(setup, camera, self.clock);
+            return match opened {
+                Ok(evk1) => {
+                    self.tolerated.add(camera, evk1.tolerated());
+                    bench::detached_camera(Box::new(evk1), self.rig.kind, self.clock)
+                        .map_err(|e| skinrig_hil::trouble::of(&e))
+                }
+                Err(e) => Err(trouble::camera(&e, subject, held)),
+            };
+        }
+        let (kind, clock) = (self.rig.kind, self.clock);
+        bench::open_camera(setup, kind, camera, clock, &mut self.tolerated).map_err(|failure| {
+            let what = failure.message;
+            Box::new(Evidence::new(EvidenceKind::Absent, subject, what))
+        })
+    }
+}
+
+/// How late stand-ins may be that share this computer's processors.
+pub fn patience(kind: RigKind) -> HostDuration {
+    match kind {
+        RigKind::Emulated => bench::SLOW_LATE,
+        RigKind::Bench => HostDuration::ZERO,
+    }
+}
+
+/// What a camera is called in results.
+pub(super) fn subject(camera: CameraId) -> &'static str {
+    match camera {
+        CameraId::One => "camera1",
+        CameraId::Two => "camera2",
+    }
+}
+
+/// A slot of which nobody has asked yet.
+pub(super) fn closed(subject: &str) -> Trouble {
+    Box::new(Evidence::new(EvidenceKind::State, subject, "not opened"))
+}
+
+/// What is wrong with this program.
+pub(super) fn software(subject: &str, failure: &Failure) -> Trouble {
+    Box::new(Evidence::new(
+        EvidenceKind::Software,
+        subject,
+        &*failure.message,
+    ))
+}
