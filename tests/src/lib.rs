@@ -3,7 +3,7 @@
 use std::error::Error;
 use std::path::Path;
 
-use skinrig::results::RigDocument;
+use skinrig::rig_document::RigDocument;
 use skinrig_controller::{ControlHandle, RecordSink, RunReport, SinkFault, execute};
 use skinrig_device::Rig;
 use skinrig_model::{CameraId, Record, RunHeader};

@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
-use skinrig::results::RigDocument;
+use skinrig::rig_document::RigDocument;
 use skinrig_device::contract::{self, IndenterContract};
 use skinrig_device::{
     Clock, DeviceError, EventCamera, Indenter, IndenterCapabilities, MotionLimits, Rig, RobotSample,

@@ -15,6 +15,7 @@ use crate::error::AnalysisError;
 use crate::estimators::{PressEstimator, Sighting, Thinning};
 use crate::grid::PixelGrid;
 use crate::held::Held;
+use crate::input::EventSource;
 use crate::keeper::{KeepPlan, Keeper};
 use crate::kept::KeptEvent;
 use crate::rates::RateHistogram;
@@ -531,5 +532,17 @@ fn first_from(events: &[CdEvent], time_us: u64) -> usize {
 pub fn rate_bin_us(settings: &AnalysisSettings) -> u64 {
     (settings.rate_bin_ms * 1e3).round().max(1.0) as u64
 }
+/// Everything that a camera's events say, in one pass over them.
+pub(crate) fn pass(
+    source: &dyn EventSource,
+    camera: CameraId,
+    mut accumulator: Accumulator<'_>,
+) -> Result<Accumulated, AnalysisError> {
+    source
+        .for_each_slice(camera, &mut |events| accumulator.take(events))
+        .map_err(|message| AnalysisError::Events { camera, message })?;
+    accumulator.finish()
+}
+
 #[cfg(test)]
 mod tests;

@@ -1,8 +1,8 @@
 //! The analysis as a whole: from a session's values and events to one [`Analysis`].
 
-use skinrig_model::{CameraId, PressTiming};
+use skinrig_model::CameraId;
 
-use crate::accumulate::{Accumulated, Accumulator, SLACK_US, Wanted};
+use crate::accumulate::{Accumulated, Accumulator, SLACK_US, Wanted, pass};
 use crate::audit::Streams;
 use crate::calibrate::Calibrated;
 use crate::closeups::{Closeups, keep_plans, zoom_plans};
@@ -13,17 +13,18 @@ use crate::keeper::KeepPlan;
 use crate::kept::{Keep, Kept, KeptPress};
 use crate::metrics::{Exclusions, metrics, penalised};
 use crate::onsets::{Onset, onsets};
+use crate::press_spans::{spans, timings};
 use crate::rates::RateHistogram;
-use crate::reading::{Reading, Readings, spans};
+use crate::reading::{Reading, Readings};
 use crate::result::{
     ANALYSIS_VERSION, Activity, Alignment, AlignmentStatus, Analysis, ClockFit, ClockMap,
     ContactTiming, DepthResult, MapName, OffSensor, PressPicture, PressResult, PressView,
     RateSeries, RateZoom, RatesEvidence,
 };
 use crate::segment::{Window, windows};
+use crate::session_base::time_base;
 use crate::sets::ScoreSet;
 use crate::stream::{Silences, contacts_s};
-use crate::timebase::{Ties, TimeBase};
 use crate::untimed::Untimed;
 use crate::{audit, bit_rates, caveats, check, cmre, coverage, latency, legs, reduction, verdict};
 
@@ -191,23 +192,6 @@ pub fn analyze_and_keep(
     Ok((analysis, kept))
 }
 
-/// The time base, when the trigger box told of its clock.
-pub(crate) fn time_base(input: &SessionInput) -> Option<TimeBase> {
-    let used_at_us: Vec<f64> = spans(input)
-        .iter()
-        .flat_map(|s| [s.contact_us, s.release_us])
-        .collect();
-    let ties = Ties {
-        reports: &input.box_reports,
-        edges: [&input.edges[0], &input.edges[1]],
-        channel: input.rig.trigger_channel?,
-        recorded: [&input.recorded[0], &input.recorded[1]],
-        legs: &input.legs,
-        used_at_us: &used_at_us,
-    };
-    TimeBase::new(&ties, &input.settings.alignment)
-}
-
 /// What can be said of the alignment without reports of a trigger box.
 fn uncertified(clocks: [Option<ClockFit>; 2]) -> Alignment {
     let names = [MapName::Camera1FromHost, MapName::Camera2FromHost];
@@ -325,11 +309,6 @@ fn paired(presses: &[PressResult], plan: &Closeups, [one, two]: [Vec<KeepPlan>; 
         left_out: (plan.kept.len() - presses.len()) as u32,
         presses,
     }
-}
-
-pub(crate) fn timings(input: &SessionInput) -> impl Iterator<Item = (usize, PressTiming)> {
-    let rows = input.outcomes.iter().enumerate();
-    rows.filter_map(|(row, o)| Some((row, o.as_ref()?.timing?)))
 }
 
 fn camera_pass(
@@ -485,17 +464,6 @@ fn stream(
         Vec::new()
     };
     (silences, contacts_s)
-}
-
-pub(crate) fn pass(
-    source: &dyn EventSource,
-    camera: CameraId,
-    mut accumulator: Accumulator<'_>,
-) -> Result<Accumulated, AnalysisError> {
-    source
-        .for_each_slice(camera, &mut |events| accumulator.take(events))
-        .map_err(|message| AnalysisError::Events { camera, message })?;
-    accumulator.finish()
 }
 
 pub(crate) fn by_row(rows: usize, views: Vec<(usize, PressView)>) -> Vec<Option<PressView>> {

@@ -5,7 +5,7 @@ use skinrig_model::{
     RigGeometry, SentMark, TriggerEdge,
 };
 
-use crate::legs::LegStart;
+use crate::leg::LegStart;
 
 /// An attempt at a press that was made again: it counts nowhere, but it pressed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -4,82 +4,16 @@
 //! leg's clock is fitted on its own, its times are moved by whole µs so that one line through camera over host time holds for all.
 //! From there on a session in legs is as any other.
 
-use skinrig_model::{CameraId, HostTime, TriggerEdge};
+use skinrig_model::{CameraId, HostTime};
 
 use crate::clock::fit_marks;
 use crate::input::SessionInput;
-use crate::result::{ClockFit, LegClock};
+use crate::leg::{LegLine, LegStart, edges_of, leg_at};
+use crate::result::LegClock;
 use crate::timebase::TimeBase;
-
-/// Where a further leg of the session begins.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct LegStart {
-    /// On the host's clock; all times of the leg are at or after it, all earlier ones before.
-    pub origin: HostTime,
-    /// Where the recorder put each camera's zero of the leg, µs.
-    pub recorded_us: [u64; 2],
-    /// On each camera's clock: all events of the leg are at or after it, all earlier ones before, µs.
-    pub camera_us: [u64; 2],
-    /// By how much [`align`] moved each camera's times of the leg, µs; 0 before it.
-    pub moved_us: [i64; 2],
-}
-
-impl LegStart {
-    /// A leg as it was recorded.
-    #[must_use]
-    pub const fn recorded(origin: HostTime, recorded_us: [u64; 2]) -> Self {
-        Self {
-            origin,
-            recorded_us,
-            camera_us: recorded_us,
-            moved_us: [0; 2],
-        }
-    }
-}
 
 /// A leg's events may come this long before its host time, µs: half of the least pause between two legs.
 const BEFORE_US: f64 = 0.5e6;
-
-/// A leg's line, and a host time in the middle of what it was fitted to, µs.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct LegLine {
-    pub fit: ClockFit,
-    pub middle_us: f64,
-}
-
-/// The edges of one leg, 0 for the first, out of all edges of a camera in stream order.
-pub(crate) fn edges_of<'a>(
-    edges: &'a [TriggerEdge],
-    legs: &[LegStart],
-    leg: usize,
-    camera: usize,
-) -> &'a [TriggerEdge] {
-    let from = leg.checked_sub(1).map_or(0, |i| legs[i].camera_us[camera]);
-    let to = legs
-        .get(leg)
-        .map_or(u64::MAX, |next| next.camera_us[camera]);
-    // In order but for a broken time base, whose edges are nowhere anyway.
-    let start = edges.partition_point(|e| e.t_us < from);
-    let end = edges.partition_point(|e| e.t_us < to).max(start);
-    &edges[start..end]
-}
-
-/// When a camera was recording in one leg, 0 for the first, on its own clock, µs.
-pub(crate) fn recorded_of(
-    recorded: &[(u64, u64)],
-    legs: &[LegStart],
-    leg: usize,
-    camera: usize,
-) -> Vec<(u64, u64)> {
-    let of = |t_us: u64| legs.partition_point(|next| next.camera_us[camera] <= t_us);
-    let spans = recorded.iter().copied();
-    spans.filter(|(from, _)| of(*from) == leg).collect()
-}
-
-/// The leg that a host time belongs to, 0 for the first.
-pub(crate) fn leg_at(legs: &[LegStart], t: HostTime) -> usize {
-    legs.partition_point(|leg| leg.origin <= t)
-}
 
 /// Moves the camera times of all further legs, those of edges and of gaps, onto the line of the first, and says in
 /// [`SessionInput::legs`] by how much: whoever hands over the events moves them too. A session in one leg stays as it is.
@@ -87,7 +21,7 @@ pub fn align(input: &mut SessionInput) {
     if input.legs.is_empty() {
         return;
     }
-    let base = crate::analyze::time_base(input);
+    let base = crate::session_base::time_base(input);
     for k in 0..2 {
         let lines: Vec<Option<LegLine>> = (0..=input.legs.len())
             .map(|leg| {

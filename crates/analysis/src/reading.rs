@@ -1,13 +1,13 @@
 //! Owns the first reading of the cameras: their clocks, from the time base, from marks, or from the presses in the event rates.
 
-use skinrig_model::{CameraId, PressRole};
+use skinrig_model::CameraId;
 
-use crate::accumulate::{Accumulator, Wanted, rate_bin_us};
-use crate::analyze::{pass, timings};
-use crate::clock::{PressSpan, align_by_rates, fit_marks};
+use crate::accumulate::{Accumulator, Wanted, pass, rate_bin_us};
+use crate::clock::{align_by_rates, fit_marks};
 use crate::error::AnalysisError;
 use crate::held::Held;
 use crate::input::{EventSource, SessionInput};
+use crate::press_spans::spans;
 use crate::rates::RateHistogram;
 use crate::result::{Activity, ClockFit, OffSensor, RatesEvidence, RatesSights};
 use crate::timebase::{Tie, TimeBase};
@@ -166,19 +166,6 @@ impl Reading {
             ..reading
         })
     }
-}
-
-/// The presses that were made, in time order.
-pub fn spans(input: &SessionInput) -> Vec<PressSpan> {
-    let mut spans: Vec<PressSpan> = timings(input)
-        .map(|(row, t)| PressSpan {
-            contact_us: t.contact.0 as f64 * 1e-3,
-            release_us: t.release.0 as f64 * 1e-3,
-            sync: input.planned[row].role == PressRole::Sync,
-        })
-        .collect();
-    spans.sort_by(|a, b| a.contact_us.total_cmp(&b.contact_us));
-    spans
 }
 
 /// Why the plan is not what a camera recorded.

@@ -4,9 +4,10 @@ use std::fmt;
 
 use skinrig_model::CameraId;
 
-use crate::analyze::{time_base, timings};
 use crate::clock::{MarksFit, fit_marks};
 use crate::input::SessionInput;
+use crate::press_spans::timings;
+use crate::session_base::time_base;
 use crate::timebase::{Tie, TimeBase, distance_us};
 
 /// A press that a clock does not reach.

@@ -29,7 +29,7 @@ pub mod remote;
 pub mod results;
 pub mod resume;
 pub mod rig;
-mod rig_document;
+pub mod rig_document;
 pub mod run;
 pub mod salvage;
 pub mod sample_size;

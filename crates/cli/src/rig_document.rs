@@ -44,3 +44,35 @@ impl TryFrom<RecordedRig> for RigDocument {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_older_recording_names_the_presses_that_it_leaves_out_by_index() {
+        let settings = AnalysisSettings {
+            exclude_press_numbers: vec![PressId::from_index(4)],
+            ..AnalysisSettings::default()
+        };
+        let rig = RigGeometry {
+            outline: skinrig_model::SkinOutline::PAPER,
+            nominal: skinrig_model::StereoGeometry::PAPER,
+            trigger_channel: None,
+            trigger_delay_us: [0; 2],
+        };
+        let document = RigDocument {
+            geometry: rig,
+            analysis: settings.clone(),
+            rig: serde_json::Value::Null,
+        };
+        let text = serde_json::to_string(&document).unwrap();
+        let today = "\"exclude_press_numbers\":[5]";
+        assert!(text.contains(today), "{text}");
+        let old = text.replace(today, "\"exclude_presses\":[4]");
+        for text in [text, old] {
+            let read: RigDocument = serde_json::from_str(&text).unwrap();
+            assert_eq!(read.analysis, settings);
+        }
+    }
+}

@@ -16,12 +16,13 @@ use crate::error::{ControllerError, Halt};
 use crate::guard::GuardedIndenter;
 use crate::invalid_run::InvalidRun;
 use crate::journal::Journal;
+use crate::machine::Machine;
 use crate::moments::{PressTracker, Settling};
 use crate::press_fault::PressFault;
 use crate::run::{Resume, RunReport};
 use crate::settings::ControllerSettings;
 use crate::sink::RecordSink;
-use crate::states::{Event, Machine, State};
+use crate::states::{Event, State};
 use crate::suspend::Suspender;
 use crate::touch::TouchDetector;
 

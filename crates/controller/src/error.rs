@@ -1,8 +1,9 @@
 //! What can end a run before its plan does.
 
 use skinrig_device::DeviceError;
-use skinrig_model::{HostDuration, Point3, PreflightCheck, Skin};
+use skinrig_model::{HostDuration, PreflightCheck};
 
+use crate::not_arrived::NotArrived;
 use crate::press_fault::PressFault;
 use crate::sink::SinkFault;
 use crate::watchdog::Trip;
@@ -103,22 +104,6 @@ pub enum GuardError {
     /// The robot is not armed.
     #[error("expected an armed robot, found it disarmed")]
     NotArmed,
-}
-
-/// A motion did not end where it should: the tip had not settled at its target in time.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("{what}: expected to settle within {tolerance_mm} mm of {} in {allowed}, found {}", point(.target), .found.as_ref().map_or_else(|| "no pose".to_owned(), point))]
-pub struct NotArrived {
-    /// Which motion.
-    pub what: String,
-    /// mm.
-    pub tolerance_mm: f64,
-    /// Where to.
-    pub target: Point3<Skin>,
-    /// How long it was given.
-    pub allowed: HostDuration,
-    /// Where the tip was then.
-    pub found: Option<Point3<Skin>>,
 }
 
 /// A run cannot start or go on. Every one of these ends the run safely.
@@ -283,11 +268,6 @@ fn words(failed: &[PreflightCheck]) -> Vec<String> {
 fn joined(parts: &[impl std::fmt::Display]) -> String {
     let parts: Vec<String> = parts.iter().map(ToString::to_string).collect();
     parts.join("; ")
-}
-
-/// `(x, y, z) mm` to the micrometre.
-pub(crate) fn point(p: &Point3<Skin>) -> String {
-    format!("({:.3}, {:.3}, {:.3}) mm", p.x_mm, p.y_mm, p.z_mm)
 }
 
 /// Why the steps of a plan ended early.

@@ -11,9 +11,10 @@ use skinrig_protocol::TouchSearch;
 use skinrig_protocol::plan::RunLimits;
 
 use crate::control::ControlHandle;
-use crate::error::{ControllerError, GuardError, NotArrived};
+use crate::error::{ControllerError, GuardError};
 use crate::guard::{Floor, GuardedIndenter};
 use crate::moments::Settling;
+use crate::not_arrived::NotArrived;
 use crate::settings::ControllerSettings;
 use crate::touch::TouchDetector;
 

@@ -40,7 +40,9 @@ pub mod guard;
 mod invalid_run;
 pub mod jog;
 mod journal;
+mod machine;
 pub mod moments;
+mod not_arrived;
 mod preflight;
 mod press;
 pub mod press_fault;
@@ -58,9 +60,10 @@ pub mod watchdog;
 
 pub use checks::{ExpectedDevice, Loopback, Preflight, differing, identity_checks, says_version};
 pub use control::{ControlHandle, NotesFull};
-pub use error::{ControllerError, GuardError, NotArrived, NotAtRest, Problem};
+pub use error::{ControllerError, GuardError, NotAtRest, Problem};
 pub use guard::{Floor, GuardedIndenter};
 pub use jog::{Jog, Moved, Touched};
+pub use not_arrived::NotArrived;
 pub use press_fault::{MomentFault, PressFault, TouchFault};
 pub use progress::{Progress, ProgressTracker};
 pub use run::{

@@ -141,7 +141,7 @@ pub(crate) fn check_plan(
                     return Err(plan_error(
                         name,
                         "a travel to above the press before it",
-                        above.map_or_else(|| "none".to_owned(), |a| crate::error::point(&a)),
+                        above.map_or_else(|| "none".to_owned(), |a| crate::not_arrived::point(&a)),
                     ));
                 }
                 above = Some(press.at.at_height(limits.clearance_mm));

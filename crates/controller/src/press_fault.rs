@@ -4,7 +4,7 @@ use std::fmt;
 
 use skinrig_model::{CameraId, HostDuration, HostTime, Point3, PressFaultKind, PressVerdict, Skin};
 
-use crate::error::{NotArrived, point};
+use crate::not_arrived::{NotArrived, point};
 
 /// Reason of a press that the operator's `pause_now` broke off.
 const PAUSED: &str = "paused by the operator";

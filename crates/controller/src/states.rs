@@ -2,8 +2,6 @@
 //!
 //! `docs/run-states.md` shows the same table; a test writes it out and compares.
 
-use crate::control::ControlHandle;
-
 /// Where a run is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum State {
@@ -330,34 +328,6 @@ pub fn markdown() -> String {
         out.push('\n');
     }
     out
-}
-
-/// A run's present state.
-#[derive(Debug)]
-pub(crate) struct Machine {
-    state: State,
-    /// Where the present state can be seen from other threads.
-    shown: ControlHandle,
-}
-
-impl Machine {
-    pub(crate) fn new(shown: ControlHandle) -> Self {
-        let state = State::Planned;
-        shown.show(state);
-        Self { state, shown }
-    }
-
-    pub(crate) const fn state(&self) -> State {
-        self.state
-    }
-
-    /// Goes to the next state and says what to do.
-    pub(crate) fn fire(&mut self, event: Event) -> Action {
-        let (next, action) = transition(self.state, event);
-        self.state = next;
-        self.shown.show(next);
-        action
-    }
 }
 
 #[cfg(test)]

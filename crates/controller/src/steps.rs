@@ -4,8 +4,9 @@ use skinrig_model::{HostDuration, HostTime, Point3, Skin};
 use skinrig_protocol::plan::Step;
 
 use crate::core::Core;
-use crate::error::{ControllerError, GuardError, Halt, NotArrived};
+use crate::error::{ControllerError, GuardError, Halt};
 use crate::moments::Settling;
+use crate::not_arrived::NotArrived;
 use crate::press_fault::PressFault;
 use crate::states::{Action, Event, State};
 

@@ -4,8 +4,9 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json as object};
 use skinrig_analysis::result::{Estimate, PressCounts};
 
+use crate::comparison;
+use crate::input::ReportInput;
 use crate::provenance::Variant;
-use crate::{ReportInput, comparison};
 
 /// Value of the document's `format` field.
 pub const JSON_FORMAT: &str = "skinrig-report";

@@ -6,7 +6,7 @@ use minijinja::{AutoEscape, Environment, Value, context};
 use sha2::{Digest, Sha256};
 use skinrig_model::text::visible;
 
-use crate::ReportError;
+use crate::error::ReportError;
 
 /// The frame that each page's template extends, and the macros that it may import.
 const TEMPLATES: [(&str, &str); 2] = [

@@ -10,6 +10,7 @@
 //! Hooks for browser tests: every section, figure, button and the press table carries a `data-testid`.
 
 pub mod axes;
+mod choices;
 pub mod colour;
 pub mod compare;
 pub mod comparison;
@@ -26,40 +27,19 @@ pub mod trend;
 
 mod detector;
 mod document;
+mod error;
 mod format;
 mod frame;
+mod input;
 mod tables;
 mod terminal;
 
 pub use document::{JSON_FORMAT, JSON_VERSION, Summary};
+pub use error::ReportError;
+pub use input::ReportInput;
 pub use provenance::{
     DeviceRow, InterruptionRow, LegRow, LossRow, NoteRow, Provenance, RetakenRow, Variant,
 };
-
-use skinrig_analysis::result::Analysis;
-use skinrig_analysis::tradeoff::Tradeoff;
-
-/// What a report is made from.
-#[derive(Debug, Clone)]
-pub struct ReportInput<'a> {
-    /// The numbers.
-    pub analysis: &'a Analysis,
-    /// Where they come from.
-    pub provenance: Provenance,
-    /// What speed costs in accuracy, when that was measured on this session: the result, or why it cannot be read.
-    pub tradeoff: Option<Result<&'a Tradeoff, &'a str>>,
-}
-
-/// Why a report could not be written.
-#[derive(Debug, thiserror::Error)]
-pub enum ReportError {
-    /// The page template failed; a defect of this crate.
-    #[error("expected the report template to render, found: {0}; please report this as a defect")]
-    Template(#[from] minijinja::Error),
-    /// The script data could not be written as JSON; a defect of this crate.
-    #[error("expected report data that JSON can hold, found: {0}; please report this as a defect")]
-    Json(#[from] serde_json::Error),
-}
 
 /// The whole report as one HTML page that needs no network and no other file.
 ///

@@ -6,10 +6,11 @@ use minijinja::value::Serde;
 use minijinja::{Value, context};
 use serde::Serialize;
 use skinrig_analysis::result::Estimate;
-use skinrig_analysis::tradeoff::{Choice, Cost, Region, Row, Tradeoff};
-use skinrig_model::{CentroidRule, Estimator, Precision};
+use skinrig_analysis::tradeoff::{Cost, Row, Tradeoff};
 
-use crate::ReportError;
+pub use crate::choices::label;
+use crate::choices::short;
+use crate::error::ReportError;
 use crate::figures::tradeoff as figure;
 use crate::format::{interval, number};
 use crate::frame::Frame;
@@ -21,37 +22,6 @@ const CSS: &str = include_str!("../assets/tradeoff/page.css");
 /// More rows than this are not all printed: what is on a front is, and the rest is in the files.
 const MOST_ROWS: usize = 120;
 const LABEL: usize = 31;
-
-/// A choice in a few words: estimator, then what is not at its plainest.
-#[must_use]
-pub fn label(choice: &Choice) -> String {
-    let mut out = match (choice.estimator, choice.centroid) {
-        (Estimator::Dbscan, CentroidRule::LargestCluster) => "dbscan",
-        (Estimator::Dbscan, CentroidRule::AllClusters) => "dbscan all",
-        (Estimator::ColumnMedian, _) => "median",
-        (Estimator::HistogramPeak, _) => "peak",
-        (Estimator::Streaming, _) => "streaming",
-    }
-    .to_owned();
-    if choice.precision == Precision::F32 {
-        out += " f32";
-    }
-    if let Some(ms) = choice.window_ms {
-        let _ = write!(out, ", {ms} ms");
-    }
-    if choice.thinning > 1 {
-        let _ = write!(out, ", 1/{}", choice.thinning);
-    }
-    if choice.bin_px > 1 {
-        let _ = write!(out, ", bin {}", choice.bin_px);
-    }
-    match choice.region {
-        Region::Full => {}
-        Region::Half => out += ", half rows",
-        Region::Quarter => out += ", quarter rows",
-    }
-    out
-}
 
 /// The fronts of a row as letters: c for CPU time, b for bytes, d for delay.
 fn fronts(row: &Row) -> String {
@@ -70,18 +40,6 @@ fn fronts(row: &Row) -> String {
 
 fn percent(e: &Estimate) -> String {
     number(e.value.map(|v| 100.0 * v), 1)
-}
-
-/// Three digits, or whole from 100 on.
-pub(crate) fn short(value: f64) -> String {
-    let digits = if value >= 100.0 {
-        0
-    } else if value >= 10.0 {
-        1
-    } else {
-        2
-    };
-    number(Some(value), digits)
 }
 
 /// The rows in the order in which they are read: the session's own, then by RMSE those on a front, then the others.

@@ -35,9 +35,6 @@ const BIASES: [(&str, i64, i64, i64); 6] = [
 /// Trigger inputs of an EVK1 (evk1.md section 2.12).
 const CHANNELS: [u8; 3] = [0, 6, 7];
 
-/// The channel that the trigger box is wired to.
-pub const TRIGGER_CHANNEL: u8 = 0;
-
 /// Temperature of a simulated camera that no fault heats, °C.
 pub const TEMPERATURE_C: f64 = 35.0;
 

@@ -8,10 +8,10 @@ use skinrig_model::{
     CameraId, CdEvent, HostTime, Polarity, RawChunk, SENSOR_HEIGHT, SENSOR_WIDTH, TriggerEdge,
 };
 
-use crate::camera::TRIGGER_CHANNEL;
 use crate::drifting::DriftingClock;
 use crate::faults::{STORM_PER_MS, STORM_PIXELS};
 use crate::line::LineEdge;
+use crate::line::TRIGGER_CHANNEL;
 use crate::scene::{GRID_NS, PixelEvent, PixelModel, TipSample};
 
 /// What exists only while streaming.

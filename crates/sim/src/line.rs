@@ -10,6 +10,9 @@ use crate::drifting::DriftingClock;
 use crate::faults::{DELAY_NS, Fault, MarkFate};
 use crate::random::{Purpose, Stream};
 
+/// The channel that the trigger box is wired to.
+pub const TRIGGER_CHANNEL: u8 = 0;
+
 /// An edge on a camera's trigger input, on world time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LineEdge {

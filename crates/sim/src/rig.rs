@@ -3,13 +3,14 @@
 use skinrig_device::{CameraSettings, EventCamera, Rig, TriggerBox};
 use skinrig_model::{CameraId, LensKind, RigGeometry, SimLevel, StereoGeometry};
 
-use crate::camera::{PixelFactory, SimCamera, TRIGGER_CHANNEL};
+use crate::camera::{PixelFactory, SimCamera};
 use crate::clock::{Boxed, Paced};
 use crate::config::SimConfig;
 use crate::faults::Fault;
 use crate::geometric::GeometricModel;
 use crate::held_up::HeldUp;
 use crate::indenter::SimIndenter;
+use crate::line::TRIGGER_CHANNEL;
 use crate::optical::OpticalModel;
 use crate::scene::{PixelModel, SceneConfig};
 use crate::trigger::SimTriggerBox;

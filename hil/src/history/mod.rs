@@ -4,9 +4,11 @@
 
 mod error;
 mod file;
+mod line;
 mod read;
 mod write;
 
+pub use self::line::Line;
 use std::path::{Path, PathBuf};
 
 use skinrig_nightly::Night;
@@ -25,17 +27,6 @@ pub enum Appended {
     New,
     /// It was in there already.
     Known,
-}
-
-/// A bench and a suite of which the history has nights.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Line {
-    /// Name of the bench.
-    pub rig: String,
-    /// Name of the suite.
-    pub suite: String,
-    /// So many nights.
-    pub nights: usize,
 }
 
 /// Which nights to read. What is not named is that of the newest night.

@@ -8,8 +8,8 @@ use skinrig_nightly::{Verdict, Versions};
 use sqlx::Row;
 use sqlx::sqlite::{SqliteConnection, SqliteRow};
 
-use super::Line;
 use super::error::Fault;
+use super::line::Line;
 
 /// The benches and suites that the history knows, the one with the newest night first.
 pub(super) async fn lines(conn: &mut SqliteConnection) -> Result<Vec<Line>, Fault> {

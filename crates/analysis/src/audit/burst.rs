@@ -3,7 +3,7 @@
 use skinrig_model::{CameraId, PressId};
 
 use super::drift::has_bursts;
-use super::finding;
+use super::finding::finding;
 use super::statistics::median;
 use super::touch::Touch;
 use crate::result::{Analysis, Fault, Finding, Law};

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use skinrig_model::{Point2, PressRole};
 
-use super::finding;
+use super::finding::finding;
 use super::frames::Frame;
 use super::statistics::median;
 use super::touch::Touch;

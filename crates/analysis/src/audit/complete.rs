@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use skinrig_model::{CameraId, PressRole, PressVerdict};
 
-use super::finding;
+use super::finding::finding;
 use super::touch::is_number;
 use crate::input::SessionInput;
 use crate::result::{Analysis, ClockMethod, Fault, Finding, Law};

@@ -2,7 +2,7 @@
 
 use skinrig_model::{CameraId, HostTime};
 
-use super::finding;
+use super::finding::finding;
 use crate::input::SessionInput;
 use crate::result::{Analysis, Fault, Finding, Law};
 use crate::stream::Silences;

@@ -2,7 +2,7 @@
 
 use skinrig_model::CameraId;
 
-use super::finding;
+use super::finding::finding;
 use super::statistics::median;
 use crate::input::SessionInput;
 use crate::result::{Analysis, Fault, Finding, Law, RateSeries};

@@ -6,7 +6,7 @@
 
 use skinrig_model::{CameraId, Point2};
 
-use super::finding;
+use super::finding::finding;
 use super::readings::{Judged, Path, Reading};
 use super::resection::{residuals, spread_deg};
 use super::segments::shifted_rest;

@@ -2,7 +2,7 @@
 
 use skinrig_model::PressVerdict;
 
-use super::finding;
+use super::finding::finding;
 use super::statistics::median;
 use crate::input::SessionInput;
 use crate::onsets::Onset;

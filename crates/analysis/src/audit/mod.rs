@@ -9,6 +9,7 @@ mod commanded;
 mod complete;
 mod covered;
 mod drift;
+mod finding;
 mod follow;
 mod frames;
 mod height;
@@ -24,9 +25,8 @@ mod worth;
 
 use crate::input::SessionInput;
 use crate::onsets::Onset;
-use crate::result::{Analysis, Fault, Finding, Law};
+use crate::result::{Analysis, Finding};
 use crate::stream::Silences;
-use skinrig_model::CameraId;
 
 /// What the streams say by themselves, camera 1 and camera 2.
 #[derive(Debug, Clone, Default)]
@@ -67,16 +67,4 @@ pub fn audit(input: &SessionInput, analysis: &Analysis, streams: &Streams) -> Ve
     ]
     .concat();
     order::leading_first(found)
-}
-
-/// A finding, with the advice that belongs to its fault.
-fn finding(law: Law, fault: Fault, camera: Option<CameraId>, evidence: String) -> Finding {
-    Finding {
-        law,
-        fault,
-        camera,
-        evidence,
-        advice: advice::of(fault).to_owned(),
-        invalidates: fault.invalidates(),
-    }
 }

@@ -4,7 +4,7 @@
 
 use skinrig_model::PressRole;
 
-use super::finding;
+use super::finding::finding;
 use super::touch::Touch;
 use crate::result::{Fault, Finding, Law};
 

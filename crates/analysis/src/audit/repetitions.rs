@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use skinrig_model::{CameraId, LocationId, RepetitionId};
 
-use super::finding;
+use super::finding::finding;
 use super::statistics::median;
 use super::touch::Touch;
 use crate::result::{Fault, Finding, Law};

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use skinrig_model::{Point2, PressRole, PressVerdict};
 
-use super::finding;
+use super::finding::finding;
 use crate::metrics::spread_mm;
 use crate::result::{Analysis, Fault, Finding, Law, PressResult};
 

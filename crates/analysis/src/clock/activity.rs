@@ -1,6 +1,6 @@
 //! Owns the activity of a camera over its recording: the event rate on a scale from idle to pressed.
 
-use super::presses::PressSpan;
+use super::span::PressSpan;
 use crate::rates::RateHistogram;
 
 /// Rate per bin, scaled to 0..=1.

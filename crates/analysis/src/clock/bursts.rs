@@ -1,9 +1,9 @@
 //! Owns the bursts of a camera: every instant at which its activity looks like a press, planned or not.
 
 use super::activity::Activity;
-use super::presses::PressSpan;
 use super::refine::{LEAST_STRENGTH, Profile, products};
 use super::search::Map;
+use super::span::PressSpan;
 
 /// Bins that are merged before the recording is compared with the mean press.
 const MERGE: usize = 2;

@@ -9,11 +9,13 @@ mod presses;
 mod refine;
 mod search;
 mod shifts;
+mod span;
 mod tally;
 
 pub use line::{Line, Pair, fit as fit_line};
 pub use marks::{MarksFit, fit_marks};
-pub use presses::{PressSpan, RatesAlignment, RatesFit, align_by_rates, fit_rates};
+pub use presses::{RatesAlignment, RatesFit, align_by_rates, fit_rates};
+pub use span::PressSpan;
 
 use skinrig_model::HostTime;
 

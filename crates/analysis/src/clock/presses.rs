@@ -16,20 +16,10 @@ use super::line::Line;
 use super::refine::{UNKNOWN_DRIFT, refine};
 use super::search::{MOST_DRIFT, Map, first_map};
 use super::shifts::{Choice, SAME_US, choose};
+use super::span::PressSpan;
 use super::tally::Plan;
 use crate::rates::RateHistogram;
 use crate::result::{ClockFit, ClockMethod, RatesEvidence, RatesSights};
-
-/// Contact and release of one press on the host clock, µs.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PressSpan {
-    /// First touch.
-    pub contact_us: f64,
-    /// Last touch.
-    pub release_us: f64,
-    /// A sync press: one of a few at one place that are seen together or not at all.
-    pub sync: bool,
-}
 
 /// The clock of one camera from event rates, and what to say about it.
 #[derive(Debug, Clone, PartialEq)]

@@ -2,8 +2,8 @@
 
 use super::activity::Activity;
 use super::line::{self, Pair, median};
-use super::presses::PressSpan;
 use super::search::{Map, period_us};
+use super::span::PressSpan;
 
 /// Largest lag of one press against the prediction, µs, in the first and the later rounds.
 const LAGS_US: [f64; 4] = [400_000.0, 250_000.0, 120_000.0, 120_000.0];

@@ -3,7 +3,7 @@
 use super::activity::Activity;
 use super::correlate::Correlator;
 use super::line::median;
-use super::presses::PressSpan;
+use super::span::PressSpan;
 
 /// Bins that are merged for the search.
 const MERGE: usize = 5;

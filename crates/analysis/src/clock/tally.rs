@@ -6,8 +6,8 @@
 //! weight that the recording itself gives it. `docs/time-base.md` has the formulae and the priors.
 
 use super::bursts::Train;
-use super::presses::PressSpan;
 use super::search::period_us;
+use super::span::PressSpan;
 
 /// A burst within this of a predicted contact is that press, µs.
 pub(super) const NEAR_US: f64 = 150_000.0;

@@ -15,13 +15,11 @@
 
 mod tiles;
 
-use self::tiles::{Part, SIDE, Tiles, ones};
+use self::tiles::{Part, SIDE, Tiles, WIDTH, ones};
 use crate::grid::PixelGrid;
 
 /// The label of events that belong to no cluster.
 pub const NOISE: u32 = u32::MAX;
-
-const WIDTH: usize = PixelGrid::WIDTH;
 
 /// One cluster.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

@@ -1,7 +1,8 @@
 //! Tiles of 8 by 8 pixels, each a word of bits, and discs as masks of tiles: a disc meets a few tiles only.
 
-use super::WIDTH;
+use crate::grid::PixelGrid;
 
+pub(super) const WIDTH: usize = PixelGrid::WIDTH;
 /// Pixels along a side of a tile.
 pub(super) const SIDE: usize = 8;
 /// Tiles in a row of tiles.

@@ -7,7 +7,7 @@ use super::epochs::epochs;
 use super::line::{best_drift, clock};
 use super::piece::{Piece, piece, shared};
 use super::reading::{Drift, Reading};
-use crate::legs::{LegLine, LegStart, edges_of, leg_at, recorded_of};
+use crate::leg::{LegLine, LegStart, edges_of, leg_at, recorded_of};
 use crate::result::{Alignment, AlignmentStatus, ClockFit};
 
 /// What the time base is made of.

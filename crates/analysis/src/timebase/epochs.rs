@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use skinrig_model::{BoxReport, Label, PulseTrain};
 
-use crate::legs::{LegStart, leg_at};
+use crate::leg::{LegStart, leg_at};
 
 /// An exchange of time: `sent <= box time <= received`, µs.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -4,7 +4,7 @@ use skinrig_model::{AlignmentSettings, HostTime};
 
 use super::base::{Ties, TimeBase};
 use super::drifting::{drifting, drifts};
-use crate::legs::{leg_at, recorded_of};
+use crate::leg::{leg_at, recorded_of};
 use crate::result::{Alignment, MapName};
 
 /// Coverage is judged from this many held-out points on: of fewer, two misses are no evidence.

@@ -3,7 +3,7 @@
 use super::piece::Piece;
 use super::smooth::Figure;
 use crate::clock::line::{self, Pair};
-use crate::legs::LegLine;
+use crate::leg::LegLine;
 use crate::result::{ClockFit, ClockMethod};
 
 /// One line through camera over host time at all trains. Its slope is the mean rate from the first train to the last, of the leg in which

@@ -4,12 +4,13 @@ use skinrig_model::{AnalysisSettings, CameraId, PressOutcome, PressRole};
 
 use super::choice::Region;
 use crate::accumulate::{Tally, press_view};
-use crate::analyze::{by_row, lost_rows, timings};
+use crate::analyze::{by_row, lost_rows};
 use crate::estimators::{PressEstimator, Thinning};
 use crate::input::SessionInput;
 use crate::judge::{Judged, Seen, judge};
 use crate::kept::{Kept, KeptEvent, KeptPress, KeptView};
 use crate::metrics::{Exclusions, metrics, penalised};
+use crate::press_spans::timings;
 use crate::result::{Analysis, ClockFit, Metrics, Penalised, PressView};
 use crate::segment::{Window, windows};
 use crate::sets::ScoreSet;

@@ -1,7 +1,8 @@
 //! Legs of a resumed session: trains stay in their leg, and all legs lie on one line.
 
+use skinrig_analysis::LegStart;
 use skinrig_analysis::SessionInput;
-use skinrig_analysis::legs::{LegStart, align};
+use skinrig_analysis::legs::align;
 use skinrig_analysis::result::AlignmentStatus;
 use skinrig_analysis::timebase::{Ties, TimeBase};
 use skinrig_model::{

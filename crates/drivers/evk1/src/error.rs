@@ -2,6 +2,10 @@
 
 use crate::registers::Register;
 
+/// What to do when a user may not open the camera.
+pub const UDEV_STEP: &str =
+    "install hil/udev/70-skinrig.rules (hil/README.md), then plug the camera in again";
+
 /// A transfer or a request to the USB stack failed.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum UsbError {
@@ -17,7 +21,7 @@ pub enum UsbError {
     #[error("another program holds the device: end it, or unplug and plug in again")]
     Busy,
     /// The operating system does not let this user open the device.
-    #[error("no permission to open the device: {}", crate::identify::UDEV_STEP)]
+    #[error("no permission to open the device: {}", UDEV_STEP)]
     NoPermission,
     /// The endpoint answered with a stall.
     #[error("the endpoint stalled")]

@@ -8,15 +8,11 @@ use skinrig_device::{Clock, RealClock};
 use skinrig_model::HostDuration;
 
 use crate::access::Registers;
-use crate::error::{Evk1Error, UsbError};
+use crate::error::{Evk1Error, UDEV_STEP, UsbError};
 use crate::registers::{ATIS_CONTROL, FPGA_VERSION, SERIAL_MSB};
 use crate::requests;
 use crate::tolerance::{Mismatches, Tolerance};
 use crate::usb::{Access, LibUsb, Slot, Transport, bus};
-
-/// What to do when a user may not open the camera.
-pub const UDEV_STEP: &str =
-    "install hil/udev/70-skinrig.rules (hil/README.md), then plug the camera in again";
 
 /// The FPGA loads its configuration within this time.
 const BOOT_LIMIT: HostDuration = HostDuration::from_millis(10_000);

@@ -27,6 +27,7 @@ mod owner;
 pub mod profile;
 mod regulation;
 pub mod sdk;
+mod span;
 mod stream;
 pub mod supervisor;
 pub mod trajectory;

@@ -3,7 +3,7 @@
 use skinrig_model::HostTime;
 
 use crate::config::Trips;
-use crate::engine::span;
+use crate::span::span;
 
 /// Fewest readings of a mean.
 const READINGS: u32 = 20;

@@ -8,7 +8,7 @@ use skinrig_compare::{Comparison, Weight};
 
 use super::figures::{self, Drawn};
 use super::{tables, words};
-use crate::ReportError;
+use crate::error::ReportError;
 use crate::format::number;
 use crate::frame::{Frame, safe};
 use crate::page::script_json;

@@ -2,11 +2,11 @@
 
 use skinrig_analysis::result::Activity;
 
+use super::canvas::{Canvas, Figure};
 use super::raster::{image, indexed_png};
-use super::{Canvas, Figure};
-use crate::ReportInput;
 use crate::axes::{Axes, Scale};
 use crate::colour::viridis_rgb;
+use crate::input::ReportInput;
 use crate::svg::{Px, Svg};
 
 /// Colours of the scale; more would only swell the file.

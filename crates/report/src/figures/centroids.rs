@@ -1,8 +1,8 @@
 //! Owns the centroid tracks: where each camera saw each press.
 
-use super::{Canvas, Figure, LINKED, press_path};
-use crate::ReportInput;
+use super::canvas::{Canvas, Figure, LINKED, press_path};
 use crate::axes::{Axes, Scale};
+use crate::input::ReportInput;
 use crate::svg::dots;
 use skinrig_analysis::result::PressResult;
 use skinrig_model::{PressId, SENSOR_WIDTH};

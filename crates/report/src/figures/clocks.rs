@@ -2,10 +2,10 @@
 
 use skinrig_analysis::result::{ClockMap, ClockResiduals};
 
-use super::{Canvas, Figure, nice_above};
-use crate::ReportInput;
+use super::canvas::{Canvas, Figure, nice_above};
 use crate::axes::{Axes, Scale};
 use crate::format::number;
+use crate::input::ReportInput;
 use crate::svg::{Px, dots};
 
 /// Height of a row of panels, px.

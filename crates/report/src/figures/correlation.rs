@@ -1,8 +1,8 @@
 //! Owns the picture of the calibration's correlation matrix.
 
-use super::{Canvas, Figure};
-use crate::ReportInput;
+use super::canvas::{Canvas, Figure};
 use crate::format::number;
+use crate::input::ReportInput;
 use crate::svg::{Px, Svg};
 
 /// Correlation of each pair of calibrated parameters as a small heat map. `None` without a calibration that has one.

@@ -1,10 +1,10 @@
 //! Owns the error figures: distribution, and x against y.
 
-use super::{Canvas, Figure, LINKED, nice_above, press_path};
-use crate::ReportInput;
+use super::canvas::{Canvas, Figure, LINKED, nice_above, press_path};
 use crate::axes::{Axes, Scale, tick_label};
 use crate::derive;
 use crate::format::number;
+use crate::input::ReportInput;
 use crate::svg::{Px, Svg, dots};
 
 /// Histogram and cumulative distribution of the Euclidean error, with median, RMSE and 95th percentile.

@@ -2,12 +2,12 @@
 
 use skinrig_analysis::result::Latency;
 
+use super::canvas::{Canvas, Figure, band, nice_above};
 use super::legend::{self, Sample};
-use super::{Canvas, Figure, band, nice_above};
-use crate::ReportInput;
 use crate::axes::{Axes, Scale};
 use crate::derive;
 use crate::format::number;
+use crate::input::ReportInput;
 use crate::svg::{Px, Svg, polyline};
 
 /// Percentiles of the event rate over trials against the time since contact, with those of the background and dashed

@@ -1,10 +1,10 @@
 //! Owns the histogram of detected onsets after contact.
 
-use super::{Canvas, Figure, nice_above};
-use crate::ReportInput;
+use super::canvas::{Canvas, Figure, nice_above};
 use crate::axes::{Axes, Scale, tick_label};
 use crate::derive;
 use crate::format::number;
+use crate::input::ReportInput;
 use crate::svg::Px;
 
 /// How long after the contact presses are detected, at the chosen threshold. `None` without the study or any onset.

@@ -1,10 +1,10 @@
 //! Owns the figure of the detector's thresholds: detected trials against false alarms.
 
+use super::canvas::{Canvas, Figure};
 use super::legend::{self, Sample, diamond};
-use super::{Canvas, Figure};
-use crate::ReportInput;
 use crate::axes::{Axes, Scale};
 use crate::format::number;
+use crate::input::ReportInput;
 use crate::published;
 use crate::svg::{Px, dots, polyline};
 

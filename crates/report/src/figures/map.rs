@@ -3,11 +3,11 @@
 use skinrig_analysis::result::PressResult;
 use skinrig_model::{Point2, PressRole};
 
+use super::canvas::{Canvas, Figure, LINKED, nice_above, press_path};
 use super::skin::{Layout, colour_bar};
-use super::{Canvas, Figure, LINKED, nice_above, press_path};
-use crate::ReportInput;
 use crate::colour::viridis;
 use crate::derive::{self, LocationSummary};
+use crate::input::ReportInput;
 use crate::svg::{Px, Svg, dots, polyline};
 
 const SIZE: (f64, f64) = (900.0, 700.0);

@@ -2,11 +2,11 @@
 
 use skinrig_model::CalibrationModel;
 
+use super::canvas::{Canvas, Figure, nice_above};
 use super::legend::{self, Sample};
-use super::{Canvas, Figure, nice_above};
-use crate::ReportInput;
 use crate::axes::{Axes, Scale};
 use crate::format::number;
+use crate::input::ReportInput;
 use crate::svg::{Px, dots};
 
 /// A model's name for people.

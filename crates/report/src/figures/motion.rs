@@ -2,10 +2,10 @@
 
 use skinrig_analysis::result::{Motion, PressMotion};
 
-use super::{Canvas, Figure, nice_above};
-use crate::ReportInput;
+use super::canvas::{Canvas, Figure, nice_above};
 use crate::axes::{Axes, Scale};
 use crate::format::{grouped, number};
+use crate::input::ReportInput;
 use crate::svg::polyline;
 
 /// The distance between commanded and measured position over the session. `None` without poses.

@@ -3,10 +3,10 @@
 use skinrig_analysis::result::{PressPicture, PressView};
 use skinrig_model::SENSOR_WIDTH;
 
+use super::canvas::{Canvas, Figure};
 use super::raster::{image, indexed_png};
-use super::{Canvas, Figure};
-use crate::ReportInput;
 use crate::axes::tick_label;
+use crate::input::ReportInput;
 use crate::svg::Px;
 
 /// Colours of a picture: no event, then ON and OFF outside the cluster, then ON and OFF in it. A picture cannot follow the

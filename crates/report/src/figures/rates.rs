@@ -5,10 +5,10 @@ use std::fmt::Write as _;
 use skinrig_analysis::result::{RateSeries, RateZoom};
 use skinrig_model::PressId;
 
-use super::{Canvas, Figure, LINKED, nice_above, press_path};
-use crate::ReportInput;
+use super::canvas::{Canvas, Figure, LINKED, nice_above, press_path};
 use crate::axes::{Axes, Scale};
 use crate::format::number;
+use crate::input::ReportInput;
 use crate::svg::{Px, polyline};
 
 /// A readable unit for rates up to `most` events per second: divisor and name.

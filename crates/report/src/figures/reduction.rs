@@ -2,11 +2,11 @@
 
 use skinrig_analysis::result::{Estimate, Reduction, ReductionCurve, ReductionRow, Thinning};
 
+use super::canvas::{Canvas, Figure, band, nice_above};
 use super::legend::{self, Sample, diamond};
-use super::{Canvas, Figure, band, nice_above};
-use crate::ReportInput;
 use crate::axes::{Axes, Scale, tick_label, ticks};
 use crate::format::number;
+use crate::input::ReportInput;
 use crate::published;
 use crate::svg::{Svg, dots, polyline};
 

@@ -2,11 +2,11 @@
 
 use skinrig_model::Point2;
 
+use super::canvas::{Canvas, Figure};
 use super::skin::Layout;
-use super::{Canvas, Figure};
-use crate::ReportInput;
 use crate::derive::{self, Residual};
 use crate::format::number;
+use crate::input::ReportInput;
 use crate::svg::{dots, polyline};
 
 /// Which estimate of a press is drawn.

@@ -2,10 +2,10 @@
 
 use skinrig_model::{CameraModel, Point2, SENSOR_WIDTH};
 
-use crate::ReportInput;
 use crate::axes::{Axes, Scale, tick_label, ticks};
 use crate::colour::viridis;
 use crate::derive::LocationSummary;
+use crate::input::ReportInput;
 use crate::svg::{Px, Svg, polyline};
 
 /// Where the skin lies in the figure.

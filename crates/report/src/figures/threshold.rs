@@ -1,9 +1,9 @@
 //! Owns the figure of the threshold's choice.
 
-use super::{Canvas, Figure, nice_above};
-use crate::ReportInput;
+use super::canvas::{Canvas, Figure, nice_above};
 use crate::axes::{Axes, Scale};
 use crate::format::number;
+use crate::input::ReportInput;
 use crate::svg::{Px, dots, polyline};
 
 /// Root mean square cost of each candidate for the least number of cluster events, the chosen one marked. `None`

@@ -3,10 +3,10 @@
 use skinrig_analysis::tradeoff::{Cost, Row, Tradeoff};
 use skinrig_model::Estimator;
 
-use super::Figure;
+use super::canvas::Figure;
 use crate::axes::{Scale, tick_label};
+use crate::choices::{label, short};
 use crate::svg::{Px, Svg};
-use crate::tradeoff::{label, short};
 
 const SIZE: (f64, f64) = (1240.0, 600.0);
 const TOP: f64 = 64.0;

@@ -7,7 +7,7 @@ use skinrig_nightly::{Attempt, Cause, CheckResult, Measurement, Night, Verdict};
 
 use super::trends::Trends;
 use super::{bars, words};
-use crate::ReportError;
+use crate::error::ReportError;
 use crate::frame::Frame;
 use crate::trend::{ALARM_CSS, ALARM_TEMPLATE};
 

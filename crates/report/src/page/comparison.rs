@@ -3,9 +3,9 @@
 use skinrig_analysis::result::{Analysis, Thinning};
 
 use super::grid::Grid;
-use crate::ReportInput;
 use crate::comparison::{Cell, rows};
 use crate::format::{NONE, interval, number};
+use crate::input::ReportInput;
 use crate::published::{self, Metric};
 
 fn digits(metric: Metric, value: Option<f64>) -> usize {

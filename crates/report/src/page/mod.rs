@@ -24,14 +24,15 @@ use skinrig_analysis::result::Analysis;
 use assets::{SCRIPT, TEMPLATES};
 
 use crate::derive;
+use crate::error::ReportError;
 use crate::figures::{self, Figure};
 use crate::format::{digits_of_error, grouped, interval, number, or_missing};
 use crate::frame::{Frame, safe};
+use crate::input::ReportInput;
 use crate::provenance::Provenance;
 use crate::svg::{FIGURE_CSS, plain_css};
 use crate::tables;
 use crate::terminal::{clock_method, metric_rows};
-use crate::{ReportError, ReportInput};
 
 /// JSON that may stand inside `<script>`: `<`, `>`, `&` and the line separators of JavaScript are written as
 /// escapes, so no text can end the element or open a comment.

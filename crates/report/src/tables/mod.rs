@@ -3,56 +3,16 @@
 
 mod packing;
 mod studies;
+mod table;
 mod traces;
 
 use serde_json::{Map, Value, json};
 use skinrig_analysis::result::{Analysis, CalibrationResult};
 use skinrig_model::PressId;
 
-use crate::ReportInput;
 use crate::derive;
-use packing::packed;
-
-/// A number rounded to `digits` decimals; missing or non-finite ones are null.
-fn rounded(value: Option<f64>, digits: i32) -> Value {
-    let Some(v) = value.filter(|v| v.is_finite()) else {
-        return Value::Null;
-    };
-    let power = 10f64.powi(digits);
-    let r = (v * power).round() / power;
-    // Whole numbers without ".0": they are most of the page's data.
-    if r == r.trunc() && r.abs() < 1e15 {
-        json!(r as i64)
-    } else {
-        json!(r)
-    }
-}
-
-/// A table under construction: names and column-wise data, in order.
-struct Table {
-    columns: Vec<&'static str>,
-    data: Vec<Vec<Value>>,
-}
-
-impl Table {
-    const fn new() -> Self {
-        Self {
-            columns: vec![],
-            data: vec![],
-        }
-    }
-
-    fn column(mut self, name: &'static str, cells: impl IntoIterator<Item = Value>) -> Self {
-        self.columns.push(name);
-        self.data.push(cells.into_iter().collect());
-        self
-    }
-
-    fn finish(self) -> Value {
-        let data: Vec<Value> = self.data.into_iter().map(packed).collect();
-        json!({ "columns": self.columns, "data": data })
-    }
-}
+use crate::input::ReportInput;
+use table::{Table, rounded};
 
 /// Everything the script needs: session id and the named tables.
 pub(crate) fn script_data(input: &ReportInput<'_>) -> Value {

@@ -6,7 +6,7 @@ use skinrig_analysis::result::{
     ReferenceReduction,
 };
 
-use super::{Table, rounded};
+use super::table::{Table, rounded};
 use crate::{comparison, derive};
 
 /// All that the analysis has, by name.

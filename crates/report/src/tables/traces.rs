@@ -4,9 +4,9 @@ use serde_json::{Value, json};
 use skinrig_analysis::result::{ClockResiduals, Motion};
 use skinrig_analysis::tradeoff::Tradeoff;
 
-use super::{Table, rounded};
-use crate::ReportInput;
-use crate::tradeoff::label;
+use super::table::{Table, rounded};
+use crate::choices::label;
+use crate::input::ReportInput;
 
 /// All that there are, by name.
 pub(super) fn all(input: &ReportInput<'_>) -> Vec<(&'static str, Table)> {

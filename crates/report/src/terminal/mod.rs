@@ -1,6 +1,7 @@
 //! Owns the results table for a terminal: findings, headline, presses, clocks; the studies are in [`studies`].
 
 mod studies;
+mod text;
 
 use std::fmt::Write as _;
 
@@ -8,12 +9,10 @@ use skinrig_analysis::result::{
     Alignment, AlignmentStatus, Analysis, ClockFit, ClockMethod, Estimate, MapName, Metrics,
 };
 
-use skinrig_model::text::visible;
-
-use crate::ReportInput;
+use self::text::WIDTH;
+pub(crate) use self::text::{Paint, plain, wrap};
 use crate::format::{digits_of_error, grouped, interval, number, or_missing};
-
-const WIDTH: usize = 80;
+use crate::input::ReportInput;
 
 /// A metric ready to be written: name, value, unit, interval, n.
 pub(crate) struct MetricRow {
@@ -97,61 +96,6 @@ pub(crate) fn clock_method(method: ClockMethod) -> &'static str {
         ClockMethod::TriggerMarks => "trigger marks",
         ClockMethod::EventRates => "event rates",
     }
-}
-
-/// User text on one line, with what a terminal would obey written out.
-pub(crate) fn plain(text: &str) -> String {
-    visible(&text.replace(['\n', '\t'], " ")).into_owned()
-}
-
-pub(crate) struct Paint(pub(crate) bool);
-
-impl Paint {
-    pub(crate) fn bold(&self, s: &str) -> String {
-        if self.0 {
-            format!("\x1b[1m{s}\x1b[0m")
-        } else {
-            s.to_owned()
-        }
-    }
-    pub(crate) fn warn(&self, s: &str) -> String {
-        if self.0 && !s.is_empty() {
-            format!("\x1b[33m{s}\x1b[0m")
-        } else {
-            s.to_owned()
-        }
-    }
-}
-
-/// Words of `text` in lines of at most `WIDTH` columns; the first begins with `first`, the others with as
-/// many spaces. Words longer than a line are cut.
-pub(crate) fn wrap(first: &str, text: &str) -> String {
-    let indent = " ".repeat(first.chars().count());
-    let room = WIDTH - indent.len();
-    let mut lines = vec![String::new()];
-    for word in text.split_whitespace() {
-        let mut rest: Vec<char> = word.chars().collect();
-        while !rest.is_empty() {
-            let used = lines.last().map_or(0, |l| l.chars().count());
-            let needed = rest.len() + usize::from(used > 0);
-            if used > 0 && used + needed > room {
-                lines.push(String::new());
-                continue;
-            }
-            let piece: String = rest.drain(..rest.len().min(room)).collect();
-            if let Some(line) = lines.last_mut() {
-                if used > 0 {
-                    line.push(' ');
-                }
-                line.push_str(&piece);
-            }
-        }
-    }
-    let mut out = String::new();
-    for (i, line) in lines.iter().enumerate() {
-        let _ = writeln!(out, "{}{line}", if i == 0 { first } else { &indent });
-    }
-    out
 }
 
 /// See [`crate::terminal_table`].

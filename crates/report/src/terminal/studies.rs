@@ -6,7 +6,7 @@ use skinrig_analysis::result::{
     Analysis, Estimate, Latency, Reduction, ReductionRow, ReferenceCode, Thinning,
 };
 
-use super::{plain, wrap};
+use super::text::{plain, wrap};
 use crate::figures::model_name;
 use crate::format::{interval, number};
 

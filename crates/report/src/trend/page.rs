@@ -8,7 +8,7 @@ use skinrig_nightly::trend::{Acceptance, Alarm, Chart, Report};
 
 use super::alarm::{self, Told};
 use super::{ALARM_CSS, ALARM_TEMPLATE, Links, cause, figure, moved, state, with_unit};
-use crate::ReportError;
+use crate::error::ReportError;
 use crate::frame::Frame;
 use crate::svg::FIGURE_CSS;
 

@@ -30,10 +30,9 @@ pub use skinrig_emulated_camera::steer::Order;
 pub use skinrig_emulated_trigger_box::NoisePerMillion;
 pub use ties::{LEAKS_EVERY, Wire};
 
+pub use ties::CAMERA_SERIALS;
 use ties::Ties;
 
-/// Serial numbers of the two cameras, as in `hil/rigs/emulated.yaml`.
-pub const CAMERA_SERIALS: [&str; 2] = ["00000001", "00000002"];
 /// Serial number of the arm, as in `hil/rigs/emulated.yaml`.
 pub const ARM_SERIAL: u16 = 4711;
 /// Serial number in the trigger box's EEPROM.

@@ -12,7 +12,8 @@ use skinrig_emulated_camera::world::{Edge, Tip};
 use skinrig_emulated_trigger_box::{CAMERA_1, CAMERA_2, EdgeStream, EmulatedBox, Told};
 use skinrig_model::CameraId;
 
-use crate::CAMERA_SERIALS;
+/// Serial numbers of the two cameras, as in `hil/rigs/emulated.yaml`.
+pub const CAMERA_SERIALS: [&str; 2] = ["00000001", "00000002"];
 
 /// How often the tip is looked at.
 const LOOK_EVERY: Duration = Duration::from_micros(500);

@@ -14,6 +14,7 @@ use rustix::io::Errno;
 
 use crate::config::{Access, BusConfig, DeviceConfig};
 use crate::content::Source;
+use crate::error::{BusError, SHIM, SHIM_VARIABLE};
 use crate::evk1::{Evk1, SyncLine, produce};
 use crate::steer::{Addressed, Answer, Observation, Order, ROOT_VARIABLE, Remote};
 use crate::treuzell::Treuzell;
@@ -23,32 +24,6 @@ use crate::usb::readiness::Readiness;
 use crate::usb::serve::{Node, listen};
 use crate::usb::testbed::{Address, TestBed};
 use crate::world::{Edge, World};
-
-/// Names the preload library where it is not beside the program.
-const SHIM_VARIABLE: &str = "SKINRIG_USBSHIM";
-const SHIM: &str = "libusbshim.so";
-
-/// A bus cannot be made.
-#[derive(Debug, thiserror::Error)]
-pub enum BusError {
-    /// The machine refuses.
-    #[error("emulated bus: {0}")]
-    Io(#[from] io::Error),
-    /// Two devices of one name, or a number that is none.
-    #[error("emulated bus: expected {expected}, found {found}")]
-    Config {
-        /// What would do.
-        expected: String,
-        /// What was given.
-        found: String,
-    },
-    /// What the pixels should do cannot be done.
-    #[error("emulated camera: {0}")]
-    Content(String),
-    /// The preload library is not there.
-    #[error("emulated bus: expected {SHIM} at {}; build skinrig-usbshim or set {SHIM_VARIABLE}", .0.display())]
-    NoShim(PathBuf),
-}
 
 enum Device {
     Evk1(Arc<Evk1>),

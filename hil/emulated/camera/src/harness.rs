@@ -16,8 +16,9 @@ use std::process::Stdio;
 use std::thread;
 use std::time::{Duration, Instant};
 
-use crate::bus::{Bus, BusError};
+use crate::bus::Bus;
 use crate::config::{BusConfig, DeviceConfig};
+use crate::error::BusError;
 use crate::steer::Remote;
 
 /// A test that hangs fails after this.

@@ -23,13 +23,16 @@
 pub mod bus;
 pub mod config;
 pub mod content;
+mod error;
 mod evk1;
 pub mod harness;
+mod random;
 pub mod steer;
 mod treuzell;
 mod usb;
 pub mod world;
 
-pub use bus::{Bus, BusError};
+pub use bus::Bus;
 pub use config::{BusConfig, DeviceConfig, Evk1Config};
+pub use error::BusError;
 pub use steer::Remote;

@@ -3,10 +3,10 @@
 use skinrig_drd_abi::ForceOffCause;
 use skinrig_model::{HostTime, Point3, Robot};
 
-use super::span;
 use crate::config::Trips;
 use crate::correction::Correction;
 use crate::monitor::{Freshness, Monitor, Trip};
+use crate::span::span;
 use crate::trajectory::{Trajectory, norm};
 use crate::weighing::Weighing;
 

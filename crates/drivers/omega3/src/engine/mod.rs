@@ -5,7 +5,6 @@ mod arming;
 mod cycle;
 
 use std::sync::Arc;
-use std::time::Duration;
 
 use skinrig_device::{Clock, DeviceError, MotionLimits, limits};
 use skinrig_model::{DeviceRole, HostDuration, Point3, Robot, Setting};
@@ -18,6 +17,7 @@ use crate::monitor::Trip;
 use crate::open::{NotSet, Opened, seen};
 use crate::regulation;
 use crate::sdk::{CallError, Sdk};
+use crate::span::span;
 use crate::stream::Stream;
 use crate::supervisor::Supervisor;
 
@@ -249,9 +249,4 @@ impl<C: Clock> Drop for Engine<C> {
             supervisor.dismiss();
         }
     }
-}
-
-/// A duration of the standard library on the bench's clock.
-pub(crate) fn span(duration: Duration) -> HostDuration {
-    HostDuration(i64::try_from(duration.as_nanos()).unwrap_or(i64::MAX))
 }

@@ -3,7 +3,9 @@
 use skinrig_formats::evt2::TIME_HIGH_CADENCE_US;
 use skinrig_model::{SENSOR_HEIGHT, SENSOR_WIDTH};
 
-use super::{PixelEvent, Splitmix};
+use skinrig_sim::scene::PixelEvent;
+
+use crate::random::Splitmix;
 
 /// Random pixels in the pattern, a power of two.
 const PATTERN: usize = 1 << 13;

@@ -4,11 +4,11 @@ mod dense;
 mod recorded;
 mod scene;
 
-use skinrig_model::{Polarity, SENSOR_HEIGHT, SENSOR_WIDTH};
 pub use skinrig_sim::scene::PixelEvent;
 
-use crate::bus::BusError;
 use crate::config::Content;
+use crate::error::BusError;
+use crate::random::Splitmix;
 use crate::world::World;
 use dense::Dense;
 use recorded::Recorded;
@@ -96,40 +96,6 @@ impl Source {
             Self::Dense(dense) => dense.events(from_ns, until_ns, out),
             Self::Recorded(recorded) => recorded.events(until_ns, out),
             Self::Scene(scene) => scene.events(world, until_ns, out),
-        }
-    }
-}
-
-/// A small generator of pseudo-random numbers (Steele, Lea, Flood: Fast splittable pseudorandom number generators,
-/// 2014). Good enough for noise and jitter, and the same everywhere.
-pub(crate) struct Splitmix(pub u64);
-
-impl Splitmix {
-    pub fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ self.0 >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ z >> 31
-    }
-
-    /// 0..`end`; `end` is not 0.
-    pub fn below(&mut self, end: u64) -> u64 {
-        ((u128::from(self.next()) * u128::from(end)) >> 64) as u64
-    }
-
-    /// Exponentially distributed with mean 1.
-    fn exponential(&mut self) -> f64 {
-        // In (0, 1], so that the logarithm is finite.
-        let unit = ((self.next() >> 11) + 1) as f64 / (1u64 << 53) as f64;
-        -unit.ln()
-    }
-
-    fn event(&mut self, t_ns: i64) -> PixelEvent {
-        PixelEvent {
-            t_ns,
-            x: self.below(SENSOR_WIDTH.into()) as u16,
-            y: self.below(SENSOR_HEIGHT.into()) as u16,
-            polarity: Polarity::from_bit(self.next() >> 63 == 1),
         }
     }
 }

@@ -5,8 +5,9 @@ use std::path::Path;
 use skinrig_formats::raw::RawReader;
 use skinrig_model::CdEvent;
 
-use super::PixelEvent;
-use crate::bus::BusError;
+use skinrig_sim::scene::PixelEvent;
+
+use crate::error::BusError;
 
 pub(crate) struct Recorded {
     /// In the order of time.

@@ -6,8 +6,8 @@ use skinrig_sim::geometric::GeometricModel;
 use skinrig_sim::optical::OpticalModel;
 use skinrig_sim::scene::{GRID_NS, PixelEvent, PixelModel, SceneConfig, TipSample};
 
-use crate::bus::BusError;
 use crate::config::SceneContent;
+use crate::error::BusError;
 use crate::world::World;
 
 pub(crate) struct Scene {

@@ -5,12 +5,14 @@
 
 mod camera;
 mod clock;
+mod counters;
 mod pattern;
 mod producer;
 mod registers;
 mod requests;
 mod sensor;
 
-pub use camera::{Counters, Evk1};
+pub use camera::Evk1;
 pub use clock::SyncLine;
+pub use counters::Counters;
 pub use producer::produce;

@@ -7,7 +7,7 @@ use skinrig_model::Polarity;
 
 use super::registers as r;
 use super::registers::Registers;
-use crate::content::PixelEvent;
+use skinrig_sim::scene::PixelEvent;
 
 /// Columns and rows of the scan.
 const COLUMNS: u32 = 512;

@@ -11,8 +11,10 @@ use super::camera::{Evk1, Run};
 use super::pattern::Scan;
 use super::sensor::Gates;
 use crate::config::Pacing;
-use crate::content::{PixelEvent, Source, Splitmix};
+use crate::content::Source;
+use crate::random::Splitmix;
 use crate::world::Edge;
+use skinrig_sim::scene::PixelEvent;
 
 /// How often a wait looks whether the run has ended.
 const PATIENCE: Duration = Duration::from_millis(5);

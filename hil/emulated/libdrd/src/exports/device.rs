@@ -4,7 +4,7 @@ use std::ffi::c_char;
 
 use skinrig_drd_abi::{COM_MODE_ASYNC, DEVICE_OMEGA3, ErrorCode};
 
-use super::{Outcome, fill, run, run_bool, run_call, values};
+use super::outcome::{Outcome, fill, run, run_bool, run_call, values};
 use crate::host;
 use crate::wire::Call;
 

@@ -5,7 +5,7 @@ use std::sync::OnceLock;
 
 use skinrig_drd_abi::{ErrorCode, SdkVersion};
 
-use super::{fill, run};
+use super::outcome::{fill, run};
 use crate::host;
 use crate::time::now_ns;
 

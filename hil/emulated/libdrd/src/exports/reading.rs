@@ -4,7 +4,7 @@ use std::sync::{Mutex, PoisonError};
 
 use skinrig_drd_abi::{ErrorCode, TIMEGUARD};
 
-use super::{Outcome, fill, run};
+use super::outcome::{Outcome, fill, run};
 use crate::host;
 use crate::page::ArmState;
 use crate::wire::Call;

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use skinrig_drd_abi::{ErrorCode, MOTOR_SATURATED};
 
-use super::{Outcome, run, run_bool, run_call, values};
+use super::outcome::{Outcome, run, run_bool, run_call, values};
 use crate::host;
 use crate::page::ArmState;
 use crate::wire::Call;

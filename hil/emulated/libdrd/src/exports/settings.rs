@@ -1,6 +1,6 @@
 //! Parameters: each is set by one call and read back by another.
 
-use super::{fill, run, run_bool, values};
+use super::outcome::{fill, run, run_bool, values};
 use crate::config::Setting;
 use crate::host;
 use crate::wire::Call;

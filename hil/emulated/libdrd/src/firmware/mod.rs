@@ -19,15 +19,13 @@ use std::thread;
 use std::time::Duration;
 
 use self::calls::Caller;
-use self::world::World;
+use self::world::{STEP_US, World};
 use crate::config::ArmConfig;
 use crate::file;
 use crate::page::Page;
 use crate::time::now_ns;
 use crate::wire::{Connection, Reply, Request};
 
-/// Step of the simulation, us.
-pub const STEP_US: u32 = 250;
 /// How often the arm is taken to the present when nobody asks.
 const WAKE_EVERY: Duration = Duration::from_micros(250);
 /// How many wake-ups lie between two looks at the driving process.

@@ -2,7 +2,6 @@
 
 use skinrig_drd_abi::WATCHDOG_UNIT_US;
 
-use super::STEP_US;
 use super::body::Body;
 use super::faults::Faults;
 use super::initialise::Initialisation;
@@ -11,6 +10,9 @@ use super::settings::Settings;
 use super::vector::{Vector, ZERO, add, norm, sub};
 use crate::config::{ArmConfig, Fault};
 use crate::page::{ArmState, Mode};
+
+/// Step of the simulation, us.
+pub const STEP_US: u32 = 250;
 
 /// Why the power went off, as the status vector tells it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,0 +1,23 @@
+//! A finding of the audit.
+
+use skinrig_model::CameraId;
+
+use super::advice;
+use crate::result::{Fault, Finding, Law};
+
+/// A finding, with the advice that belongs to its fault.
+pub(super) fn finding(
+    law: Law,
+    fault: Fault,
+    camera: Option<CameraId>,
+    evidence: String,
+) -> Finding {
+    Finding {
+        law,
+        fault,
+        camera,
+        evidence,
+        advice: advice::of(fault).to_owned(),
+        invalidates: fault.invalidates(),
+    }
+}
