@@ -160,7 +160,8 @@ pub(crate) fn nominal_only(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::result::ClockMethod;
+    use crate::result::{ClockFit, ClockMethod};
+    use skinrig_model::TriggerEdge;
 
     fn edge(t_us: u64) -> TriggerEdge {
         TriggerEdge {
