@@ -360,50 +360,6 @@ mod tests {
         assert_eq!(found, BTreeSet::from(State::ALL));
     }
 
-    fn at(state: State) -> Machine {
-        Machine {
-            state,
-            shown: ControlHandle::new(),
-        }
-    }
-
-    #[test]
-    fn abort_and_fault_lead_to_disarmed_from_everywhere() {
-        for state in State::ALL {
-            for event in [Event::Abort, Event::Fault] {
-                let mut machine = at(state);
-                let action = machine.fire(event);
-                if state == State::Finished {
-                    assert_eq!(machine.state(), State::Finished);
-                    continue;
-                }
-                if machine.state() == State::Halting {
-                    assert_eq!(action, Action::Ignore, "a halt is not softened");
-                    assert_eq!(machine.fire(Event::Disarmed), Action::Close);
-                    continue;
-                }
-                assert!(matches!(action, Action::Retract | Action::Ignore));
-                assert_eq!(machine.fire(Event::Cleared), Action::Disarm, "{state:?}");
-                assert_eq!(machine.fire(Event::Disarmed), Action::Close, "{state:?}");
-                assert!(!machine.state().may_be_armed());
-            }
-        }
-    }
-
-    #[test]
-    fn a_halt_disarms_at_once_from_everywhere() {
-        for state in State::ALL {
-            let mut machine = at(state);
-            let action = machine.fire(Event::Halt);
-            if matches!(state, State::Halting | State::Finished) {
-                assert_eq!((machine.state(), action), (state, Action::Ignore));
-                continue;
-            }
-            assert_eq!(action, Action::Disarm, "{state:?}");
-            assert_eq!(machine.fire(Event::Disarmed), Action::Close, "{state:?}");
-        }
-    }
-
     /// From every state that can be reached, every course of four events: nothing leaves the way out, a pause always
     /// ends in a resume, a stop or worse, and the run executes a step only when it is running.
     #[test]

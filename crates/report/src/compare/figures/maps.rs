@@ -3,7 +3,7 @@
 use skinrig_compare::{Comparison, Here, Location};
 use skinrig_model::Point2;
 
-use super::scales::{bars, diverging};
+use super::scales::{LEFT, PANEL, STEP, bars, diverging};
 use super::{Drawn, Sheet};
 use crate::axes::{Axes, Scale};
 use crate::colour::viridis;
@@ -11,9 +11,6 @@ use crate::format::number;
 use crate::svg::{Px, Svg, polyline};
 
 const SIZE: (f64, f64) = (1240.0, 528.0);
-pub(super) const LEFT: f64 = 62.0;
-pub(super) const PANEL: f64 = 350.0;
-pub(super) const STEP: f64 = 400.0;
 const TOP: f64 = 40.0;
 
 /// The maps of skin `k` beside the first.

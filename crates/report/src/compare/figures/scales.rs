@@ -1,11 +1,13 @@
 //! Owns the colour scales of the maps: errors, and their differences, as many px per mm in both.
 
-use super::maps::{LEFT, PANEL, STEP};
 use super::{BETTER, NEITHER, WORSE};
 use crate::axes::{tick_label, ticks};
 use crate::colour::viridis;
 use crate::svg::{Px, Svg};
 
+pub(super) const LEFT: f64 = 62.0;
+pub(super) const PANEL: f64 = 350.0;
+pub(super) const STEP: f64 = 400.0;
 const BAR_Y: f64 = 450.0;
 
 /// Blue for -1, a light grey for 0, orange for 1.

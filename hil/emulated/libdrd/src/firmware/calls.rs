@@ -214,8 +214,8 @@ impl World {
             (StatusField::Locks, -1),
         ];
         let by_version = match self.config.sdk {
-            [3, ..=6, _] => 15,
-            [3, ..=16, _] => 16,
+            [3, 0..=6, _] => 15,
+            [3, 0..=16, _] => 16,
             _ => 17,
         };
         let cut = self.faults.find(|f| match f {
