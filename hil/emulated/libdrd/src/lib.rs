@@ -6,7 +6,7 @@
 //!
 //! # Processes
 //! - The **firmware process** is the arm: inertia, gravity, motors, contact, modes, watchdog, velocity
-//!   trip, in real time in steps of [`STEP_US`](firmware::STEP_US). It outlives the program that drives the arm.
+//!   trip, in real time in steps of 250 µs. It outlives the program that drives the arm.
 //! - The **library** in the driving program turns each C call into a message to it, keeps the last error of
 //!   each thread and writes the journal. Poses are read from a page of shared memory, without a message.
 //! - The **control client** ([`EmulatedArm`]) of a test or of the emulated bench starts the firmware, sees
