@@ -169,7 +169,7 @@ const UNSAFE_HOMES: &[&str] = &[
     "hil/emulated/libdrd/src/entry.rs",
     "hil/emulated/libdrd/src/exports/device.rs",
     "hil/emulated/libdrd/src/exports/library.rs",
-    "hil/emulated/libdrd/src/exports/mod.rs",
+    "hil/emulated/libdrd/src/exports/outcome.rs",
     "hil/emulated/libdrd/src/exports/reading.rs",
     "hil/emulated/libdrd/src/exports/regulation.rs",
     "hil/emulated/libdrd/src/exports/settings.rs",
