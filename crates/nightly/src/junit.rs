@@ -9,7 +9,7 @@ use skinrig_model::text::visible;
 
 use crate::cause::Cause;
 use crate::night::{CheckResult, Night};
-use crate::rules::{GOLDEN_ON_A_BAD_RIG, RULES};
+use crate::rules::{ACROSS, RULES};
 use crate::verdict::Verdict;
 
 /// How a check is told in JUnit's words.
@@ -147,7 +147,7 @@ fn message(check: &CheckResult) -> String {
         return reason.clone();
     }
     let cause = check.cause.map_or("", Cause::name);
-    let all = RULES.iter().chain([&GOLDEN_ON_A_BAD_RIG]);
+    let all = RULES.iter().chain(ACROSS);
     let named = |rule: &String| all.clone().find(|r| r.name == rule).map(|r| r.reason);
     let reason = check.rule.as_ref().and_then(named);
     format!("{cause}: {}", reason.unwrap_or("a limit was broken"))

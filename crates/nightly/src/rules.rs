@@ -107,6 +107,18 @@ pub const GOLDEN_ON_A_BAD_RIG: Rule = Rule {
     reason: "a device that the golden campaign relies on was found at fault in the same night",
 };
 
+/// The rule for presses of an arm that moves badly. Its evidence is other checks, as above.
+pub const TOUCH_ON_A_BAD_ARM: Rule = Rule {
+    name: "touch-on-a-bad-arm",
+    seen: &[],
+    cause: Some(Cause::Rig),
+    verdict: Verdict::Inconclusive,
+    reason: "the arm did not move as it should in the same night: friction shifts the force at which a touch is detected",
+};
+
+/// Rules whose evidence is other checks of the same night.
+pub const ACROSS: [&Rule; 2] = [&GOLDEN_ON_A_BAD_RIG, &TOUCH_ON_A_BAD_ARM];
+
 /// What a verdict is about.
 #[derive(Debug, Clone, Copy)]
 pub struct Case<'a> {
@@ -172,8 +184,13 @@ pub const WITNESSES: &[&str] = &[
     "force_ceiling",
 ];
 
-/// The rules across the checks of one night: what other checks found changes what the golden skin's mean.
+/// Checks of the free arm's motion, and the check whose touches rely on it, by name.
+const ARM_MOTION: [&str; 2] = ["repeatability", "step_response"];
+const PRESSES: &str = "depth";
+
+/// The rules across the checks of one night: faults that other checks found change the verdict of presses and of the golden skin.
 pub fn across(checks: &mut [CheckResult]) {
+    touches(checks);
     let at_fault = |c: &&CheckResult| {
         WITNESSES.contains(&c.name.as_str()) && !c.verdict.is_good() && c.cause == Some(Cause::Rig)
     };
@@ -193,5 +210,25 @@ pub fn across(checks: &mut [CheckResult]) {
         golden.cause = GOLDEN_ON_A_BAD_RIG.cause;
         golden.rule = Some(GOLDEN_ON_A_BAD_RIG.name.to_owned());
         golden.witnesses.clone_from(&witnesses);
+    }
+}
+
+/// A good press of a bad arm is not evidence of a good frame.
+fn touches(checks: &mut [CheckResult]) {
+    let moves_badly = |c: &&CheckResult| {
+        ARM_MOTION.contains(&c.name.as_str()) && !c.verdict.is_good() && c.cause == Some(Cause::Rig)
+    };
+    let witnesses = checks.iter().filter(moves_badly);
+    let witnesses: Vec<String> = witnesses.map(|c| c.name.clone()).collect();
+    if witnesses.is_empty() {
+        return;
+    }
+    let made = |c: &&mut CheckResult| c.verdict.is_good() && c.skipped.is_none();
+    let presses = checks.iter_mut().filter(|c| c.name == PRESSES);
+    for press in presses.filter(made) {
+        press.verdict = TOUCH_ON_A_BAD_ARM.verdict;
+        press.cause = TOUCH_ON_A_BAD_ARM.cause;
+        press.rule = Some(TOUCH_ON_A_BAD_ARM.name.to_owned());
+        press.witnesses.clone_from(&witnesses);
     }
 }

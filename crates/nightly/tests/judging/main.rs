@@ -6,7 +6,7 @@ mod support;
 use proptest::prelude::*;
 use skinrig_model::Limit;
 use skinrig_nightly::judge::{RepeatRule, attempt};
-use skinrig_nightly::rules::{Case, GOLDEN_ON_A_BAD_RIG, RULES, WITNESSES, across, rule};
+use skinrig_nightly::rules::{ACROSS, Case, GOLDEN_ON_A_BAD_RIG, RULES, WITNESSES, across, rule};
 use skinrig_nightly::{Cause, Evidence, EvidenceKind, NightExit, Verdict};
 
 use support::{attempts, check, measured, part};
@@ -159,11 +159,44 @@ fn only_the_rigs_witnesses_speak_against_the_golden_skin() {
     assert!(!WITNESSES.contains(&"golden"));
 }
 
+/// Friction shifts the force at which a touch is detected: a good depth check beside it is not evidence of a good frame.
+#[test]
+fn touches_of_an_arm_that_moves_badly_are_inconclusive() {
+    for (name, verdict, cause, turns) in [
+        ("step_response", Verdict::Fail, Cause::Rig, true),
+        ("repeatability", Verdict::Invalid, Cause::Rig, true),
+        ("step_response", Verdict::Fail, Cause::Infrastructure, false),
+        ("step_response", Verdict::Marginal, Cause::Rig, false),
+        ("noise_lit", Verdict::Fail, Cause::Rig, false),
+    ] {
+        let arm = check(name, verdict, Some(cause));
+        let mut checks = [arm, check("depth", Verdict::Pass, None)];
+        across(&mut checks);
+        let expected = if turns {
+            (Verdict::Inconclusive, Some(Cause::Rig))
+        } else {
+            (Verdict::Pass, None)
+        };
+        assert_eq!((checks[1].verdict, checks[1].cause), expected, "{name}");
+        assert_eq!(checks[1].witnesses.is_empty(), !turns);
+    }
+    // A broken limit stays broken, and force_ceiling asks about the motors alone.
+    let arm = || check("step_response", Verdict::Fail, Some(Cause::Rig));
+    for other in [
+        check("depth", Verdict::Fail, Some(Cause::Rig)),
+        check("force_ceiling", Verdict::Pass, None),
+    ] {
+        let mut checks = [arm(), other.clone()];
+        across(&mut checks);
+        assert_eq!(checks[1], other);
+    }
+}
+
 /// The tables of the rules are in the documentation, word for word.
 #[test]
 fn the_documentation_has_the_rules() {
     let docs = include_str!("../../../../docs/nightly.md");
-    for r in RULES.iter().chain([&GOLDEN_ON_A_BAD_RIG]) {
+    for r in RULES.iter().chain(ACROSS) {
         let kinds: Vec<&str> = r.seen.iter().map(|k| k.name()).collect();
         let seen = if kinds.is_empty() {
             "other checks".to_owned()

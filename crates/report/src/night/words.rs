@@ -1,7 +1,7 @@
 //! Owns how a night is put into words: amounts with units, limits, where to look.
 
 use skinrig_model::Limit;
-use skinrig_nightly::rules::{GOLDEN_ON_A_BAD_RIG, RULES};
+use skinrig_nightly::rules::{ACROSS, RULES};
 use skinrig_nightly::{Cause, CheckResult, Measurement, Night, Verdict};
 
 use crate::format::{NONE, number};
@@ -87,10 +87,7 @@ pub(super) fn against(m: &Measurement) -> String {
 
 /// Why a rule says what it says.
 pub(super) fn reason(rule: &str) -> Option<&'static str> {
-    let named = RULES
-        .iter()
-        .chain([&GOLDEN_ON_A_BAD_RIG])
-        .find(|r| r.name == rule);
+    let named = RULES.iter().chain(ACROSS).find(|r| r.name == rule);
     named.map(|r| r.reason)
 }
 
