@@ -17,6 +17,7 @@ pub mod press;
 pub mod press_fault;
 pub mod pulse;
 pub mod range;
+pub use skinrig_settings::ValueRange;
 pub mod record;
 pub mod scene;
 pub mod settings;
@@ -38,7 +39,6 @@ pub use preflight::{CheckKind, CheckVerdict, PreflightCheck};
 pub use press::{PlannedPress, PressHistory, PressOutcome, PressRole, PressTiming, PressVerdict};
 pub use press_fault::PressFaultKind;
 pub use pulse::{Label, Mark, MarkKind, PulseTrain, SeenMark, SeenSync, SentMark};
-pub use range::ValueRange;
 pub use record::{
     DeviceIdentity, InterruptionKind, MotionCommand, Record, ResumeHeader, RunEnd, RunHeader,
     Setting,

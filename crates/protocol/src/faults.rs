@@ -6,9 +6,9 @@ use std::str::FromStr;
 use serde::Serialize;
 use skinrig_model::{CameraId, HostDuration};
 
-use crate::diagnostic::{Collector, closest};
-use crate::quantity::{self, Dimension};
 use crate::shape::{Field, Shape, Value};
+use skinrig_settings::{Collector, closest};
+use skinrig_settings::{Dimension, quantity};
 
 /// A fault that a run makes on purpose.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

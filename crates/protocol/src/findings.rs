@@ -3,11 +3,11 @@
 use std::collections::BTreeMap;
 
 use crate::check::{Violation, check};
-use crate::diagnostic::{Diagnostic, Diagnostics};
 use crate::plan::Plan;
 use crate::protocol::Protocol;
 use crate::shape::Field;
-use crate::source::{Location, Sources};
+use skinrig_settings::{Diagnostic, Diagnostics};
+use skinrig_settings::{Location, Sources};
 
 /// Every key that a [`Violation`] may name.
 const KEYS: &[&str] = &[

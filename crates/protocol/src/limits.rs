@@ -3,12 +3,13 @@
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
-use crate::build::{hex, open};
-use crate::diagnostic::{Diagnostics, did_you_mean, one_of};
+use crate::build::hex;
 use crate::keys::{count, default, optional, required};
-use crate::quantity::{self, Dimension};
-use crate::read::expectation;
-use crate::shape::{Field, Key, Need, Range, Shape, Table, Value};
+use crate::shape::{Field, Key, Keys, Need, Range, Shape, Table, Value};
+use skinrig_settings::expectation;
+use skinrig_settings::open;
+use skinrig_settings::{Diagnostics, did_you_mean, one_of};
+use skinrig_settings::{Dimension, quantity};
 
 /// The version of the language of limits that this crate reads.
 const VERSION: i64 = 1;

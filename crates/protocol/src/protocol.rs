@@ -9,13 +9,13 @@ use skinrig_model::{
 };
 
 use crate::area::Surroundings;
-use crate::diagnostic::Diagnostics;
 use crate::faults::PlantedFault;
 use crate::plan::{Plan, RunLimits};
 use crate::retakes::Retakes;
 use crate::surface::Surface;
 use crate::surface_check::SurfaceCheck;
 use crate::suspend::Suspend;
+use skinrig_settings::Diagnostics;
 
 /// Reads a file that a protocol names. The path is the protocol's folder joined with the name in the protocol.
 pub type Loader<'a> = &'a dyn Fn(&Path) -> std::io::Result<Vec<u8>>;
@@ -86,7 +86,7 @@ pub struct Protocol {
     pub cameras: [CameraRequest; 2],
     /// Where the keys stand that a plan may break.
     #[serde(skip)]
-    pub(crate) key_places: BTreeMap<&'static str, crate::source::Location>,
+    pub(crate) key_places: BTreeMap<&'static str, skinrig_settings::Location>,
 }
 
 /// Which skin is pressed.

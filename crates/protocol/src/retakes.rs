@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 use skinrig_model::{PressHistory, PressVerdict};
 
 use crate::keys::{count, default};
-use crate::shape::{Field, Key, Table};
+use crate::shape::{Field, Key, Keys, Table};
 
 /// How often a press that brought no data through no fault of the skin is taken again: at once, in place, as a new
 /// attempt. Which causes are meant stands in `docs/run-states.md`.

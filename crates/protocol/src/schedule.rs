@@ -6,12 +6,13 @@ use skinrig_model::{
     AnalysisSettings, HostDuration, HostTime, LocationId, PlannedPress, Point2, PressId, PressRole,
     PressTiming, RepetitionId, RigGeometry, StereoGeometry,
 };
+use skinrig_settings::open;
 
-use crate::build::{calibration_possible, nominal_camera, open, outline, roles, seconds};
-use crate::diagnostic::{Collector, Diagnostics};
+use crate::build::{calibration_possible, nominal_camera, outline, roles, seconds};
 use crate::keys::schedule::SCHEDULE;
 use crate::protocol::Prototype;
-use crate::shape::Field;
+use crate::shape::{Field, Keys};
+use skinrig_settings::{Collector, Diagnostics};
 
 /// A recording that was made without skinrig: what `skinrig import` needs to know about it.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -4,8 +4,8 @@ use serde::{Deserialize, Serialize};
 use skinrig_model::HostDuration;
 
 use crate::keys::{count, default};
-use crate::quantity::Dimension::{Force, Length, Speed, Time};
-use crate::shape::{Field, Key, Range, Shape, Table, Word};
+use crate::shape::{Field, Key, Keys, Range, Shape, Table, Word};
+use skinrig_settings::Dimension::{Force, Length, Speed, Time};
 
 /// Where a press takes the surface to be.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]

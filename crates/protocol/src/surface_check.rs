@@ -3,11 +3,11 @@
 use serde::{Deserialize, Serialize};
 use skinrig_model::Point2;
 
-use crate::diagnostic::Collector;
 use crate::keys::{POINT_ITEM, default, required};
-use crate::quantity::Dimension::Length;
-use crate::shape::{Field, Key, Range, Shape, Table, Word};
+use crate::shape::{Field, Key, Keys, Range, Shape, Table, Word};
 use crate::surface::{Surface, TouchSearch};
+use skinrig_settings::Collector;
+use skinrig_settings::Dimension::Length;
 
 /// The check of the surface. A touch farther than the tolerance from z = 0 of the frame ends the run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -4,10 +4,10 @@ use serde::{Deserialize, Serialize};
 use skinrig_model::HostDuration;
 
 use crate::build::seconds;
-use crate::diagnostic::Collector;
 use crate::keys::{default, optional};
-use crate::quantity::Dimension::{Data, DataRate, EventRate, Temperature, Time};
-use crate::shape::{Field, Key, Range, Shape, Table, Word};
+use crate::shape::{Field, Key, Keys, Range, Shape, Table, Word};
+use skinrig_settings::Collector;
+use skinrig_settings::Dimension::{Data, DataRate, EventRate, Temperature, Time};
 
 /// What suspends a run, and for how long. Nothing when no condition is given.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

@@ -10,124 +10,17 @@ use sha2::{Digest, Sha256};
 use skinrig_model::pulse::MAX_MARKED_PRESS;
 use skinrig_model::{HostDuration, PulseTrain};
 
-use crate::diagnostic::{Collector, Diagnostics};
 use crate::keys::PROTOCOL;
 use crate::protocol::{Loader, Protocol, Prototype, Sync};
-use crate::read::read_table;
-use crate::shape::{Field, Table};
-use crate::source::{Sources, Span};
+use crate::shape::{Field, Keys};
 use crate::surface::Surface;
 use crate::timing;
-use crate::yaml;
 pub(crate) use parts::{biases, calibration_possible, nominal_camera, outline, roi, roles};
 use parts::{camera, depths, marks, read_limits, read_motion, read_sync, scene, surroundings};
 pub(crate) use settings::analysis;
-
-/// Decodes a file, applies overrides and reads it by its table. `Err` only when there is nothing to go on with.
-pub(crate) fn open(
-    name: &str,
-    bytes: &[u8],
-    overrides: &[String],
-    table: &'static Table,
-) -> Result<(Collector, Option<Field>), Diagnostics> {
-    let mut sources = Sources::default();
-    let text = match yaml::decode(bytes) {
-        Ok(text) => text,
-        Err((at, found)) => {
-            let start = at.saturating_sub(200);
-            let valid = bytes.get(..at).unwrap_or(&[]);
-            let text = String::from_utf8_lossy(valid);
-            let source = sources.add(name, text.clone());
-            let mut out = Collector::new(sources);
-            let span = Span::new(source, text.len().max(start), text.len());
-            let limit = yaml::LARGEST_TEXT;
-            if bytes.len() > limit {
-                out.error(span, "", "the file is too large")
-                    .expected(format!("at most {limit} bytes"))
-                    .found(found);
-            } else {
-                let utf16 = bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]);
-                let help = if utf16 {
-                    "the file seems to be UTF-16; save it as UTF-8"
-                } else {
-                    "save the file as UTF-8"
-                };
-                out.error(span, "", "not UTF-8 text")
-                    .expected("UTF-8 text")
-                    .found(found)
-                    .help(help);
-            }
-            return Err(out.finish());
-        }
-    };
-    let source = sources.add(name, text);
-    let mut out = Collector::new(sources);
-    let Some(mut root) = yaml::parse(&mut out, source) else {
-        return Err(out.finish());
-    };
-    if let Some((place, other)) = other_language(&root, table) {
-        out.error(place, "", format!("this is not a {}", table.name))
-            .expected(format!("a {}", table.name))
-            .found(other);
-        return Err(out.finish());
-    }
-    if matches!(root.kind, yaml::Kind::Null) && out.is_clean() {
-        out.error(root.span, "", "the file is empty")
-            .expected(format!("a {}", table.name))
-            .found("nothing")
-            .help(format!(
-                "begin with `{}: 1`, or copy one of the shipped files",
-                version_key(table)
-            ));
-        return Err(out.finish());
-    }
-    crate::overrides::apply(&mut root, table, overrides, &mut out);
-    let field = read_table(&root, table, "", &mut out);
-    Ok((out, field))
-}
-
-/// Our languages: name of the table, key of the version, and what a file of it is in another one's place.
-const LANGUAGES: [(&str, &str, &str); 5] = [
-    ("protocol", "skinrig", "a protocol"),
-    (
-        "schedule",
-        "skinrig_schedule",
-        "a schedule, which only `skinrig import` reads",
-    ),
-    ("rig", "skinrig_rig", "a rig file, which belongs to `--rig`"),
-    (
-        "limits",
-        "skinrig_limits",
-        "a file of limits, which only `skinrig compare` reads",
-    ),
-    (
-        "suite",
-        "skinrig_suite",
-        "a suite, which only `skinrig hil run` reads",
-    ),
-];
-
-/// The key by which a file of `table` says which language it is in.
-fn version_key(table: &Table) -> &'static str {
-    LANGUAGES
-        .iter()
-        .find(|(name, ..)| *name == table.name)
-        .map_or("skinrig", |(_, key, _)| key)
-}
-
-/// The version key of another language, where the file has that and not its own, and what the file then is.
-fn other_language(root: &yaml::Node, table: &Table) -> Option<(Span, &'static str)> {
-    let yaml::Kind::Map(entries) = &root.kind else {
-        return None;
-    };
-    let given = |key: &str| entries.iter().find(|e| e.key == key);
-    if given(version_key(table)).is_some() {
-        return None;
-    }
-    LANGUAGES
-        .iter()
-        .find_map(|(_, key, what)| given(key).map(|e| (e.key_span, *what)))
-}
+use skinrig_settings::Span;
+use skinrig_settings::open;
+use skinrig_settings::{Collector, Diagnostics};
 
 /// Reads a protocol; see [`Protocol::parse`].
 pub(crate) fn protocol(

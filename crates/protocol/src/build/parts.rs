@@ -9,11 +9,11 @@ use skinrig_model::{
 
 use super::seconds;
 use crate::area::{Area, KeepOut, Surroundings};
-use crate::diagnostic::Collector;
 use crate::plan::{OnTrip, RunLimits};
 use crate::protocol::{CameraRequest, Motion, Pace, Scene, Sync};
-use crate::quantity::Dimension;
-use crate::shape::{Field, Value};
+use crate::shape::{Field, Keys, Value};
+use skinrig_settings::Collector;
+use skinrig_settings::Dimension;
 
 pub(super) fn scene(f: &Field, out: &mut Collector) -> Option<Scene> {
     let named = f.word("level").and_then(|w| w.parse::<SimLevel>().ok());

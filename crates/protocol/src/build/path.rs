@@ -8,11 +8,11 @@ use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use skinrig_model::Point2;
 
 use crate::area::Surroundings;
-use crate::diagnostic::Collector;
 use crate::protocol::Loader;
-use crate::shape::Field;
-use crate::source::Span;
-use crate::yaml;
+use crate::shape::{Field, Keys};
+use skinrig_settings::Collector;
+use skinrig_settings::Span;
+use skinrig_settings::quote;
 
 /// The kind of path and its locations in order.
 pub(crate) fn locations(
@@ -126,7 +126,7 @@ fn csv(f: &Field, folder: &Path, loader: Loader<'_>, out: &mut Collector) -> Opt
             return None;
         }
     };
-    let text = match yaml::decode(&bytes) {
+    let text = match skinrig_settings::decode(&bytes) {
         Ok(text) => text,
         Err((at, found)) => {
             out.error(
@@ -136,7 +136,7 @@ fn csv(f: &Field, folder: &Path, loader: Loader<'_>, out: &mut Collector) -> Opt
             )
             .expected(format!(
                 "UTF-8 text of at most {} bytes",
-                yaml::LARGEST_TEXT
+                skinrig_settings::LARGEST_TEXT
             ))
             .found(format!("{found} at byte {at} of {shown}"));
             return None;
@@ -203,7 +203,7 @@ fn csv_points(
                     format!("the column `{wanted}` is missing"),
                 )
                 .expected("a header line with `x` and `y`, separated by commas")
-                .found(yaml::quote(header));
+                .found(quote(header));
                 return None;
             }
         }
@@ -236,7 +236,7 @@ fn csv_points(
             (Err(text), _) | (_, Err(text)) => {
                 out.error(span, "", format!("row {row} holds no location"))
                     .expected("numbers within 1000 mm in the columns `x` and `y`")
-                    .found(yaml::quote(text));
+                    .found(quote(text));
                 clean = false;
             }
         }

@@ -6,8 +6,8 @@ use skinrig_model::{
     ReductionSettings, ThresholdRule, WindowAnchor,
 };
 
-use crate::diagnostic::Collector;
-use crate::shape::{Field, Value};
+use crate::shape::{Field, Keys, Value};
+use skinrig_settings::Collector;
 
 /// The settings that `f`, a mapping of the table `analysis`, stands for.
 pub(crate) fn analysis(f: &Field, out: &mut Collector) -> Option<AnalysisSettings> {

@@ -3,8 +3,8 @@
 use skinrig_model::range::analysis as limits;
 
 use super::{SEED, count, default, optional};
-use crate::quantity::Dimension::{Length, Pixels, Time};
 use crate::shape::{Range, Shape, Table, Word};
+use skinrig_settings::Dimension::{Length, Pixels, Time};
 
 pub(crate) const ROW: Shape = Shape::Quantity(&[Pixels], Range::between(0.0, 479.0));
 pub(crate) static ROW_ITEM: Shape = ROW;

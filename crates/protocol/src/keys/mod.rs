@@ -12,7 +12,6 @@ pub(crate) use path::UNITS;
 pub(crate) use run::{EVALUATION, ROI};
 
 use crate::faults::FAULT;
-use crate::quantity::Dimension::{Length, Speed, Time};
 use crate::retakes::RETAKES;
 use crate::shape::{Key, Need, Range, Shape, Table, Word};
 use crate::surface::PRESS;
@@ -21,6 +20,7 @@ use crate::suspend::SUSPEND;
 use frame::{FRAME, SYNC};
 use path::{ORDER, ORDER_TABLE, PATH, REPETITIONS};
 use run::{CAMERAS, LIMITS, MOTION, TRIGGERS};
+use skinrig_settings::Dimension::{Length, Speed, Time};
 
 /// The version of the protocol language that this crate reads.
 pub(crate) const VERSION: i64 = 1;

@@ -4,8 +4,8 @@ use super::{
     LENGTH, MOST_POINTS, POINT, POINT_ITEM, POSITIVE_LENGTH, SEED, SPAN, count, default, optional,
     required,
 };
-use crate::quantity::Dimension::Angle;
 use crate::shape::{Range, Shape, Table, Word};
+use skinrig_settings::Dimension::Angle;
 
 pub(crate) static PATH: Table = Table {
     name: "path",

@@ -4,8 +4,8 @@ use super::{
     DEPTH, PACE, POSITION, POSITIVE_LENGTH, POSITIVE_SPAN, SPAN, SPEED, count, default, optional,
     required,
 };
-use crate::quantity::Dimension::{Acceleration, Force, Length};
 use crate::shape::{Range, Shape, Table, Word};
+use skinrig_settings::Dimension::{Acceleration, Force, Length};
 
 pub(crate) static MOTION: Table = Table {
     name: "motion",

@@ -4,8 +4,8 @@ use crate::keys::{
     ANALYSIS, DEPTH, EVALUATION, MOST_POINTS, OUTLINE, OUTLINES, POINT, POSITIVE_SPAN, PROTOTYPE,
     SPAN, UNITS, VERSION, count, default, optional, required,
 };
-use crate::quantity::Dimension::{Angle, Time};
 use crate::shape::{Range, Shape, Table};
+use skinrig_settings::Dimension::{Angle, Time};
 
 /// A moment relative to the press time; may be before it.
 const MOMENT: Shape = Shape::Quantity(&[Time], Range::between(-3600.0, 3600.0));

@@ -7,10 +7,11 @@ use skinrig_model::HostDuration;
 
 use super::keys::RIG;
 use super::{Environment, PreflightLimits, RigFile, RigKind, camera, frame, hil, robot};
-use crate::build::{hex, open};
-use crate::diagnostic::{Collector, Diagnostics};
-use crate::shape::{Field, Value};
+use crate::build::hex;
+use crate::shape::{Field, Keys, Value};
 use crate::surface::surface;
+use skinrig_settings::open;
+use skinrig_settings::{Collector, Diagnostics};
 
 /// Where paths of a rig file lead.
 pub(super) struct Places<'a> {

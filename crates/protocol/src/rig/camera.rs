@@ -3,9 +3,9 @@
 use super::build::Places;
 use super::{BoxSetup, CameraSetup, SyncRole};
 use crate::build::{biases, nominal_camera, roi};
-use crate::diagnostic::Collector;
-use crate::shape::{Field, Value};
+use crate::shape::{Field, Keys, Value};
 use skinrig_model::Point2;
+use skinrig_settings::Collector;
 
 /// The EVK1's trigger input that its sync line uses when it is a slave.
 const AUXILIARY: u8 = 7;

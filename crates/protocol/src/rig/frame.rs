@@ -3,8 +3,8 @@
 use skinrig_model::{Point3, RigidTransform, Robot, Skin};
 
 use super::{Date, Frame, TouchOff, TouchedPoint, fit};
-use crate::diagnostic::Collector;
-use crate::shape::Field;
+use crate::shape::{Field, Keys};
+use skinrig_settings::Collector;
 
 /// Touched points must spread at least this far from a line, mm: a slip of 0.3 mm in one of them then tilts the
 /// skin by no more than 2 degrees.

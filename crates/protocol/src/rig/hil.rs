@@ -3,8 +3,8 @@
 use serde::Serialize;
 
 use super::build::Places;
-use crate::diagnostic::Collector;
 use crate::shape::Field;
+use skinrig_settings::Collector;
 
 /// What a suite of checks may do.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]

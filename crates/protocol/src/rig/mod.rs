@@ -18,8 +18,8 @@ use skinrig_model::{CameraModel, HostDuration, Point3, RigidTransform, Robot, Sk
 pub use date::Date;
 pub use hil::{Drill, HilSetup, Lamps};
 
-use crate::diagnostic::Diagnostics;
 use crate::surface::Surface;
+use skinrig_settings::Diagnostics;
 
 /// The value of an environment variable.
 pub type Environment<'a> = &'a dyn Fn(&str) -> Option<String>;

@@ -2,8 +2,8 @@
 
 use super::build::Places;
 use super::{BenchLimits, RobotSetup, Tip};
-use crate::diagnostic::Collector;
-use crate::shape::Field;
+use crate::shape::{Field, Keys};
+use skinrig_settings::Collector;
 
 /// One step of the controller's watchdog, s.
 const WATCHDOG_STEP_S: f64 = 125e-6;

@@ -7,9 +7,10 @@ use skinrig_model::HostDuration;
 
 use super::keys::{CATALOGUE, Entry, SUITE};
 use super::{Check, Light, Measure, Repeats, Suite, limits};
-use crate::build::{hex, open};
-use crate::diagnostic::{Collector, Diagnostics, one_of};
-use crate::shape::Field;
+use crate::build::hex;
+use crate::shape::{Field, Keys};
+use skinrig_settings::open;
+use skinrig_settings::{Collector, Diagnostics, one_of};
 
 /// Reads a suite; see [`Suite::parse`].
 pub(super) fn suite(name: &str, bytes: &[u8]) -> Result<Suite, Diagnostics> {

@@ -3,8 +3,8 @@
 use super::Metric;
 use super::limits::{COUNT, DATA, DRIFT, EVENTS, FORCE, LENGTH, RATE, SHARE, TIME, limit, metric};
 use crate::keys::{count, default, optional, required};
-use crate::quantity::Dimension;
 use crate::shape::{Key, Range, Shape, Table};
+use skinrig_settings::Dimension;
 
 /// The version of the language of suites that this crate reads.
 const VERSION: i64 = 1;

@@ -3,12 +3,12 @@
 use skinrig_model::Limit;
 
 use super::Metric;
-use crate::diagnostic::Collector;
 use crate::keys::optional;
-use crate::quantity::Dimension::{
+use crate::shape::{Field, Key, Range, Shape, Table, Value};
+use skinrig_settings::Collector;
+use skinrig_settings::Dimension::{
     self, Data, DataRate, Drift, EventRate, Force, Length, Share, Time,
 };
-use crate::shape::{Field, Key, Range, Shape, Table, Value};
 
 /// A metric: the key of its limit in the check's table, and what people are shown.
 pub(super) const fn metric(name: &'static str, title: &'static str, unit: &'static str) -> Metric {

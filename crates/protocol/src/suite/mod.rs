@@ -10,7 +10,7 @@ use std::path::PathBuf;
 use serde::Serialize;
 use skinrig_model::{HostDuration, Limit};
 
-use crate::diagnostic::Diagnostics;
+use skinrig_settings::Diagnostics;
 
 /// A suite that was read and checked.
 #[derive(Debug, Clone, PartialEq, Serialize)]

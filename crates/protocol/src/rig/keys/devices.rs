@@ -3,8 +3,8 @@
 use super::{ANGLE, MASS};
 use crate::keys::schedule::CAMERA as NOMINAL_CAMERA;
 use crate::keys::{ROI, count, default, optional, required};
-use crate::quantity::Dimension::{Acceleration, EventRate, Force, Jerk, Time};
 use crate::shape::{Range, Shape, Table, Word};
+use skinrig_settings::Dimension::{Acceleration, EventRate, Force, Jerk, Time};
 
 pub(super) static ROBOT: Table = Table {
     name: "robot",

@@ -3,9 +3,9 @@
 mod devices;
 
 use crate::keys::{count, default, optional, required};
-use crate::quantity::Dimension::{Angle, Data, DataRate, Force, Length, Mass, Speed, Time};
 use crate::shape::{Range, Shape, Table, Word};
 use devices::{CAMERAS, ROBOT, TRIGGER_BOX};
+use skinrig_settings::Dimension::{Angle, Data, DataRate, Force, Length, Mass, Speed, Time};
 
 /// The version of the rig file's language that this crate reads.
 pub(crate) const VERSION: i64 = 1;

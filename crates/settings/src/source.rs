@@ -2,7 +2,7 @@
 
 /// A range of bytes of one source text.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) struct Span {
+pub struct Span {
     /// Index into [`Sources`].
     pub source: usize,
     /// First byte.
@@ -29,7 +29,7 @@ struct Source {
 
 /// All texts that diagnostics can point into.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Sources {
+pub struct Sources {
     list: Vec<Source>,
 }
 

@@ -1,8 +1,10 @@
 //! Reads a node tree by its table: every structural error at once, and the values that could be read.
 
 use crate::diagnostic::{Collector, did_you_mean, one_of};
+use crate::field::{Field, Value};
 use crate::quantity::{self, Dimension};
-use crate::shape::{Field, Key, Need, Range, Shape, Table, Value, Word};
+use crate::range::ValueRange;
+use crate::shape::{Key, Need, Shape, Table, Word};
 use crate::source::{Sources, Span};
 use crate::yaml::{Kind, Node, join, quote};
 
@@ -326,7 +328,7 @@ fn whole(
 
 fn number(
     text: &str,
-    range: &Range,
+    range: &ValueRange,
     node: &Node,
     path: &str,
     out: &mut Collector,
@@ -348,7 +350,7 @@ fn number(
 fn measured(
     text: &str,
     wanted: &[Dimension],
-    range: &Range,
+    range: &ValueRange,
     node: &Node,
     path: &str,
     out: &mut Collector,
@@ -428,7 +430,8 @@ fn key_names(table: &Table) -> String {
 }
 
 /// A shape in words, for "expected".
-pub(crate) fn expectation(shape: &Shape) -> String {
+#[must_use]
+pub fn expectation(shape: &Shape) -> String {
     match shape {
         Shape::Text => "a text".to_owned(),
         Shape::Whole { min, max: i64::MAX } => {
@@ -460,7 +463,8 @@ pub(crate) fn expectation(shape: &Shape) -> String {
 }
 
 /// A value of this shape that could be typed.
-fn example(shape: &Shape) -> String {
+#[must_use]
+pub fn example(shape: &Shape) -> String {
     match shape {
         Shape::Text => "...".to_owned(),
         Shape::Whole { min, .. } => min.max(&1).to_string(),

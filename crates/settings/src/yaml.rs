@@ -9,7 +9,7 @@ use crate::diagnostic::Collector;
 use crate::source::Span;
 
 /// Largest accepted text, bytes.
-pub(crate) const LARGEST_TEXT: usize = 4 << 20;
+pub const LARGEST_TEXT: usize = 4 << 20;
 /// Deepest accepted nesting. Protocols need six levels.
 const DEEPEST: usize = 32;
 /// Most keys of one mapping; the largest of a protocol has about twenty.
@@ -62,7 +62,7 @@ impl Node {
 }
 
 /// The text in backticks, shortened.
-pub(crate) fn quote(text: &str) -> String {
+pub fn quote(text: &str) -> String {
     let line: String = text
         .chars()
         .map(|c| if c.is_control() { ' ' } else { c })
@@ -75,8 +75,11 @@ pub(crate) fn quote(text: &str) -> String {
     }
 }
 
-/// Checks `bytes` for size and encoding; findings go to `collector` as source number `source`.
-pub(crate) fn decode(bytes: &[u8]) -> Result<&str, (usize, String)> {
+/// The text of a file.
+///
+/// # Errors
+/// The first wrong byte and what was found there: more than [`LARGEST_TEXT`] bytes, no UTF-8.
+pub fn decode(bytes: &[u8]) -> Result<&str, (usize, String)> {
     if bytes.len() > LARGEST_TEXT {
         return Err((0, format!("a file of {} bytes", bytes.len())));
     }

@@ -31,7 +31,7 @@ pub struct Diagnostics {
 
 impl Diagnostics {
     /// These findings, in this order.
-    pub(crate) fn new(list: Vec<Diagnostic>) -> Self {
+    pub fn new(list: Vec<Diagnostic>) -> Self {
         Self { list }
     }
 
@@ -144,7 +144,7 @@ impl Paint {
 const MOST_FINDINGS: usize = 100;
 
 /// Collects findings about some sources.
-pub(crate) struct Collector {
+pub struct Collector {
     /// The texts.
     pub sources: Sources,
     /// True for the text of a recording, which may be older than today's keys.
@@ -153,7 +153,7 @@ pub(crate) struct Collector {
 }
 
 /// A finding under construction; it is already in the collector.
-pub(crate) struct Finding<'a>(Option<&'a mut Diagnostic>);
+pub struct Finding<'a>(Option<&'a mut Diagnostic>);
 
 impl Finding<'_> {
     /// What would have been accepted.
@@ -231,7 +231,14 @@ impl Collector {
         }
     }
 
+    /// How many findings there are.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.found.len()
+    }
+
     /// True when nothing is wrong so far.
+    #[must_use]
     pub fn is_clean(&self) -> bool {
         self.found.is_empty()
     }
@@ -247,10 +254,7 @@ impl Collector {
 }
 
 /// The candidate that looks most like `word`, when one is close enough to be a slip.
-pub(crate) fn closest<'a>(
-    word: &str,
-    candidates: impl IntoIterator<Item = &'a str>,
-) -> Option<&'a str> {
+pub fn closest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     const LONGEST: usize = 64;
     if word.len() > LONGEST {
         return None;
@@ -269,7 +273,7 @@ pub(crate) fn closest<'a>(
 }
 
 /// `did you mean X?` for the candidate that looks most like `word`.
-pub(crate) fn did_you_mean<'a>(
+pub fn did_you_mean<'a>(
     word: &str,
     candidates: impl IntoIterator<Item = &'a str>,
 ) -> Option<String> {
@@ -277,7 +281,7 @@ pub(crate) fn did_you_mean<'a>(
 }
 
 /// `a`, `b` or `c`.
-pub(crate) fn one_of<'a>(words: impl IntoIterator<Item = &'a str>) -> String {
+pub fn one_of<'a>(words: impl IntoIterator<Item = &'a str>) -> String {
     let words: Vec<String> = words.into_iter().map(|w| format!("`{w}`")).collect();
     match words.as_slice() {
         [] => "nothing".to_owned(),

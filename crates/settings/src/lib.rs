@@ -1,0 +1,54 @@
+//! Files of settings. Each key is declared once, by the struct that holds it; text is read with places and help.
+//!
+//! A struct with `#[derive(Settings)]` is a mapping of a YAML file: a field gives the key's name, unit, range, default and
+//! documentation. From that one declaration come the reader ([`open`]), `--set`, the JSON Schema ([`schema_json`]), the
+//! `Default` of the struct, the check of a value that was built in code ([`Settings::out_of_range`]) and
+//! the rows of a page that shows it ([`Settings::rows`]). An enum with `#[derive(Choice)]` is a key with a choice of words.
+//!
+//! ```
+//! use skinrig_settings::{Choice, Settings};
+//!
+//! /// When a pose counts as settled.
+//! #[derive(Debug, PartialEq, Settings)]
+//! #[settings(name = "settle")]
+//! struct Settle {
+//!     /// Largest distance from the target.
+//!     #[setting(default = "0.05 mm", above = 0.0, max = 10.0)]
+//!     tolerance_mm: f64,
+//!     /// Samples in a row.
+//!     #[setting(default = "3", min = 1, max = 100)]
+//!     samples: u32,
+//! }
+//!
+//! assert_eq!(Settle::default(), Settle { tolerance_mm: 0.05, samples: 3 });
+//! ```
+//!
+//! The name of a field ends in its unit, and the key is the name without it: `tolerance_mm` is the key `tolerance`, a length in
+//! mm. Units: `mm`, `s`, `ms`, `us`, `mm_s`, `mm_s2`, `mm_s3`, `n`, `deg`, `hz`, `px`, `kg`, `ev_s`, `b`, `b_s`, `percent`,
+//! `deg_c`, `ppm`. A range is in the unit of the field.
+
+mod diagnostic;
+mod field;
+mod language;
+mod overrides;
+pub mod quantity;
+mod range;
+mod read;
+mod schema;
+mod setting;
+mod shape;
+mod source;
+mod yaml;
+
+pub use diagnostic::{Collector, Diagnostic, Diagnostics, Finding, closest, did_you_mean, one_of};
+pub use field::{Field, Value};
+pub use language::open;
+pub use quantity::Dimension;
+pub use range::ValueRange;
+pub use read::{example, expectation};
+pub use schema::schema_json;
+pub use setting::{Choice, OutOfRange, Row, Setting, Settings, in_unit, key_path, whole_units};
+pub use shape::{Key, Need, Shape, Table, Word};
+pub use skinrig_settings_derive::{Choice, Settings};
+pub use source::{Location, Sources, Span};
+pub use yaml::{LARGEST_TEXT, decode, quote};

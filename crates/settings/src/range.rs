@@ -1,0 +1,79 @@
+//! Ranges of values.
+
+/// The values that a setting may have, in the unit of the setting.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ValueRange {
+    /// Smallest value.
+    pub min: f64,
+    /// True when `min` itself is not allowed.
+    pub above: bool,
+    /// Largest value, itself allowed.
+    pub max: f64,
+}
+
+impl ValueRange {
+    /// From `min` to `max`, both allowed.
+    #[must_use]
+    pub const fn between(min: f64, max: f64) -> Self {
+        Self {
+            min,
+            above: false,
+            max,
+        }
+    }
+
+    /// More than `min`, up to `max`.
+    #[must_use]
+    pub const fn above(min: f64, max: f64) -> Self {
+        Self {
+            min,
+            above: true,
+            max,
+        }
+    }
+
+    /// More than 0, up to `max`.
+    #[must_use]
+    pub const fn above_zero(max: f64) -> Self {
+        Self::above(0.0, max)
+    }
+
+    /// From 0 to `max`, both allowed.
+    #[must_use]
+    pub const fn from_zero(max: f64) -> Self {
+        Self::between(0.0, max)
+    }
+
+    /// True for an allowed value; never for NaN.
+    #[must_use]
+    pub const fn contains(&self, value: f64) -> bool {
+        value <= self.max
+            && if self.above {
+                value > self.min
+            } else {
+                value >= self.min
+            }
+    }
+
+    /// The same range in a unit that is `factor` times as large.
+    #[must_use]
+    pub const fn in_units_of(self, factor: f64) -> Self {
+        Self {
+            min: self.min / factor,
+            above: self.above,
+            max: self.max / factor,
+        }
+    }
+
+    /// In words, for messages: `more than 0 px and at most 50 px`. `unit` may be empty.
+    #[must_use]
+    pub fn describe(&self, unit: &str) -> String {
+        let unit = if unit.is_empty() {
+            String::new()
+        } else {
+            format!(" {unit}")
+        };
+        let low = if self.above { "more than" } else { "at least" };
+        format!("{low} {}{unit} and at most {}{unit}", self.min, self.max)
+    }
+}

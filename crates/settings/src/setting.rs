@@ -1,0 +1,187 @@
+//! Types that can be the value of a key, and structs that declare the keys of a mapping.
+
+use std::collections::BTreeMap;
+
+use crate::diagnostic::Collector;
+use crate::field::{Field, Value};
+use crate::shape::{Shape, Table, Word};
+use crate::yaml::join;
+
+/// A struct whose fields are the keys of a mapping; see the [crate] for how `#[derive(Settings)]` declares them.
+pub trait Settings: Sized {
+    /// Its keys.
+    const TABLE: &'static Table;
+
+    /// Reads a mapping that was read by [`Settings::TABLE`]. `None` when a required key is missing or a check fails; each
+    /// reason is in `out`.
+    fn from_mapping(field: &Field, out: &mut Collector) -> Option<Self>;
+
+    /// Adds one row per value, nested mappings included. `path` is the key path of this mapping, empty for a whole file.
+    fn add_rows(&self, path: &str, rows: &mut Vec<Row>);
+
+    /// One row per value, in the order of the declaration.
+    #[must_use]
+    fn rows(&self) -> Vec<Row> {
+        let mut rows = Vec::new();
+        self.add_rows("", &mut rows);
+        rows
+    }
+
+    /// The first value outside its declared range, of a value that was built in code instead of being read.
+    #[must_use]
+    fn out_of_range(&self) -> Option<OutOfRange> {
+        self.rows().into_iter().find_map(|row| {
+            Some(OutOfRange {
+                expected: row.expected?,
+                key: row.key,
+                found: row.value,
+            })
+        })
+    }
+}
+
+/// A value as it is typed in a file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Row {
+    /// Key path, for example `latency.bin`.
+    pub key: String,
+    /// Documentation of the key.
+    pub doc: &'static str,
+    /// The value with its unit, for example `0.2 ms`; empty for an optional key that is absent.
+    pub value: String,
+    /// The declared range, when the value is outside it.
+    pub expected: Option<String>,
+}
+
+/// A value outside its declared range.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct OutOfRange {
+    /// Key path.
+    pub key: String,
+    /// The range, for example `more than 0 px and at most 50 px`.
+    pub expected: String,
+    /// The value with its unit.
+    pub found: String,
+}
+
+/// A type that can be the value of a key.
+pub trait Setting: Sized {
+    /// The form of the value.
+    const SHAPE: Shape;
+
+    /// The value of a field that was read by [`Setting::SHAPE`]. `None` when a check fails; the reason is in `out`.
+    fn from_field(field: &Field, out: &mut Collector) -> Option<Self>;
+
+    /// The value as it is typed.
+    fn text(&self) -> String;
+
+    /// Adds the rows of the value at the key path `key`: one, unless it is a mapping.
+    fn add_rows(&self, key: &str, doc: &'static str, rows: &mut Vec<Row>) {
+        rows.push(Row {
+            key: key.to_owned(),
+            doc,
+            value: self.text(),
+            expected: None,
+        });
+    }
+}
+
+/// A choice of words: an enum with `#[derive(Choice)]`. A variant's word is its name in snake case, its documentation the
+/// meaning of the word.
+pub trait Choice: Copy + 'static {
+    /// Every variant, in the order of the declaration.
+    const ALL: &'static [Self];
+    /// The words and their meanings, in the same order.
+    const WORDS: &'static [Word];
+
+    /// The variant's word.
+    fn word(self) -> &'static str;
+
+    /// The variant of a word.
+    #[must_use]
+    fn from_word(word: &str) -> Option<Self> {
+        Self::ALL.iter().copied().find(|v| v.word() == word)
+    }
+}
+
+impl Setting for String {
+    const SHAPE: Shape = Shape::Text;
+
+    fn from_field(field: &Field, _: &mut Collector) -> Option<Self> {
+        field.as_text().map(str::to_owned)
+    }
+
+    fn text(&self) -> String {
+        self.clone()
+    }
+}
+
+impl Setting for bool {
+    const SHAPE: Shape = Shape::Flag;
+
+    fn from_field(field: &Field, _: &mut Collector) -> Option<Self> {
+        field.as_flag()
+    }
+
+    fn text(&self) -> String {
+        self.to_string()
+    }
+}
+
+/// Values by free names, such as biases.
+impl Setting for BTreeMap<String, i64> {
+    const SHAPE: Shape = Shape::Named(&Shape::Whole {
+        min: i32::MIN as i64,
+        max: i32::MAX as i64,
+    });
+
+    fn from_field(field: &Field, _: &mut Collector) -> Option<Self> {
+        let entries = field.entries().iter();
+        entries
+            .map(|(name, value)| Some((name.clone(), value.as_whole()?)))
+            .collect()
+    }
+
+    fn text(&self) -> String {
+        let entries: Vec<String> = self.iter().map(|(k, v)| format!("{k}: {v}")).collect();
+        format!("{{{}}}", entries.join(", "))
+    }
+}
+
+/// A quantity of a dimension's own unit in another unit, of which `per` make one: seconds to milliseconds with 1000. Times are
+/// rounded to whole nanoseconds, which removes the last-bit noise of the factor.
+#[must_use]
+pub fn in_unit(value: f64, per: f64) -> f64 {
+    const STEPS: f64 = 1e9;
+    if per == 1.0 {
+        value
+    } else {
+        (value * STEPS).round() / (STEPS / per)
+    }
+}
+
+/// A quantity as a whole number of a unit, of which `per` make one of the dimension's own. `None` with a finding for a fraction.
+pub fn whole_units(field: &Field, unit: &str, per: f64, out: &mut Collector) -> Option<i64> {
+    let Value::Quantity(value, _) = field.value else {
+        return None;
+    };
+    let found = value * per;
+    if (found - found.round()).abs() > 1e-6 {
+        out.error(
+            field.span,
+            field.path.as_str(),
+            "not a whole number of its unit",
+        )
+        .expected(format!("whole {unit}, such as `{} {unit}`", found.ceil()))
+        .found(format!("{found} {unit}"));
+        return None;
+    }
+    Some(found.round() as i64)
+}
+
+/// The key path of `name` in the mapping at `path`.
+#[doc(hidden)]
+#[must_use]
+pub fn key_path(path: &str, name: &str) -> String {
+    join(path, name)
+}
