@@ -4,6 +4,7 @@ use std::fmt;
 
 use serde::de::{Error as _, Unexpected};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use skinrig_settings::{Collector, Field, Setting, Shape};
 
 /// One of the two event cameras. The paper's camera 1 sits at negative y, camera 2 at positive y of the
 /// skin's right edge (paper, section "Geometric Triangulation").
@@ -211,6 +212,22 @@ pub struct AttemptId {
 impl fmt::Display for AttemptId {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} (attempt {})", self.press, self.number)
+    }
+}
+
+impl Setting for PressId {
+    const SHAPE: Shape = Shape::Whole {
+        min: 1,
+        max: 10_000_000,
+    };
+
+    fn from_field(field: &Field, _: &mut Collector) -> Option<Self> {
+        let number = u32::try_from(field.as_whole()?).ok()?;
+        Self::from_number(number)
+    }
+
+    fn text(&self) -> String {
+        self.number().to_string()
     }
 }
 

@@ -6,9 +6,10 @@
 //! half field of view H and W describe different things.
 
 use serde::{Deserialize, Serialize};
+use skinrig_settings::Choice;
 
 /// How a column becomes an angle before distortion. See [`LensModel`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, Choice)]
 #[serde(rename_all = "snake_case")]
 pub enum LensKind {
     /// The paper's: equidistant with an exponential falloff.

@@ -16,8 +16,6 @@ pub mod preflight;
 pub mod press;
 pub mod press_fault;
 pub mod pulse;
-pub mod range;
-pub use skinrig_settings::ValueRange;
 pub mod record;
 pub mod scene;
 pub mod settings;

@@ -1,14 +1,21 @@
-//! Settings of an analysis: everything that can change its numbers.
+//! Settings of an analysis: everything that can change its numbers, each declared once.
 
 use serde::{Deserialize, Serialize};
+use skinrig_settings::{Choice, Collector, Field, Setting, Settings, ValueRange};
 
 use crate::camera::StereoGeometry;
 use crate::id::PressId;
 use crate::lens::LensKind;
 use crate::skin::SkinOutline;
 
+/// Times are kept in whole nanoseconds.
+const NANOSECOND_MS: f64 = 1e-6;
+/// A window of ten seconds is longer than any press.
+const WINDOW_MARGIN_MS: ValueRange = ValueRange::between(0.0, 10_000.0);
+const SHARE: ValueRange = ValueRange::between(0.0, 1.0);
+
 /// Which clustered events make the centroid of a press.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, Choice)]
 #[serde(rename_all = "snake_case")]
 pub enum CentroidRule {
     /// The largest cluster, as the paper says.
@@ -19,22 +26,22 @@ pub enum CentroidRule {
 }
 
 /// What turns the events of a press in one camera into a column.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, Choice)]
 #[serde(rename_all = "snake_case")]
 pub enum Estimator {
-    /// Mean of clustered events, as the paper says.
+    /// Mean of the clustered events, as the paper says.
     #[default]
     Dbscan,
     /// Median column of all events.
     ColumnMedian,
-    /// Peak of the smoothed histogram of columns, between pixels.
+    /// Peak of the histogram of columns, smoothed by `eps`, between pixels.
     HistogramPeak,
-    /// A histogram of 40 columns that forgets, updated event by event in constant memory.
+    /// A running histogram of 40 columns that forgets, in constant memory.
     Streaming,
 }
 
-/// Width of the floating-point numbers of an estimator. Estimators that count in whole numbers know no difference.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+/// Width of the floating-point numbers of an estimator. Estimators that count in whole numbers do not depend on it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, Choice)]
 #[serde(rename_all = "snake_case")]
 pub enum Precision {
     /// 64 bits.
@@ -45,27 +52,26 @@ pub enum Precision {
 }
 
 /// Which nested camera model is calibrated.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, Choice)]
 #[serde(rename_all = "snake_case")]
 pub enum CalibrationModel {
-    /// Use the starting geometry as it is.
+    /// Use the nominal geometry as it is.
     None,
-    /// Two positions (4 parameters).
+    /// Both positions: 4 parameters.
     Positions,
-    /// Positions and skews (6).
+    /// Positions and skews: 6 parameters.
     PositionsSkews,
-    /// Positions, skews and distortions: the paper's eight.
+    /// Positions, skews and distortions: the paper's 8.
     Full,
-    /// The eight and a scale of the field of view per camera (10).
+    /// The 8 and a scale of the field of view per camera: 10.
     FullScale,
-    /// The smallest of the models above that no larger one beats at places left out of the fit, by more than noise
-    /// explains.
+    /// The smallest of them that no larger one beats at locations left out of the fit, by more than noise explains.
     #[default]
     Auto,
 }
 
-/// How the least number of cluster events for a press to count is found.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+/// How the least number of clustered events of a press is found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, Choice)]
 #[serde(rename_all = "snake_case")]
 pub enum ThresholdRule {
     /// Chosen on the calibrating presses alone; never below `min_cluster_events`.
@@ -76,311 +82,413 @@ pub enum ThresholdRule {
 }
 
 /// Where a press window is anchored.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, Choice)]
 #[serde(rename_all = "snake_case")]
 pub enum WindowAnchor {
-    /// From `window_before_ms` before the measured contact to `window_after_ms` after the measured release.
+    /// From `window_before` before the measured contact to `window_after` after the measured release.
     #[default]
     Touch,
-    /// From `window_before_ms` before the middle between contact and release to `window_after_ms` after it, as the
-    /// public code does.
+    /// About the middle between contact and release, as the public code does.
     Middle,
 }
 
-/// Where the background of the latency detector is taken from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+/// Where the background rate of the latency detector is taken from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, Choice)]
 #[serde(rename_all = "snake_case")]
 pub enum Background {
-    /// The idle time before the press, as the paper says.
+    /// Idle time before the press, as the paper says.
     #[default]
     Before,
     /// 1.5 s to 2.4 s after the middle of the press, as the public code does.
     After,
 }
 
-/// The data-reduction study.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+/// Localisation on thinned events.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default)]
+#[settings(name = "reduction")]
 pub struct ReductionSettings {
-    /// Thinning factors 2^0 ..= 2^this (0..=20; the paper: 10).
+    /// Thinning factors 1, 2, 4 ... up to 2 to this power; the paper's 10.
+    #[setting(default = "12", max = 20)]
     pub max_power: u32,
-    /// Random seeds per factor and kind of thinning, at least 1.
+    /// Random seeds per factor and kind of thinning.
+    #[setting(default = "10", min = 1, max = 1000)]
     pub seeds: u32,
-    /// DBSCAN core threshold for all factors; 0: that of the analysis. The public code: 1.
+    /// Core threshold of DBSCAN at all factors; 0 takes that of the analysis. The public code: 1.
+    #[setting(default = "0", max = 1_000_000)]
     pub min_samples: u32,
 }
 
-impl Default for ReductionSettings {
-    fn default() -> Self {
-        Self {
-            max_power: 12,
-            seeds: 10,
-            min_samples: 0,
-        }
-    }
-}
-
-/// The detection-latency study: a one-sided CUSUM on binned, smoothed event counts of both cameras.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+/// A one-sided CUSUM on the binned, smoothed event counts of both cameras.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default)]
+#[settings(name = "latency")]
 pub struct LatencySettings {
-    /// Width of a bin, ms (paper: 0.2).
+    /// Width of a bin; the paper's 0.2 ms.
+    #[setting(default = "0.2 ms", min = 0.01, max = 10.0)]
     pub bin_ms: f64,
-    /// Standard deviation of the Gaussian kernel, ms (paper: 0.5).
+    /// Standard deviation of the Gaussian kernel; the paper's 0.5 ms.
+    #[setting(default = "0.5 ms", max = 50.0)]
     pub sigma_ms: f64,
-    /// Rate increase that the detector is tuned to (paper: 4).
+    /// Rate increase that the detector is tuned to; the paper's 4.
+    #[setting(default = "4", min = 1.01, max = 1000.0)]
     pub alpha: f64,
-    /// Bins in a row that must be above the threshold (paper: 3).
+    /// Bins in a row above the threshold; the paper's 3.
+    #[setting(default = "3", min = 1, max = 1000)]
     pub consecutive: u32,
-    /// Thresholds h that are tried, first and last (public code: 17 to 19 at full data; the paper reports 1).
-    pub threshold_range: (f64, f64),
-    /// How many thresholds, evenly spaced, both ends included.
-    pub thresholds: u32,
-    /// The threshold chosen has the fewest false alarms among those that detect at least this share (paper: 0.95).
+    /// The thresholds h that are tried.
+    #[setting(default)]
+    pub thresholds: ThresholdGrid,
+    /// The threshold with the fewest false alarms is chosen among those that detect at least this share; the paper's 0.95.
+    #[setting(default = "0.95", range = SHARE)]
     pub target_rate: f64,
-    /// A detection counts when it lies within this of the median onset, ms (paper: 100).
+    /// A detection counts when it lies within this of the median onset; the paper's 100 ms.
+    #[setting(default = "100 ms", min = NANOSECOND_MS, max = 10_000.0)]
     pub window_ms: f64,
-    /// Where the background comes from.
+    /// Where the background rate is taken from.
+    #[setting(default = "before")]
     pub background: Background,
     /// The same study on thinned events.
+    #[setting(default)]
     pub reduced: ReducedLatencySettings,
 }
 
-impl Default for LatencySettings {
-    fn default() -> Self {
-        Self {
-            bin_ms: 0.2,
-            sigma_ms: 0.5,
-            alpha: 4.0,
-            consecutive: 3,
-            threshold_range: (1.0, 20.0),
-            thresholds: 20,
-            target_rate: 0.95,
-            window_ms: 100.0,
-            background: Background::Before,
-            reduced: ReducedLatencySettings::default(),
-        }
-    }
+/// Evenly spaced thresholds, both ends included. The public code tries 17 to 19 on all events; the paper reports 1.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, Settings)]
+#[serde(default)]
+#[settings(name = "thresholds", finish = Self::in_order)]
+pub struct ThresholdGrid {
+    /// The first.
+    #[setting(default = "1", above = 0.0, max = 1e6)]
+    pub from: f64,
+    /// The last.
+    #[setting(default = "20", above = 0.0, max = 1e6)]
+    pub to: f64,
+    /// How many.
+    #[setting(default = "20", min = 1, max = 1000)]
+    pub count: u32,
 }
 
-/// The detection-latency study on thinned events: what differs from the study on all of them.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+/// What differs from the study on all events.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default)]
+#[settings(name = "reduced")]
 pub struct ReducedLatencySettings {
-    /// Thinning factor k, at least 1 (paper, "Data Ablation and Latency Distribution Analysis": 1024).
+    /// Of the events of a trial and of its background one in this many is used, chosen at random; the paper's 1024
+    /// ("Data Ablation and Latency Distribution Analysis").
+    #[setting(default = "1024", min = 1, max = 1_048_576)]
     pub factor: u32,
-    /// Thresholds h that are tried, first and last (public code: 3 to 8; the paper reports 3).
-    pub threshold_range: (f64, f64),
-    /// How many thresholds, evenly spaced, both ends included (public code: 6).
-    pub thresholds: u32,
-    /// The threshold chosen has the fewest false alarms among those that detect at least this share (public code: 0.85).
+    /// The thresholds h that are tried.
+    #[setting(default)]
+    pub thresholds: ReducedThresholdGrid,
+    /// The threshold with the fewest false alarms is chosen among those that detect at least this share; the public code's 0.85.
+    #[setting(default = "0.85", range = SHARE)]
     pub target_rate: f64,
 }
 
-impl Default for ReducedLatencySettings {
-    fn default() -> Self {
-        Self {
-            factor: 1024,
-            threshold_range: (3.0, 8.0),
-            thresholds: 6,
-            target_rate: 0.85,
+/// Evenly spaced thresholds for thinned events, both ends included; the public code's 3 to 8. The paper reports 3.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, Settings)]
+#[serde(default)]
+#[settings(name = "reduced_thresholds", finish = Self::in_order)]
+pub struct ReducedThresholdGrid {
+    /// The first.
+    #[setting(default = "3", above = 0.0, max = 1e6)]
+    pub from: f64,
+    /// The last.
+    #[setting(default = "8", above = 0.0, max = 1e6)]
+    pub to: f64,
+    /// How many.
+    #[setting(default = "6", min = 1, max = 1000)]
+    pub count: u32,
+}
+
+impl ThresholdGrid {
+    fn in_order(self, field: &Field, out: &mut Collector) -> Option<Self> {
+        if self.from > self.to {
+            out.error(field.span, field.path.as_str(), "no thresholds are left")
+                .expected("the first threshold at or below the last")
+                .found(format!("{} to {}", self.from, self.to));
+            return None;
         }
+        Some(self)
     }
 }
 
-/// The contact map reconstruction error. None of these values is published: see `docs/paper.md`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+impl ReducedThresholdGrid {
+    fn in_order(self, field: &Field, out: &mut Collector) -> Option<Self> {
+        ThresholdGrid::from(self).in_order(field, out).map(|_| self)
+    }
+}
+
+impl From<ReducedThresholdGrid> for ThresholdGrid {
+    fn from(grid: ReducedThresholdGrid) -> Self {
+        let ReducedThresholdGrid { from, to, count } = grid;
+        Self { from, to, count }
+    }
+}
+
+/// Parameters of the contact map reconstruction error; none of them is published, see `docs/paper.md`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default)]
+#[settings(name = "cmre")]
 pub struct CmreSettings {
-    /// Side of a square cell, mm (the virtual grid of the skin that defined the measure: 5).
+    /// Side of a square cell. The virtual grid of the skin that defined the measure: 5 mm.
+    #[setting(default = "5 mm", min = 0.5, max = 100.0)]
     pub cell_mm: f64,
-    /// Standard deviation of the estimate's Gaussian, mm (default of the public code: 1).
+    /// Standard deviation of the estimate's Gaussian; the public code's 1 mm. Below a micrometre it is no contact map.
+    #[setting(default = "1 mm", min = 0.001, max = 1000.0)]
     pub sigma_mm: f64,
-    /// SR of the public code, a length whose meaning and value are not given, mm; 5 makes the documented scores (one
-    /// cell off about 0.02).
+    /// SR of the public code, a length whose meaning and value are not given; 5 mm makes the documented scores (one cell off about
+    /// 0.02).
+    #[setting(default = "5 mm", min = 0.001, max = 1000.0)]
     pub sr_mm: f64,
 }
 
-impl Default for CmreSettings {
-    fn default() -> Self {
-        Self {
-            cell_mm: 5.0,
-            sigma_mm: 1.0,
-            sr_mm: 5.0,
-        }
-    }
-}
-
-/// Limits of the alignment certificate: a session beyond one of them is invalid.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+/// Limits of the alignment certificate (docs/time-base.md gives the reasons); a session beyond one of them is invalid.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default)]
+#[settings(name = "alignment")]
 pub struct AlignmentSettings {
-    /// Largest RMS residual of trains about a camera's map, µs. Trigger inputs show whole µs, optocouplers add some: more is
-    /// a line that does not carry what the box sends.
+    /// Largest RMS residual of sync trains and marks about a camera's clock. Trigger inputs show whole microseconds, optocouplers
+    /// add some.
+    #[setting(default = "10 us", min = 1e-3, max = 1e6)]
     pub max_residual_us: f64,
-    /// Largest half width of the 95 % interval of camera over box time at a press, µs: a quarter of the latency study's bin.
+    /// Largest half width of the 95 % interval of a camera's clock over the trigger box's, at a press: a quarter of the latency
+    /// study's bin.
+    #[setting(default = "50 us", min = 1e-3, max = 1e6)]
     pub max_camera_interval_us: f64,
-    /// Largest half width of the certain interval of host over box time at a press, µs: a tenth of the margin of a press
-    /// window.
+    /// Largest half width of the certain interval of the host's clock over the trigger box's, at a press: a tenth of the margin of
+    /// a press window.
+    #[setting(default = "5 ms", min = 1e-3, max = 1e6)]
     pub max_host_interval_us: f64,
-    /// Largest rate difference between two clocks, ppm: a ceramic resonator's and a crystal's, twice.
+    /// Largest rate difference between two clocks, parts per million: a ceramic resonator's and a crystal's, twice.
+    #[setting(
+        default = "10000",
+        key = "max_drift",
+        unit = "",
+        above = 0.0,
+        max = 1e6
+    )]
     pub max_drift_ppm: f64,
-    /// Largest share of lost edges: half as many again as labels and intervals are proven for (20 %).
+    /// Largest share of the edges sent that a camera did not see. Labels and intervals are proven for 20 %.
+    #[setting(default = "0.3", range = SHARE)]
     pub max_lost: f64,
-    /// Largest share of doubled and spurious edges: three times as many as labels and intervals are proven for (5 %).
+    /// Largest share, of the edges sent, of edges that a camera saw twice or that nobody sent. Labels and intervals are proven for
+    /// 5 %.
+    #[setting(default = "0.15", range = SHARE)]
     pub max_spurious: f64,
-    /// Least share of held-out trains in the 95 % interval stated for them.
+    /// Least share of held-out trains within the 95 % interval stated for them, by more than chance (3 standard errors).
+    #[setting(default = "0.85", range = SHARE)]
     pub min_coverage: f64,
-    /// A press further than this from the nearest tie of a clock (train or mark that the camera saw, exchange with the box) is
-    /// not timed by that clock, µs: beyond it, a rate that changes by 20 ppm, as a cheap crystal's does over tens of kelvins,
-    /// moves the clock by more than `max_camera_interval_us`.
+    /// A press further than this from the nearest train or mark that a camera saw, or from the nearest exchange with the trigger
+    /// box, is not timed and does not count: beyond it a rate that changes by 20 ppm, as a cheap crystal's does over tens of
+    /// kelvins, moves the clock by more than `max_camera_interval`.
+    #[setting(default = "2.5 s", min = 1e-3, max = 86_400e6)]
     pub max_tie_distance_us: f64,
-    /// The robot's poses are stamped late by at most this, µs: one interval of a 1 kHz stream. Stated, not measured.
+    /// The robot's poses are stamped late by at most this: one interval of a 1 kHz stream. Stated, not measured.
+    #[setting(default = "1 ms", max = 1e6)]
     pub robot_delay_us: f64,
-    /// Least share of the planned presses within a recording that have a burst in the event rates, and of the bursts among the
-    /// planned presses that are one of them, where clocks are aligned by event rates: with less, the plan is not what was done.
+    /// Where clocks are aligned by event rates: least share of the planned presses that are found, and of the bursts among them that
+    /// are planned presses.
+    #[setting(default = "0.5", range = SHARE)]
     pub min_explained: f64,
-    /// Least natural logarithm of the odds of an alignment by event rates against all others together. 7: 1100 to 1.
+    /// Least natural logarithm of the odds of an alignment by event rates against all others together; 7 is 1100 to 1.
+    #[setting(default = "7", max = 1000.0)]
     pub min_log_odds: f64,
 }
 
-impl Default for AlignmentSettings {
-    fn default() -> Self {
-        Self {
-            max_residual_us: 10.0,
-            max_camera_interval_us: 50.0,
-            max_host_interval_us: 5_000.0,
-            max_drift_ppm: 10_000.0,
-            max_lost: 0.3,
-            max_spurious: 0.15,
-            min_coverage: 0.85,
-            max_tie_distance_us: 2_500_000.0,
-            robot_delay_us: 1_000.0,
-            min_explained: 0.5,
-            min_log_odds: 7.0,
-        }
-    }
-}
-
-/// Settings of an analysis. A session recorded before a setting existed gets that setting's default.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+/// Settings of the analysis; every key is optional. A session recorded before a setting existed gets that setting's default.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default)]
+#[settings(name = "analysis", finish = Self::finish)]
 pub struct AnalysisSettings {
-    /// Rows kept per camera, both ends included (public code: camera 1 185..=360, camera 2 200..=355).
+    /// Rows of each camera that are kept, both ends included; the public code's 185 to 360 and 200 to 355.
+    #[setting(key = "crop", default = "{}", value = Crop::default().rows_of_both(), shape = Crop::SHAPE, read = Crop::read, show = Crop::show)]
     pub crop_v: [(u16, u16); 2],
-    /// The press window begins this long before the measured contact, ms.
+    /// The press window begins this long before the measured contact.
+    #[setting(default = "50 ms", range = WINDOW_MARGIN_MS)]
     pub window_before_ms: f64,
-    /// The press window ends this long after the measured release, ms.
+    /// The press window ends this long after the measured release.
+    #[setting(default = "50 ms", range = WINDOW_MARGIN_MS)]
     pub window_after_ms: f64,
-    /// DBSCAN neighbourhood radius, px (paper: 10).
+    /// Neighbourhood radius of DBSCAN; the paper's 10 px. The neighbourhood search is laid out for up to 50 px.
+    #[setting(default = "10 px", above = 0.0, max = 50.0)]
     pub eps_px: f64,
-    /// DBSCAN core threshold, events (paper: 10).
+    /// Core threshold of DBSCAN, events; the paper's 10.
+    #[setting(default = "10", min = 1, max = 1_000_000)]
     pub min_samples: u32,
-    /// Which clustered events make the centroid.
+    /// Which clustered events make the centroid of a press.
+    #[setting(default = "largest_cluster")]
     pub centroid: CentroidRule,
-    /// What turns the events of a press into a column.
+    /// What turns the events of a press into a column; `skinrig tradeoff` measures what each is worth.
+    #[setting(default = "dbscan")]
     pub estimator: Estimator,
-    /// Width of the estimator's floating-point numbers.
+    /// Width of the estimator's floating-point numbers; `dbscan` and `column_median` count in whole numbers and do not depend on it.
+    #[setting(default = "f64")]
     pub precision: Precision,
-    /// After this time the streaming estimator has forgotten all but 1/e of an event, ms.
+    /// After this time the streaming estimator has forgotten all but 1/e of an event.
+    #[setting(default = "100 ms", min = 0.1, max = 60_000.0)]
     pub forget_ms: f64,
-    /// Only one event in this many is used, chosen at random (1: all).
+    /// Only one event in this many is used, chosen at random; 1: all.
+    #[setting(default = "1", min = 1, max = 1_048_576)]
     pub thinning: u32,
-    /// Side of the square bins of pixels that the estimator sees, px: 1, 2, 4, 8 or 16.
+    /// Side of the square bins of pixels that the estimator sees: 1, 2, 4, 8 or 16 px.
+    #[setting(default = "1 px", min = 1, max = 16)]
     pub bin_px: u16,
-    /// The press window ends this long after the measured contact, ms, if it is not over before; `None`: only the
-    /// release and `window_after_ms` end it.
+    /// The press window ends this long after the measured contact, if it is not over before; when absent only the release ends it.
+    #[setting(min = NANOSECOND_MS, max = 60_000.0)]
     pub window_after_contact_ms: Option<f64>,
     /// Where the press window is anchored.
+    #[setting(default = "touch")]
     pub window_anchor: WindowAnchor,
-    /// How the least number of clustered events is found.
+    /// How the least number of clustered events of a press is found.
+    #[setting(default = "calibrated")]
     pub cluster_threshold: ThresholdRule,
-    /// A press with fewer clustered events than this in either camera is excluded (0 = rule off); the least value
-    /// when the threshold is calibrated.
+    /// A press with fewer clustered events than this in either camera is excluded; the least value of a calibrated threshold; 0
+    /// turns a fixed rule off.
+    #[setting(default = "20", max = 1_000_000)]
     pub min_cluster_events: u32,
-    /// A press whose events in the window are fewer than the idle rate predicts plus this many standard errors, in
-    /// either camera, is excluded: the camera did not see it (0 = rule off).
-    pub min_response_sigma: f64,
-    /// A press whose rays meet at less than this sine is excluded as nearly parallel.
-    pub min_ray_sine: f64,
-    /// Leave estimates outside the skin's outline out of the headline metrics (they are always counted).
-    pub exclude_outside: bool,
-    /// Presses left out by hand, sync presses counted.
+    /// Presses left out by hand, by their number in the report and everywhere else (from 1, sync presses counted).
+    #[setting(default = "[]")]
     pub exclude_press_numbers: Vec<PressId>,
-    /// Which parameters are calibrated.
+    /// In recordings of earlier versions only: presses left out by hand, counted from 0. New files use `exclude_press_numbers`.
+    #[doc(hidden)]
+    #[serde(skip)]
+    #[setting(max = 10_000_000)]
+    pub exclude_presses: Option<Vec<u32>>,
+    /// A press with fewer events than the idle rate predicts plus this many standard errors, in either camera, is excluded; 0 turns
+    /// the rule off.
+    #[setting(default = "5", max = 1000.0)]
+    pub min_response_sigma: f64,
+    /// A press whose rays meet at less than this sine is excluded as nearly parallel. At a sine of 1 every press would be excluded.
+    #[setting(default = "0.05", max = 0.999)]
+    pub min_ray_sine: f64,
+    /// Leave estimates outside the outline out of the headline metrics; they are always counted.
+    #[setting(default = "true")]
+    pub exclude_outside: bool,
+    /// Which parameters of the camera geometry are calibrated.
+    #[setting(default = "auto")]
     pub calibration: CalibrationModel,
-    /// The lens that is calibrated.
+    /// The lens that is calibrated: how the distance of a column from the middle becomes an angle.
+    #[setting(default = "exponential")]
     pub lens: LensKind,
-    /// The least that a failed press counts in the RMSE with failures counted, mm; `None`: the RMS distance of the scored
-    /// presses from their mean, the error of an answer that knows nothing.
+    /// The least that a failed press counts in the RMSE with failures counted; when absent the RMS distance of the scored presses
+    /// from their mean: the error of an answer that knows nothing. Raised to the RMSE of the presses with an estimate where that is
+    /// more.
+    #[setting(above = 0.0, max = 1000.0)]
     pub failure_penalty_mm: Option<f64>,
-    /// A press is "within" when its error is at most this, mm.
+    /// Error up to which a press counts as within.
+    #[setting(default = "5 mm", above = 0.0, max = 1000.0)]
     pub within_mm: f64,
-    /// Bits per event in the bit rates (paper: 21).
+    /// Bits per event in the data rates; the paper's 21.
+    #[setting(default = "21", above = 0.0, max = 1024.0)]
     pub bits_per_event: f64,
-    /// Most scored presses whose events are kept for the studies of data reduction and latency, spread evenly over
-    /// the session (0: no studies).
+    /// Most scored presses whose events are kept for the studies of data reduction and latency, chosen at random; 0 leaves the
+    /// studies out.
+    #[setting(default = "300", max = 100_000)]
     pub study_presses: u32,
     /// The data-reduction study.
+    #[setting(default)]
     pub reduction: ReductionSettings,
     /// The detection-latency study.
+    #[setting(default)]
     pub latency: LatencySettings,
-    /// The contact map reconstruction error.
+    /// The contact map reconstruction error; none of its values is published.
+    #[setting(default)]
     pub cmre: CmreSettings,
-    /// Limits of the alignment certificate.
+    /// Limits of the alignment certificate: a session beyond one of them is invalid.
+    #[setting(default)]
     pub alignment: AlignmentSettings,
-    /// Resamples of the bootstrap over locations.
+    /// Resamples of the bootstrap over locations; 0: no intervals.
+    #[setting(default = "2000", max = 1_000_000)]
     pub bootstrap_resamples: u32,
     /// Seed of the bootstrap.
+    #[setting(default = "1")]
     pub seed: u64,
-    /// Width of the event-rate bins, ms (paper: 10).
+    /// Width of the event-rate bins; the paper's 10 ms.
+    #[setting(default = "10 ms", min = 0.1, max = 10_000.0)]
     pub rate_bin_ms: f64,
 }
 
+/// Rows that are kept, both ends included.
+#[derive(Settings)]
+#[settings(name = "crop")]
+struct Crop {
+    /// First and last row of camera 1.
+    #[setting(default = "[185 px, 360 px]", value = [185, 360], names("first", "last"), max = 479)]
+    camera1_px: [u16; 2],
+    /// First and last row of camera 2.
+    #[setting(default = "[200 px, 355 px]", value = [200, 355], names("first", "last"), max = 479)]
+    camera2_px: [u16; 2],
+}
+
+impl Crop {
+    fn rows_of_both(&self) -> [(u16, u16); 2] {
+        [self.camera1_px, self.camera2_px].map(|[first, last]| (first, last))
+    }
+
+    fn read(field: &Field, out: &mut Collector) -> Option<[(u16, u16); 2]> {
+        let crop = Self::from_mapping(field, out)?;
+        for (key, [first, last]) in [("camera1", crop.camera1_px), ("camera2", crop.camera2_px)] {
+            if first > last {
+                let at = field.at(key);
+                out.error(at.span, at.path.as_str(), "no rows are left")
+                    .expected("the first row at or above the last")
+                    .found(format!("{first} px to {last} px"));
+                return None;
+            }
+        }
+        Some(crop.rows_of_both())
+    }
+
+    fn show([one, two]: &[(u16, u16); 2]) -> String {
+        let rows = |(first, last): &(u16, u16)| format!("[{first} px, {last} px]");
+        format!("{{camera1: {}, camera2: {}}}", rows(one), rows(two))
+    }
+}
+
 impl AnalysisSettings {
+    /// Sides of the bins that divide the sensor.
+    const BIN_SIDES_PX: [u16; 5] = [1, 2, 4, 8, 16];
+
     /// True for a press that is left out by hand.
     #[must_use]
     pub fn excludes(&self, press: PressId) -> bool {
         self.exclude_press_numbers.contains(&press)
     }
-}
 
-impl Default for AnalysisSettings {
-    fn default() -> Self {
-        Self {
-            crop_v: [(185, 360), (200, 355)],
-            window_before_ms: 50.0,
-            window_after_ms: 50.0,
-            eps_px: 10.0,
-            min_samples: 10,
-            centroid: CentroidRule::LargestCluster,
-            estimator: Estimator::Dbscan,
-            precision: Precision::F64,
-            forget_ms: 100.0,
-            thinning: 1,
-            bin_px: 1,
-            window_after_contact_ms: None,
-            window_anchor: WindowAnchor::Touch,
-            cluster_threshold: ThresholdRule::Calibrated,
-            min_cluster_events: 20,
-            min_response_sigma: 5.0,
-            min_ray_sine: 0.05,
-            exclude_outside: true,
-            exclude_press_numbers: Vec::new(),
-            calibration: CalibrationModel::Auto,
-            lens: LensKind::Exponential,
-            failure_penalty_mm: None,
-            within_mm: 5.0,
-            bits_per_event: 21.0,
-            study_presses: 300,
-            reduction: ReductionSettings::default(),
-            latency: LatencySettings::default(),
-            cmre: CmreSettings::default(),
-            alignment: AlignmentSettings::default(),
-            bootstrap_resamples: 2000,
-            seed: 1,
-            rate_bin_ms: 10.0,
+    fn finish(mut self, field: &Field, out: &mut Collector) -> Option<Self> {
+        if !Self::BIN_SIDES_PX.contains(&self.bin_px) {
+            let at = field.at("bin");
+            out.error(
+                at.span,
+                at.path.as_str(),
+                "bins that do not divide the sensor",
+            )
+            .expected("1, 2, 4, 8 or 16 px")
+            .found(format!("{} px", self.bin_px));
+            return None;
         }
+        let Some(indices) = self.exclude_presses.take() else {
+            return Some(self);
+        };
+        let presses: Vec<PressId> = indices.into_iter().map(PressId::from_index).collect();
+        if !out.recorded {
+            let numbers: Vec<String> = presses.iter().map(|p| p.number().to_string()).collect();
+            let at = field.at("exclude_presses");
+            out.error(at.span, at.path.as_str(), "this key counts presses from 0")
+                .expected(
+                    "`exclude_press_numbers`, which counts them from 1 as everything else does",
+                )
+                .found("`exclude_presses` of earlier versions")
+                .help(format!(
+                    "write `exclude_press_numbers: [{}]`",
+                    numbers.join(", ")
+                ));
+            return None;
+        }
+        self.exclude_press_numbers.extend(presses);
+        Some(self)
     }
 }
 

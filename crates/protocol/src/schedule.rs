@@ -6,7 +6,7 @@ use skinrig_model::{
     AnalysisSettings, HostDuration, HostTime, LocationId, PlannedPress, Point2, PressId, PressRole,
     PressTiming, RepetitionId, RigGeometry, StereoGeometry,
 };
-use skinrig_settings::open;
+use skinrig_settings::{Settings, open};
 
 use crate::build::{calibration_possible, nominal_camera, outline, roles, seconds};
 use crate::keys::schedule::SCHEDULE;
@@ -326,7 +326,7 @@ fn assemble(root: &Field, out: &mut Collector) -> Option<Schedule> {
     let rig = root.get("rig").and_then(|f| rig(f, out));
     let analysis = root
         .get("analysis")
-        .and_then(|f| crate::build::analysis(f, out));
+        .and_then(|f| AnalysisSettings::from_mapping(f, out));
     if let (Some(ScheduledRoles::Repetitions(roles)), Some(analysis)) = (&roles, &analysis)
         && let Some(by) = evaluation.and_then(|e| e.get("repetitions"))
     {

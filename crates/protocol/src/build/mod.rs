@@ -2,13 +2,12 @@
 
 mod parts;
 mod path;
-mod settings;
 
 use std::path::Path;
 
 use sha2::{Digest, Sha256};
 use skinrig_model::pulse::MAX_MARKED_PRESS;
-use skinrig_model::{HostDuration, PulseTrain};
+use skinrig_model::{AnalysisSettings, HostDuration, PulseTrain};
 
 use crate::keys::PROTOCOL;
 use crate::protocol::{Loader, Protocol, Prototype, Sync};
@@ -17,10 +16,9 @@ use crate::surface::Surface;
 use crate::timing;
 pub(crate) use parts::{biases, calibration_possible, nominal_camera, outline, roi, roles};
 use parts::{camera, depths, marks, read_limits, read_motion, read_sync, scene, surroundings};
-pub(crate) use settings::analysis;
 use skinrig_settings::Span;
-use skinrig_settings::open;
 use skinrig_settings::{Collector, Diagnostics};
+use skinrig_settings::{Settings, open};
 
 /// Reads a protocol; see [`Protocol::parse`].
 pub(crate) fn protocol(
@@ -119,7 +117,9 @@ fn assemble(
         .get("evaluation")
         .zip(count)
         .and_then(|(e, count)| roles(e, count, out));
-    let analysis = root.get("analysis").and_then(|f| analysis(f, out));
+    let analysis = root
+        .get("analysis")
+        .and_then(|f| AnalysisSettings::from_mapping(f, out));
     if let (Some(roles), Some(analysis), Some(field)) = (&roles, &analysis, root.get("evaluation"))
     {
         calibration_possible(roles, analysis, field, out);

@@ -1,15 +1,16 @@
 //! Every key of a protocol: name, meaning, form, range, default. The reader and the JSON Schema follow this table.
 
-mod analysis;
 mod frame;
 mod path;
 mod run;
 pub(crate) mod schedule;
 
-pub(crate) use analysis::ANALYSIS;
 pub(crate) use frame::{OUTLINE, OUTLINES};
 pub(crate) use path::UNITS;
 pub(crate) use run::{EVALUATION, ROI};
+
+use skinrig_model::AnalysisSettings;
+use skinrig_settings::Settings;
 
 use crate::faults::FAULT;
 use crate::retakes::RETAKES;
@@ -198,7 +199,7 @@ pub(crate) static PROTOCOL: Table = Table {
         ),
         default(
             "analysis",
-            Shape::Map(&ANALYSIS),
+            Shape::Map(AnalysisSettings::TABLE),
             "{}",
             "Settings of the analysis that follows the run.",
         ),

@@ -1,8 +1,11 @@
 //! Every key of a schedule: the description of a recording that was made without skinrig.
 
+use skinrig_model::AnalysisSettings;
+use skinrig_settings::Settings;
+
 use crate::keys::{
-    ANALYSIS, DEPTH, EVALUATION, MOST_POINTS, OUTLINE, OUTLINES, POINT, POSITIVE_SPAN, PROTOTYPE,
-    SPAN, UNITS, VERSION, count, default, optional, required,
+    DEPTH, EVALUATION, MOST_POINTS, OUTLINE, OUTLINES, POINT, POSITIVE_SPAN, PROTOTYPE, SPAN,
+    UNITS, VERSION, count, default, optional, required,
 };
 use crate::shape::{Range, Shape, Table};
 use skinrig_settings::Dimension::{Angle, Time};
@@ -87,7 +90,7 @@ pub(crate) static SCHEDULE: Table = Table {
         ),
         default(
             "analysis",
-            Shape::Map(&ANALYSIS),
+            Shape::Map(AnalysisSettings::TABLE),
             "{}",
             "Settings of the analysis.",
         ),
