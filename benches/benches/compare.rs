@@ -210,7 +210,7 @@ fn studies(folder: &Path) {
     let (done, kept) =
         analyze_and_keep(&input, &Files::at(folder), Keep::Scored).expect("a good recording");
     let presses = f64::from(recording::PRESSES);
-    let thresholds = f64::from(input.settings.latency.thresholds);
+    let thresholds = f64::from(input.settings.latency.thresholds.count);
     let method = format!(
         "wall time, rounds in turn, events in memory. This crate: {} presses, both cameras, 20 thresholds, trials and \
          backgrounds, a second study on thinned events, intervals; two threads. Python: 24 presses, one camera, \

@@ -1,14 +1,12 @@
 //! What an analysis asks of its input before it begins.
 
-use skinrig_model::range::analysis as limits;
 use skinrig_model::{
     AnalysisSettings, CameraId, PlannedPress, Point2, RigGeometry, SENSOR_HEIGHT, SkinOutline,
-    ValueRange,
 };
+use skinrig_settings::Settings;
 
 use crate::cmre::ContactMap;
 use crate::error::AnalysisError;
-use crate::estimators::BIN_SIDES_PX;
 use crate::input::SessionInput;
 
 /// Largest coordinate, length or skew that is taken for one: 1000 km. Squares of it and sums of them stay exact
@@ -54,7 +52,7 @@ pub fn before_recording(
     for press in &chosen.exclude_press_numbers {
         if !planned.iter().any(|p| p.id == *press) {
             return Err(AnalysisError::Setting {
-                name: "exclude_press_numbers",
+                name: "exclude_press_numbers".to_owned(),
                 expected: format!("presses of the plan, which has {}", planned.len()),
                 found: press.to_string(),
             });
@@ -130,155 +128,51 @@ pub fn geometry(rig: &RigGeometry) -> Result<(), AnalysisError> {
     }
 }
 
-/// Every setting is in its range.
+/// Every setting is in its declared range, and pairs of settings are in order.
 ///
 /// # Errors
 /// [`AnalysisError::Setting`] for the first setting out of its range.
 pub fn settings(s: &AnalysisSettings) -> Result<(), AnalysisError> {
-    let number = |name, range: ValueRange, found: f64| {
-        if range.contains(found) {
-            Ok(())
-        } else {
-            Err(AnalysisError::Setting {
-                name,
-                expected: range.describe(""),
-                found: found.to_string(),
-            })
+    let wrong = |key: &str, expected: &str, found: String| AnalysisError::Setting {
+        name: key.to_owned(),
+        expected: expected.to_owned(),
+        found,
+    };
+    // Negative margins cut the ends off a press; no file can ask for them.
+    let margins = AnalysisSettings {
+        window_before_ms: s.window_before_ms.abs(),
+        window_after_ms: s.window_after_ms.abs(),
+        ..s.clone()
+    };
+    if let Some(out) = margins.out_of_range() {
+        return Err(wrong(&out.key, &out.expected, out.found));
+    }
+    let reduced = s.latency.reduced.thresholds.into();
+    for (key, grid) in [
+        ("latency.thresholds", s.latency.thresholds),
+        ("latency.reduced.thresholds", reduced),
+    ] {
+        if grid.from > grid.to {
+            let found = format!("{} to {}", grid.from, grid.to);
+            return Err(wrong(
+                key,
+                "the first threshold at or below the last",
+                found,
+            ));
         }
-    };
-    let optional =
-        |name, range, found: Option<f64>| found.map_or(Ok(()), |found| number(name, range, found));
-    let both = |name, range, (first, last): (f64, f64)| {
-        number(name, range, first)?;
-        number(name, range, last)?;
-        in_order(name, first, last)
-    };
-    let (r, l, c) = (&s.reduction, &s.latency, &s.cmre);
-    let few = &l.reduced;
-    number("eps_px", limits::EPS_PX, s.eps_px)?;
-    number("min_samples", limits::MIN_SAMPLES, s.min_samples.into())?;
-    // Negative margins cut the ends off a press; no protocol asks for them.
-    let margin = limits::WINDOW_MARGIN_MS;
-    number("window_before_ms", margin, s.window_before_ms.abs())?;
-    number("window_after_ms", margin, s.window_after_ms.abs())?;
-    let after = limits::WINDOW_AFTER_CONTACT_MS;
-    optional("window_after_contact_ms", after, s.window_after_contact_ms)?;
-    number("rate_bin_ms", limits::RATE_BIN_MS, s.rate_bin_ms)?;
-    let sigma = limits::MIN_RESPONSE_SIGMA;
-    number("min_response_sigma", sigma, s.min_response_sigma)?;
-    number("min_ray_sine", limits::MIN_RAY_SINE, s.min_ray_sine)?;
-    let events = limits::MIN_CLUSTER_EVENTS;
-    number("min_cluster_events", events, s.min_cluster_events.into())?;
-    let resamples = limits::BOOTSTRAP_RESAMPLES;
-    number(
-        "bootstrap_resamples",
-        resamples,
-        s.bootstrap_resamples.into(),
-    )?;
-    optional(
-        "failure_penalty_mm",
-        limits::LENGTH_MM,
-        s.failure_penalty_mm,
-    )?;
-    number("within_mm", limits::LENGTH_MM, s.within_mm)?;
-    number("bits_per_event", limits::BITS_PER_EVENT, s.bits_per_event)?;
-    number(
-        "study_presses",
-        limits::STUDY_PRESSES,
-        s.study_presses.into(),
-    )?;
-    number("forget_ms", limits::FORGET_MS, s.forget_ms)?;
-    number("thinning", limits::THINNING, s.thinning.into())?;
-    let power = limits::REDUCTION_MAX_POWER;
-    number("reduction.max_power", power, r.max_power.into())?;
-    number("reduction.seeds", limits::REDUCTION_SEEDS, r.seeds.into())?;
-    let samples = limits::REDUCTION_MIN_SAMPLES;
-    number("reduction.min_samples", samples, r.min_samples.into())?;
-    number("latency.bin_ms", limits::LATENCY_BIN_MS, l.bin_ms)?;
-    number("latency.sigma_ms", limits::LATENCY_SIGMA_MS, l.sigma_ms)?;
-    number("latency.alpha", limits::LATENCY_ALPHA, l.alpha)?;
-    let (count, threshold) = (limits::LATENCY_COUNT, limits::LATENCY_THRESHOLD);
-    number("latency.consecutive", count, l.consecutive.into())?;
-    both("latency.threshold_range", threshold, l.threshold_range)?;
-    number("latency.thresholds", count, l.thresholds.into())?;
-    number("latency.target_rate", limits::SHARE, l.target_rate)?;
-    number("latency.window_ms", limits::LATENCY_WINDOW_MS, l.window_ms)?;
-    number(
-        "latency.reduced.factor",
-        limits::THINNING,
-        few.factor.into(),
-    )?;
-    both(
-        "latency.reduced.threshold_range",
-        threshold,
-        few.threshold_range,
-    )?;
-    number("latency.reduced.thresholds", count, few.thresholds.into())?;
-    number(
-        "latency.reduced.target_rate",
-        limits::SHARE,
-        few.target_rate,
-    )?;
-    number("cmre.cell_mm", limits::CMRE_CELL_MM, c.cell_mm)?;
-    number("cmre.sigma_mm", limits::CMRE_WIDTH_MM, c.sigma_mm)?;
-    number("cmre.sr_mm", limits::CMRE_WIDTH_MM, c.sr_mm)?;
-    let a = &s.alignment;
-    let time = limits::ALIGNMENT_TIME_US;
-    number("alignment.max_residual_us", time, a.max_residual_us)?;
-    number(
-        "alignment.max_camera_interval_us",
-        time,
-        a.max_camera_interval_us,
-    )?;
-    number(
-        "alignment.max_host_interval_us",
-        time,
-        a.max_host_interval_us,
-    )?;
-    let (distance, delay) = (limits::TIE_DISTANCE_US, limits::ROBOT_DELAY_US);
-    number(
-        "alignment.max_tie_distance_us",
-        distance,
-        a.max_tie_distance_us,
-    )?;
-    number("alignment.robot_delay_us", delay, a.robot_delay_us)?;
-    number(
-        "alignment.max_drift_ppm",
-        limits::DRIFT_PPM,
-        a.max_drift_ppm,
-    )?;
-    number("alignment.max_lost", limits::SHARE, a.max_lost)?;
-    number("alignment.max_spurious", limits::SHARE, a.max_spurious)?;
-    number("alignment.min_coverage", limits::SHARE, a.min_coverage)?;
-    number("alignment.min_explained", limits::SHARE, a.min_explained)?;
-    number("alignment.min_log_odds", limits::LOG_ODDS, a.min_log_odds)?;
-    if !BIN_SIDES_PX.contains(&s.bin_px) {
-        return Err(AnalysisError::Setting {
-            name: "bin_px",
-            expected: "1, 2, 4, 8 or 16 px".into(),
-            found: s.bin_px.to_string(),
-        });
+    }
+    if !AnalysisSettings::BIN_SIDES_PX.contains(&s.bin_px) {
+        return Err(wrong(
+            "bin",
+            "1, 2, 4, 8 or 16 px",
+            format!("{} px", s.bin_px),
+        ));
     }
     for (from, to) in s.crop_v {
         if from > to || to >= SENSOR_HEIGHT {
-            return Err(AnalysisError::Setting {
-                name: "crop_v",
-                expected: "first and last row, in order, within 0..=479".into(),
-                found: format!("{from}..={to}"),
-            });
+            let expected = "first and last row, in order, within 0 px to 479 px";
+            return Err(wrong("crop", expected, format!("{from} px to {to} px")));
         }
     }
     Ok(())
-}
-
-/// The ends of a grid are in order.
-fn in_order(name: &'static str, first: f64, last: f64) -> Result<(), AnalysisError> {
-    if first <= last {
-        return Ok(());
-    }
-    Err(AnalysisError::Setting {
-        name,
-        expected: "first and last, in order".into(),
-        found: format!("{first} to {last}"),
-    })
 }

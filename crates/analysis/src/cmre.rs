@@ -17,6 +17,7 @@
 //! maximum is 1 as everywhere (0.99202 in the same place).
 
 use skinrig_model::{CmreSettings, Point2, PressRole, PressVerdict, SkinOutline};
+use skinrig_settings::Settings;
 
 use crate::error::AnalysisError;
 use crate::metrics::bootstrap_over_locations;
@@ -82,29 +83,25 @@ impl ContactMap {
     /// # Errors
     /// When a parameter is not a positive number or the cell gives more than 200 cells along the longer side.
     pub fn new(outline: &SkinOutline, settings: &CmreSettings) -> Result<Self, AnalysisError> {
-        let positive = |name, value: f64| {
-            if value > 0.0 && value.is_finite() {
-                Ok(value)
-            } else {
-                Err(AnalysisError::Setting {
-                    name,
-                    expected: "a length above 0 mm".into(),
-                    found: value.to_string(),
-                })
-            }
+        let wrong = |key: &str, expected: &str, found: String| AnalysisError::Setting {
+            name: format!("cmre.{key}"),
+            expected: expected.to_owned(),
+            found,
         };
-        let cell_mm = positive("cmre.cell_mm", settings.cell_mm)?;
-        let sigma_mm = positive("cmre.sigma_mm", settings.sigma_mm)?;
-        let sr_mm = positive("cmre.sr_mm", settings.sr_mm)?;
+        if let Some(out) = settings.out_of_range() {
+            return Err(wrong(&out.key, &out.expected, out.found));
+        }
+        let CmreSettings {
+            cell_mm,
+            sigma_mm,
+            sr_mm,
+        } = *settings;
         let extent_mm = (outline.width_mm, outline.height_mm);
         let along = |side: f64| (side / cell_mm).ceil();
         let most = along(extent_mm.0).max(along(extent_mm.1));
         if !(1.0..=MAX_CELLS).contains(&most) {
-            return Err(AnalysisError::Setting {
-                name: "cmre.cell_mm",
-                expected: "a cell that fits at most 200 times along the skin".into(),
-                found: cell_mm.to_string(),
-            });
+            let expected = "a cell that fits at most 200 times along the skin";
+            return Err(wrong("cell", expected, format!("{cell_mm} mm")));
         }
         Ok(Self {
             corner: Point2::new(

@@ -27,7 +27,7 @@ pub enum AnalysisError {
     #[error("expected {expected} for the analysis setting `{name}`, found {found}")]
     Setting {
         /// Its name in the protocol.
-        name: &'static str,
+        name: String,
         /// What is allowed.
         expected: String,
         /// What was given.

@@ -44,8 +44,8 @@ pub use record::{
 pub use scene::{SceneNeed, SimLevel};
 pub use settings::{
     AlignmentSettings, AnalysisSettings, Background, CalibrationModel, CentroidRule, CmreSettings,
-    Estimator, LatencySettings, Precision, ReducedLatencySettings, ReductionSettings, RigGeometry,
-    ThresholdRule, WindowAnchor,
+    Estimator, LatencySettings, Precision, ReducedLatencySettings, ReducedThresholdGrid,
+    ReductionSettings, RigGeometry, ThresholdGrid, ThresholdRule, WindowAnchor,
 };
 pub use skin::SkinOutline;
 pub use stream::{ChunkFacts, LostTime, RawChunk, StreamFormat};

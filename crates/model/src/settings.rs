@@ -448,8 +448,8 @@ impl Crop {
 }
 
 impl AnalysisSettings {
-    /// Sides of the bins that divide the sensor.
-    const BIN_SIDES_PX: [u16; 5] = [1, 2, 4, 8, 16];
+    /// Sides of the bins of pixels that divide both sides of the sensor, px.
+    pub const BIN_SIDES_PX: [u16; 5] = [1, 2, 4, 8, 16];
 
     /// True for a press that is left out by hand.
     #[must_use]

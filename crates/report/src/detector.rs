@@ -74,7 +74,7 @@ pub(crate) fn remarks(l: &Latency) -> Vec<String> {
     let all = Choice {
         data: "all events".to_owned(),
         key: "analysis.latency",
-        range: l.settings.threshold_range,
+        range: (l.settings.thresholds.from, l.settings.thresholds.to),
         chosen: chosen.map(|r| r.threshold),
         detected_rate: chosen.map(|r| r.detected_rate),
         target_rate: l.settings.target_rate,
@@ -82,7 +82,7 @@ pub(crate) fn remarks(l: &Latency) -> Vec<String> {
     let few = l.reduced.as_ref().map(|r| Choice {
         data: format!("1/{} of the events", r.factor),
         key: "analysis.latency.reduced",
-        range: (r.thresholds.0, r.thresholds.1),
+        range: (r.thresholds.from, r.thresholds.to),
         chosen: r.threshold,
         detected_rate: r.detected_rate.value,
         target_rate: r.target_rate,

@@ -21,9 +21,6 @@ use skinrig_model::{AnalysisSettings, Estimator, Precision};
 
 use crate::kept::KeptEvent;
 
-/// Sides of the bins that pixels can be put together to, px: they divide both sides of the sensor.
-pub const BIN_SIDES_PX: [u16; 5] = [1, 2, 4, 8, 16];
-
 /// What an estimator says.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Sighting {

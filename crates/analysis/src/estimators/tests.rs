@@ -106,7 +106,7 @@ fn background_moves_the_running_histogram_less_than_the_median() {
 #[test]
 fn none_one_two_and_many_events_in_one_place_have_their_answers() {
     for (estimator, precision) in ALL {
-        for bin in BIN_SIDES_PX {
+        for bin in AnalysisSettings::BIN_SIDES_PX {
             let s = AnalysisSettings {
                 min_samples: 1,
                 ..settings(estimator, precision, bin)
@@ -246,7 +246,7 @@ proptest! {
     }
 
     #[test]
-    fn a_mirrored_press_is_seen_mirrored(columns in columns(), bin in proptest::sample::select(&BIN_SIDES_PX[..])) {
+    fn a_mirrored_press_is_seen_mirrored(columns in columns(), bin in proptest::sample::select(&AnalysisSettings::BIN_SIDES_PX[..])) {
         for (estimator, precision) in ALL {
             let s = AnalysisSettings { centroid: CentroidRule::AllClusters, ..settings(estimator, precision, bin) };
             let of = |flip: bool| {

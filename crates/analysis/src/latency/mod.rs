@@ -65,14 +65,13 @@ pub fn study(analysis: &Analysis, kept: &Kept) -> Option<Latency> {
         Background::After => Edges::ZeroPadded,
     };
     let margin_ms = margin_ms(analysis, &clocks);
-    let grid = sweep::thresholds(settings.threshold_range, settings.thresholds);
+    let grid = sweep::thresholds(settings.thresholds);
     let detector = Detector::new(settings, edges, grid, margin_ms);
     let trials = look(&usable, &detector, None);
     let found = Found::new(analysis, &detector, settings.target_rate, &trials);
 
     let asked = settings.reduced;
-    let (first, last) = asked.threshold_range;
-    let few = sweep::thresholds(asked.threshold_range, asked.thresholds);
+    let few = sweep::thresholds(asked.thresholds.into());
     let few = Detector::new(settings, edges, few, margin_ms);
     let thinning = Some((asked.factor, analysis.settings.seed));
     let thinned = look(&usable, &few, thinning);
@@ -112,7 +111,7 @@ pub fn study(analysis: &Analysis, kept: &Kept) -> Option<Latency> {
         from_contact: from_contact(analysis, &clocks, &trials, &found),
         reduced: Some(ReducedLatency {
             factor: asked.factor,
-            thresholds: (first, last, asked.thresholds),
+            thresholds: asked.thresholds.into(),
             target_rate: asked.target_rate,
             threshold: reduced.chosen.map(|i| few.thresholds[i]),
             detected_rate: reduced.estimates.detected_rate,

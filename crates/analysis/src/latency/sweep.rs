@@ -2,13 +2,20 @@
 
 use rayon::prelude::*;
 
+use skinrig_model::ThresholdGrid;
+
 use super::trial::{Detector, Trial};
 use crate::metrics::quantile;
 use crate::result::ThresholdRow;
 
 /// Evenly spaced thresholds, both ends included; the first alone when one is asked for.
 #[must_use]
-pub fn thresholds((first, last): (f64, f64), count: u32) -> Vec<f64> {
+pub fn thresholds(grid: ThresholdGrid) -> Vec<f64> {
+    let ThresholdGrid {
+        from: first,
+        to: last,
+        count,
+    } = grid;
     let steps = f64::from(count.max(2) - 1);
     let at = |i: u32| first + (last - first) * f64::from(i) / steps;
     (0..count).map(at).collect()

@@ -1,7 +1,7 @@
 //! Owns what the detection-latency study reports.
 
 use serde::{Deserialize, Serialize};
-use skinrig_model::{LatencySettings, PressId};
+use skinrig_model::{LatencySettings, PressId, ThresholdGrid};
 
 use super::Estimate;
 
@@ -155,7 +155,7 @@ pub struct ReducedLatency {
     /// k: of the n events of a trial, and of a background, round(n / k) are kept (public code).
     pub factor: u32,
     /// Thresholds tried: first, last and how many.
-    pub thresholds: (f64, f64, u32),
+    pub thresholds: ThresholdGrid,
     /// Share of trials that the threshold chosen should detect.
     pub target_rate: f64,
     /// The threshold chosen; `None` when nothing was detected at any.

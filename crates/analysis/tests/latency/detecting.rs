@@ -289,8 +289,22 @@ fn the_threshold_has_the_fewest_false_alarms_among_those_that_detect_enough() {
     );
     assert_eq!((found.len(), choose(&found, 0.95)), (20, None));
     assert_eq!(sweep(&[], &detector, 100.0), []);
-    assert_eq!(thresholds((17.0, 19.0), 3), [17.0, 18.0, 19.0]);
-    assert_eq!(thresholds((5.0, 9.0), 1), [5.0]);
+    assert_eq!(
+        thresholds(skinrig_model::ThresholdGrid {
+            from: 17.0,
+            to: 19.0,
+            count: 3
+        }),
+        [17.0, 18.0, 19.0]
+    );
+    assert_eq!(
+        thresholds(skinrig_model::ThresholdGrid {
+            from: 5.0,
+            to: 9.0,
+            count: 1
+        }),
+        [5.0]
+    );
 }
 
 proptest! {

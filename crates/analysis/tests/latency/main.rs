@@ -50,7 +50,16 @@ fn detector() -> Detector {
     let edges = Edges::Renormalised;
     Detector {
         earliest_ms: f64::NEG_INFINITY,
-        ..Detector::new(&settings, edges, thresholds((1.0, 20.0), 20), 0.0)
+        ..Detector::new(
+            &settings,
+            edges,
+            thresholds(skinrig_model::ThresholdGrid {
+                from: 1.0,
+                to: 20.0,
+                count: 20,
+            }),
+            0.0,
+        )
     }
 }
 

@@ -153,7 +153,11 @@ fn what_is_before_the_contact_or_never_comes_is_counted_apart() {
         _ => Some(2e4),
     });
     // High enough that the background alone does not cross it near the contact by chance.
-    analysis.settings.latency.threshold_range = (16.0, 20.0);
+    analysis.settings.latency.thresholds = skinrig_model::ThresholdGrid {
+        from: 16.0,
+        to: 20.0,
+        count: 20,
+    };
     let found = studied(&analysis, &kept);
     assert_eq!(found.trials, 25);
     let rate = found.detected_rate.value.unwrap();
