@@ -7,6 +7,7 @@
 use std::marker::PhantomData;
 
 use serde::{Deserialize, Serialize};
+use skinrig_settings::{Collector, Dimension, Field, Setting, Shape, ValueRange};
 
 /// Marker of the skin frame.
 #[derive(Debug)]
@@ -42,6 +43,34 @@ impl Point2 {
     #[must_use]
     pub const fn at_height(self, z_mm: f64) -> Point3<Skin> {
         Point3::new(self.x_mm, self.y_mm, z_mm)
+    }
+}
+
+/// A coordinate in a file, mm: nothing on a bench is further away than a metre.
+const COORDINATE: Shape =
+    Shape::Quantity(&[Dimension::Length], ValueRange::between(-1000.0, 1000.0));
+
+impl Setting for Point2 {
+    const SHAPE: Shape = Shape::Tuple(&COORDINATE, &["x", "y"]);
+
+    fn from_field(field: &Field, _: &mut Collector) -> Option<Self> {
+        field.as_quantities().map(|[x, y]| Self::new(x, y))
+    }
+
+    fn text(&self) -> String {
+        format!("[{} mm, {} mm]", self.x_mm, self.y_mm)
+    }
+}
+
+impl<F> Setting for Point3<F> {
+    const SHAPE: Shape = Shape::Tuple(&COORDINATE, &["x", "y", "z"]);
+
+    fn from_field(field: &Field, _: &mut Collector) -> Option<Self> {
+        field.as_quantities().map(|[x, y, z]| Self::new(x, y, z))
+    }
+
+    fn text(&self) -> String {
+        format!("[{} mm, {} mm, {} mm]", self.x_mm, self.y_mm, self.z_mm)
     }
 }
 

@@ -47,7 +47,7 @@ pub use settings::{
     Estimator, LatencySettings, Precision, ReducedLatencySettings, ReducedThresholdGrid,
     ReductionSettings, RigGeometry, ThresholdGrid, ThresholdRule, WindowAnchor,
 };
-pub use skin::SkinOutline;
+pub use skin::{OUTLINE_SHAPE, SkinOutline};
 pub use stream::{ChunkFacts, LostTime, RawChunk, StreamFormat};
 pub use time::{HostDuration, HostTime};
 pub use trigger_box::{BoxReport, BoxTime};

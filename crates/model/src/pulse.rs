@@ -61,7 +61,19 @@ pub const LAST_MARKED_PRESS: PressId = PressId::from_index(MAX_MARKED_PRESS);
 pub const TOLERANCE_US: u64 = 40;
 
 /// A moment of a press that can be marked on the trigger line.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[derive(
+    Debug,
+    Clone,
+    Copy,
+    PartialEq,
+    Eq,
+    PartialOrd,
+    Ord,
+    Hash,
+    Serialize,
+    Deserialize,
+    skinrig_settings::Choice,
+)]
 #[serde(rename_all = "snake_case")]
 pub enum MarkKind {
     /// The downward motion begins.

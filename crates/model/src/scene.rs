@@ -6,7 +6,19 @@ use std::str::FromStr;
 use serde::{Deserialize, Serialize};
 
 /// How much of the rig is simulated. Ordered from cheap to dear; each level contains the ones before it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[derive(
+    Debug,
+    Clone,
+    Copy,
+    PartialEq,
+    Eq,
+    PartialOrd,
+    Ord,
+    Hash,
+    Serialize,
+    Deserialize,
+    skinrig_settings::Choice,
+)]
 #[serde(rename_all = "snake_case")]
 pub enum SimLevel {
     /// Robot and trigger box; cameras deliver time base and triggers but no pixel events.
@@ -49,7 +61,19 @@ impl FromStr for SimLevel {
 }
 
 /// A property of the simulated session that its user relies on.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[derive(
+    Debug,
+    Clone,
+    Copy,
+    PartialEq,
+    Eq,
+    PartialOrd,
+    Ord,
+    Hash,
+    Serialize,
+    Deserialize,
+    skinrig_settings::Choice,
+)]
 #[serde(rename_all = "snake_case")]
 pub enum SceneNeed {
     /// Trajectories, settling, timing of the presses.

@@ -5,22 +5,65 @@
 //! 9331.75 mm²; the paper's 9328 mm² comes from a coarser polygon of the same outline (0.04 % smaller).
 
 use serde::{Deserialize, Serialize};
+use skinrig_settings::{Choice, Collector, Field, Settings, Shape};
 
 use crate::frame::Point2;
 
 /// A rectangle whose right corners (larger x) are chamfered and whose left corners are rounded.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, Settings)]
+#[settings(name = "outline", finish = Self::corners_fit)]
 pub struct SkinOutline {
-    /// Centre, skin frame.
+    /// Middle of the rectangle.
     pub centre: Point2,
-    /// Full extent along x, mm.
+    /// Full extent along x.
+    #[setting(above = 0.0, max = 1000.0)]
     pub width_mm: f64,
-    /// Full extent along y, mm.
+    /// Full extent along y.
+    #[setting(above = 0.0, max = 1000.0)]
     pub height_mm: f64,
-    /// Length cut from each side at the two right corners, mm.
+    /// Length cut from each side at the two right corners.
+    #[setting(default = "0 mm", max = 1000.0)]
     pub chamfer_mm: f64,
-    /// Radius of the two left corners, mm.
+    /// Radius of the two left corners.
+    #[setting(default = "0 mm", max = 1000.0)]
     pub radius_mm: f64,
+}
+
+/// An outline that has a name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Choice)]
+enum KnownOutline {
+    /// The published skin: 100 x 100 mm about (10, 2) mm, right corners chamfered by 20 mm, left corners rounded with 25 mm.
+    Paper,
+}
+
+/// An outline in a file: the word `paper`, or a mapping.
+pub const OUTLINE_SHAPE: Shape = Shape::WordOr(KnownOutline::WORDS, SkinOutline::TABLE);
+
+impl SkinOutline {
+    /// Reads an [`OUTLINE_SHAPE`].
+    pub fn read(field: &Field, out: &mut Collector) -> Option<Self> {
+        match field.as_word().and_then(KnownOutline::from_word) {
+            Some(KnownOutline::Paper) => Some(Self::PAPER),
+            None => Self::from_mapping(field, out),
+        }
+    }
+
+    fn corners_fit(self, field: &Field, out: &mut Collector) -> Option<Self> {
+        let half_mm = self.width_mm.min(self.height_mm) / 2.0;
+        for (key, value_mm) in [("chamfer", self.chamfer_mm), ("radius", self.radius_mm)] {
+            if value_mm > half_mm {
+                let at = field.at(key);
+                out.error(
+                    at.span,
+                    at.path.as_str(),
+                    "the corner is larger than half the skin",
+                )
+                .expected(format!("at most {half_mm} mm, half of the shorter side"))
+                .found(format!("{value_mm} mm"));
+            }
+        }
+        Some(self)
+    }
 }
 
 impl SkinOutline {

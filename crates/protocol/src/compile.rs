@@ -20,7 +20,7 @@ use crate::timing;
 pub(crate) const PLAN_VERSION: u32 = 1;
 
 /// See [`Protocol::compile`].
-pub(crate) fn compile(protocol: &Protocol) -> Plan {
+fn compile(protocol: &Protocol) -> Plan {
     let mut writer = Writer {
         protocol,
         position: protocol.motion.home,
@@ -110,6 +110,14 @@ pub(crate) fn compile(protocol: &Protocol) -> Plan {
         suspend: protocol.suspend,
         presses: writer.presses,
         steps: writer.steps,
+    }
+}
+
+impl Protocol {
+    /// The plan of this protocol: a pure function of the protocol's text, overrides and named files.
+    #[must_use]
+    pub fn compile(&self) -> Plan {
+        compile(self)
     }
 }
 

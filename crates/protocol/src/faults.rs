@@ -287,7 +287,11 @@ impl fmt::Display for PlantedFault {
 }
 
 /// The shape of an item of `faults`.
-pub(crate) static FAULT: Shape = Shape::Text;
+pub(crate) const SHAPE: Shape = Shape::List {
+    of: &Shape::Text,
+    min: 1,
+    max: 100,
+};
 
 /// Reads the items of `faults`.
 pub(crate) fn faults(f: &Field, out: &mut Collector) -> Option<Vec<PlantedFault>> {

@@ -12,13 +12,17 @@
 //! [`suite_schema_json`]).
 
 pub mod area;
+mod assemble;
 mod build;
 pub mod check;
 mod compile;
 pub mod faults;
+mod file;
 mod findings;
 mod keys;
 pub mod limits;
+mod path;
+mod phases;
 pub mod plan;
 pub mod protocol;
 mod reference_code;
@@ -40,13 +44,14 @@ pub use area::{Area, KeepOut, Surroundings};
 pub use check::{Segment, Violation, check};
 pub use faults::{FaultKind, FaultPhase, FaultTime, NoFault, PlantedFault};
 pub use limits::Limits;
+pub use phases::PressPhases;
 pub use plan::{OnTrip, Plan, PressStep, RunLimits, Step};
 pub use protocol::{CameraRequest, Loader, Motion, Pace, Protocol, Prototype, Scene, Sync};
 pub use reference_code::REFERENCE_CODE;
 pub use remaining::Route;
 pub use retakes::Retakes;
 pub use rig::{RigFile, RigKind};
-pub use schedule::{PressPhases, Schedule};
+pub use schedule::Schedule;
 pub use schema::{
     limits_schema_json, rig_schema_json, schedule_schema_json, schema_json, suite_schema_json,
 };

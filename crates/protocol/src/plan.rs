@@ -8,6 +8,8 @@ use skinrig_model::{
     HostDuration, MarkKind, PlannedPress, Point2, Point3, PressId, RepetitionId, Skin, as_index,
 };
 
+use skinrig_settings::Choice;
+
 use crate::area::Surroundings;
 use crate::retakes::Retakes;
 use crate::surface::Surface;
@@ -86,13 +88,13 @@ pub struct RunLimits {
 }
 
 /// What the robot does when a measured limit is broken.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, Choice)]
 #[serde(rename_all = "snake_case")]
 pub enum OnTrip {
-    /// Holds, and rises straight up off the skin; brakes where it is when its feedback is not to be believed.
+    /// Hold, rise straight up off the skin, disarm; brake at once when the feedback cannot be trusted.
     #[default]
     Retract,
-    /// Brakes where it is.
+    /// Brake at once, wherever the tip is.
     Brake,
 }
 

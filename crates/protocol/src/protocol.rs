@@ -8,14 +8,15 @@ use skinrig_model::{
     AnalysisSettings, HostDuration, MarkKind, Point2, Point3, PressRole, SceneNeed, SimLevel, Skin,
 };
 
+use skinrig_settings::{Location, Settings};
+
 use crate::area::Surroundings;
 use crate::faults::PlantedFault;
-use crate::plan::{Plan, RunLimits};
+use crate::plan::RunLimits;
 use crate::retakes::Retakes;
 use crate::surface::Surface;
 use crate::surface_check::SurfaceCheck;
 use crate::suspend::Suspend;
-use skinrig_settings::Diagnostics;
 
 /// Reads a file that a protocol names. The path is the protocol's folder joined with the name in the protocol.
 pub type Loader<'a> = &'a dyn Fn(&Path) -> std::io::Result<Vec<u8>>;
@@ -86,15 +87,15 @@ pub struct Protocol {
     pub cameras: [CameraRequest; 2],
     /// Where the keys stand that a plan may break.
     #[serde(skip)]
-    pub(crate) key_places: BTreeMap<&'static str, skinrig_settings::Location>,
+    pub(crate) key_places: BTreeMap<&'static str, Location>,
 }
 
 /// Which skin is pressed.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Settings)]
 pub struct Prototype {
-    /// As written on it.
+    /// Identifier of the prototype as written on it.
     pub id: String,
-    /// Anything worth keeping.
+    /// Material, thickness, anything worth keeping.
     pub description: Option<String>,
     /// The indenter's tip.
     pub tip: Option<String>,
@@ -173,42 +174,4 @@ pub struct CameraRequest {
     pub biases: BTreeMap<String, i64>,
     /// Pixels that stay on: first column, first row, columns, rows.
     pub roi: Option<[u16; 4]>,
-}
-
-impl Protocol {
-    /// Reads a protocol from the bytes of a file.
-    ///
-    /// `name` is the file's name for messages, and files named in the protocol are looked up in its folder through
-    /// `loader`. Each override is `key.path=value` as given with `--set`.
-    ///
-    /// # Errors
-    /// [`Diagnostics`] with every finding at once.
-    pub fn parse(
-        name: &str,
-        bytes: &[u8],
-        overrides: &[String],
-        loader: Loader<'_>,
-    ) -> Result<Self, Diagnostics> {
-        crate::build::protocol(name, bytes, overrides, loader, false)
-    }
-
-    /// Reads the protocol of a recording, which may use keys that a new one may not (`analysis.exclude_presses`). Otherwise as
-    /// [`Protocol::parse`].
-    ///
-    /// # Errors
-    /// [`Diagnostics`] with every finding at once.
-    pub fn parse_recorded(
-        name: &str,
-        bytes: &[u8],
-        overrides: &[String],
-        loader: Loader<'_>,
-    ) -> Result<Self, Diagnostics> {
-        crate::build::protocol(name, bytes, overrides, loader, true)
-    }
-
-    /// The plan of this protocol: a pure function of the protocol's text, overrides and named files.
-    #[must_use]
-    pub fn compile(&self) -> Plan {
-        crate::compile::compile(self)
-    }
 }

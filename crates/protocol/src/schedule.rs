@@ -3,16 +3,15 @@
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 use skinrig_model::{
-    AnalysisSettings, HostDuration, HostTime, LocationId, PlannedPress, Point2, PressId, PressRole,
-    PressTiming, RepetitionId, RigGeometry, StereoGeometry,
+    AnalysisSettings, HostTime, LocationId, PlannedPress, Point2, PressId, PressRole, RepetitionId,
+    RigGeometry, StereoGeometry,
 };
-use skinrig_settings::{Settings, open};
+use skinrig_settings::{Collector, Diagnostics, Field, Settings, open};
 
-use crate::build::{calibration_possible, nominal_camera, outline, roles, seconds};
-use crate::keys::schedule::SCHEDULE;
+use crate::file::hex;
+use crate::keys::{Evaluate, NominalCamera, ScheduleKeys, calibration_possible, roles};
+use crate::phases::PressPhases;
 use crate::protocol::Prototype;
-use crate::shape::{Field, Keys};
-use skinrig_settings::{Collector, Diagnostics};
 
 /// A recording that was made without skinrig: what `skinrig import` needs to know about it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -70,57 +69,6 @@ pub struct ScheduledSync {
     pub at: Point2,
     /// How deep, mm.
     pub depth_mm: f64,
-}
-
-/// The moments of a press relative to its press time, in ascending order.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub struct PressPhases {
-    /// The downward motion begins.
-    pub approach: HostDuration,
-    /// The tip reaches the surface.
-    pub contact: HostDuration,
-    /// The tip settled at its depth.
-    pub at_depth: HostDuration,
-    /// The upward motion begins.
-    pub retract: HostDuration,
-    /// The tip leaves the surface.
-    pub release: HostDuration,
-    /// The tip is back at clearance height.
-    pub clear: HostDuration,
-}
-
-impl PressPhases {
-    /// The moments of a press since the begin of its downward motion, as host times from 0.
-    #[must_use]
-    pub fn since_approach(&self) -> PressTiming {
-        let at = |moment: HostDuration| HostTime(moment.0 - self.approach.0);
-        PressTiming {
-            approach: at(self.approach),
-            contact: at(self.contact),
-            at_depth: at(self.at_depth),
-            retract: at(self.retract),
-            release: at(self.release),
-            clear: at(self.clear),
-        }
-    }
-
-    /// From the begin of the downward motion to the return to clearance height, s.
-    fn length_s(&self) -> f64 {
-        self.clear.as_secs_f64() - self.approach.as_secs_f64()
-    }
-
-    /// The moments of the press at `t`.
-    #[must_use]
-    pub fn at(&self, t: HostTime) -> PressTiming {
-        PressTiming {
-            approach: t + self.approach,
-            contact: t + self.contact,
-            at_depth: t + self.at_depth,
-            retract: t + self.retract,
-            release: t + self.release,
-            clear: t + self.clear,
-        }
-    }
 }
 
 /// Which presses calibrate and which are scored.
@@ -207,13 +155,13 @@ impl Schedule {
         overrides: &[String],
         recorded: bool,
     ) -> Result<Self, Diagnostics> {
-        let (mut out, root) = open(name, bytes, overrides, &SCHEDULE)?;
+        let (mut out, root) = open(name, bytes, overrides, ScheduleKeys::TABLE)?;
         out.recorded = recorded;
         let schedule = root.and_then(|root| {
             let text = String::from_utf8_lossy(bytes).into_owned();
             assemble(&root, &mut out).map(|schedule| Self {
                 file_name: name.to_owned(),
-                sha256: crate::build::hex(&Sha256::digest(bytes)),
+                sha256: hex(&Sha256::digest(bytes)),
                 text,
                 ..schedule
             })
@@ -298,99 +246,79 @@ impl Schedule {
     }
 }
 
+/// Every part is read even when another one failed, so that all findings appear at once.
 fn assemble(root: &Field, out: &mut Collector) -> Option<Schedule> {
-    let phases = root.get("phases").and_then(|f| phases(f, out));
-    let count = root.count("presses_per_repetition");
-    let used = match (root.get("presses_used"), count) {
-        (Some(field), Some(count)) => {
-            let used = root.count("presses_used")?;
-            if used > count {
-                out.error(
-                    field.span,
-                    "presses_used",
-                    "more presses than were recorded",
-                )
-                .expected(format!("at most {count}, `presses_per_repetition`"))
-                .found(used.to_string());
-            }
-            Some(used)
-        }
-        (None, count) => count,
-        _ => None,
-    };
-    let repetitions = root.count("repetitions");
-    let evaluation = root.get("evaluation");
-    let roles = evaluation
-        .zip(repetitions)
-        .and_then(|(e, n)| scheduled_roles(e, n, out));
-    let rig = root.get("rig").and_then(|f| rig(f, out));
-    let analysis = root
-        .get("analysis")
-        .and_then(|f| AnalysisSettings::from_mapping(f, out));
-    if let (Some(ScheduledRoles::Repetitions(roles)), Some(analysis)) = (&roles, &analysis)
-        && let Some(by) = evaluation.and_then(|e| e.get("repetitions"))
+    let keys = ScheduleKeys::read_parts(root, out);
+    if let (Some(used), Some(count)) = (keys.presses_used.flatten(), keys.presses_per_repetition)
+        && used > count
     {
+        out.error(
+            root.at("presses_used").span,
+            "presses_used",
+            "more presses than were recorded",
+        )
+        .expected(format!("at most {count}, `presses_per_repetition`"))
+        .found(used.to_string());
+    }
+    let evaluation = keys.evaluation.as_ref().zip(keys.repetitions);
+    let roles = evaluation.and_then(|(e, n)| scheduled_roles(e, n, root.at("evaluation"), out));
+    if let (Some(ScheduledRoles::Repetitions(roles)), Some(analysis)) = (&roles, &keys.analysis) {
+        let by = root.at("evaluation.repetitions");
         calibration_possible(roles, analysis, by, out);
     }
-    let depth = root.quantity("depth");
-    let sync = match root.get("sync") {
-        None => Some(None),
-        Some(f) => (|| {
-            Some(Some(ScheduledSync {
-                count: f.count("count")?,
-                interval_s: f.quantity("interval")?,
-                pause_after_s: f.quantity("pause_after")?,
-                at: f.get("at")?.pair().map(|[x, y]| Point2::new(x, y))?,
-                depth_mm: f.quantity("depth").or(depth)?,
-            }))
-        })(),
-    };
-    if let (Some(phases), Some(field)) = (&phases, root.get("period"))
-        && let Some(period) = field.as_quantity()
-    {
-        let length = phases.length_s();
-        if length > period {
-            overlap(field, length, period, out);
+    if let Some(field) = root.get("phases") {
+        PressPhases::check_order(field, out);
+    }
+    if let Some(phases) = &keys.phases {
+        let sync = keys.sync.as_ref().and_then(Option::as_ref);
+        for (key, time_s) in [
+            ("period", keys.period_s),
+            ("sync.interval", sync.map(|s| s.interval_s)),
+            ("sync.pause_after", sync.map(|s| s.pause_after_s)),
+        ] {
+            if let Some(time_s) = time_s.filter(|time_s| *time_s < phases.length_s()) {
+                overlap(root.at(key), phases.length_s(), time_s, out);
+            }
         }
     }
-    for key in ["interval", "pause_after"] {
-        if let (Some(phases), Some(field)) = (&phases, root.get("sync").and_then(|s| s.get(key)))
-            && let Some(time) = field.as_quantity()
-            && time < phases.length_s()
-        {
-            overlap(field, phases.length_s(), time, out);
-        }
-    }
-    let csv = root.get("csv")?;
-    let prototype = root.get("prototype")?;
+    let depth_mm = keys.depth_mm?;
+    let rig = keys.rig?;
+    let csv = keys.csv?;
+    let presses_per_repetition = keys.presses_per_repetition?;
+    let camera = |camera: &NominalCamera| camera.model(rig.outline.centre);
     Some(Schedule {
         file_name: String::new(),
         text: String::new(),
         sha256: String::new(),
-        name: root.text("name")?,
-        description: root.text("description"),
-        operator: root.text("operator")?,
-        prototype: Prototype {
-            id: prototype.text("id")?,
-            description: prototype.text("description"),
-            tip: prototype.text("tip"),
-        },
-        sync: sync?,
-        period_s: root.quantity("period")?,
-        presses_per_repetition: count?,
-        presses_used: used?,
-        pause_between_s: root.quantity("pause_between_repetitions")?,
-        depth_mm: depth?,
-        phases: phases?,
-        csv_unit_mm: match csv.word("unit")? {
-            "m" => 1000.0,
-            "cm" => 10.0,
-            _ => 1.0,
-        },
-        csv_skip_blank_rows: csv.flag("skip_blank_rows")?,
+        name: keys.name?,
+        description: keys.description?,
+        operator: keys.operator?,
+        prototype: keys.prototype?,
+        sync: keys.sync?.map(|sync| ScheduledSync {
+            count: sync.count,
+            interval_s: sync.interval_s,
+            pause_after_s: sync.pause_after_s,
+            at: sync.at,
+            depth_mm: sync.depth_mm.unwrap_or(depth_mm),
+        }),
+        period_s: keys.period_s?,
+        presses_per_repetition,
+        presses_used: keys.presses_used?.unwrap_or(presses_per_repetition),
+        pause_between_s: keys.pause_between_repetitions_s?,
+        depth_mm,
+        phases: keys.phases?,
+        csv_unit_mm: csv.unit.in_mm(),
+        csv_skip_blank_rows: csv.skip_blank_rows,
         roles: roles?,
-        rig: rig?,
-        analysis: analysis?,
+        rig: RigGeometry {
+            outline: rig.outline,
+            nominal: StereoGeometry {
+                cameras: [camera(&rig.camera1), camera(&rig.camera2)],
+            },
+            trigger_channel: rig.trigger_channel,
+            trigger_delay_us: [0; 2],
+        },
+        analysis: keys.analysis?,
     })
 }
 
@@ -402,47 +330,20 @@ fn overlap(field: &Field, least_s: f64, found_s: f64, out: &mut Collector) {
         .found(format!("{found_s} s"));
 }
 
-fn phases(f: &Field, out: &mut Collector) -> Option<PressPhases> {
-    let names = [
-        "approach", "contact", "at_depth", "retract", "release", "clear",
-    ];
-    for pair in names.windows(2) {
-        if let [earlier, later] = pair
-            && let (Some(a), Some(b)) = (f.quantity(earlier), f.quantity(later))
-            && a >= b
-            && let Some(field) = f.get(later)
-        {
-            out.error(
-                field.span,
-                field.path.as_str(),
-                "the moments of a press are out of order",
-            )
-            .expected(format!("after `{earlier}`, {a} s"))
-            .found(format!("{b} s"));
-        }
+fn scheduled_roles(
+    evaluate: &Evaluate,
+    repetitions: u32,
+    field: &Field,
+    out: &mut Collector,
+) -> Option<ScheduledRoles> {
+    if evaluate.repetitions.is_some() {
+        let roles = roles(field.at("repetitions"), repetitions, out);
+        return roles.map(ScheduledRoles::Repetitions);
     }
-    let moment = |name| f.quantity(name).map(seconds);
-    Some(PressPhases {
-        approach: moment("approach")?,
-        contact: moment("contact")?,
-        at_depth: moment("at_depth")?,
-        retract: moment("retract")?,
-        release: moment("release")?,
-        clear: moment("clear")?,
-    })
-}
-
-fn scheduled_roles(f: &Field, repetitions: u32, out: &mut Collector) -> Option<ScheduledRoles> {
-    if let Some(by) = f.get("repetitions") {
-        return roles(by, repetitions, out).map(ScheduledRoles::Repetitions);
-    }
-    let alternate = f.get("alternate")?;
-    let (every, first) = (
-        alternate.count("calibrate_every")?,
-        alternate.count("first")?,
-    );
+    let alternate = evaluate.alternate.as_ref()?;
+    let (every, first) = (alternate.calibrate_every, alternate.first);
     if first > every {
-        let field = alternate.get("first")?;
+        let field = field.at("alternate.first");
         out.error(
             field.span,
             field.path.as_str(),
@@ -456,20 +357,5 @@ fn scheduled_roles(f: &Field, repetitions: u32, out: &mut Collector) -> Option<S
         repetitions,
         every,
         first: first - 1,
-    })
-}
-
-fn rig(f: &Field, out: &mut Collector) -> Option<RigGeometry> {
-    let outline = outline(f.get("outline")?, out)?;
-    let camera = |key| nominal_camera(f.get(key)?, outline.centre);
-    Some(RigGeometry {
-        outline,
-        nominal: StereoGeometry {
-            cameras: [camera("camera1")?, camera("camera2")?],
-        },
-        trigger_channel: f
-            .count("trigger_channel")
-            .and_then(|n| u8::try_from(n).ok()),
-        trigger_delay_us: [0; 2],
     })
 }

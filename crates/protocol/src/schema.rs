@@ -1,17 +1,17 @@
 //! JSON Schemas of the five languages.
 
-use skinrig_settings::schema_json as schema;
+use skinrig_settings::{Settings, schema_json as schema};
 
 /// The JSON Schema of a protocol, for editors: documentation, completion, checks while typing.
 #[must_use]
 pub fn schema_json() -> String {
-    schema(&crate::keys::PROTOCOL, "skinrig protocol")
+    schema(crate::keys::ProtocolKeys::TABLE, "skinrig protocol")
 }
 
 /// The JSON Schema of a schedule for `skinrig import`.
 #[must_use]
 pub fn schedule_schema_json() -> String {
-    schema(&crate::keys::schedule::SCHEDULE, "skinrig schedule")
+    schema(crate::keys::ScheduleKeys::TABLE, "skinrig schedule")
 }
 
 /// The JSON Schema of a rig file for `--rig`.

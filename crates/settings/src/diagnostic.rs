@@ -144,6 +144,7 @@ impl Paint {
 const MOST_FINDINGS: usize = 100;
 
 /// Collects findings about some sources.
+#[derive(Default)]
 pub struct Collector {
     /// The texts.
     pub sources: Sources,

@@ -47,7 +47,9 @@ pub use quantity::Dimension;
 pub use range::ValueRange;
 pub use read::{example, expectation};
 pub use schema::schema_json;
-pub use setting::{Choice, OutOfRange, Row, Setting, Settings, in_unit, key_path, whole_units};
+pub use setting::{
+    Choice, NumberSpan, Numbers, OutOfRange, Row, Setting, Settings, in_unit, key_path, whole_units,
+};
 pub use shape::{Key, Need, Shape, Table, Word};
 pub use skinrig_settings_derive::{Choice, Settings};
 pub use source::{Location, Sources, Span};

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use crate::diagnostic::Collector;
 use crate::field::{Field, Value};
 use crate::shape::{Shape, Table, Word};
+use crate::source::Span;
 use crate::yaml::join;
 
 /// A struct whose fields are the keys of a mapping; see the [crate] for how `#[derive(Settings)]` declares them.
@@ -145,6 +146,42 @@ impl Setting for BTreeMap<String, i64> {
     fn text(&self) -> String {
         let entries: Vec<String> = self.iter().map(|(k, v)| format!("{k}: {v}")).collect();
         format!("{{{}}}", entries.join(", "))
+    }
+}
+
+/// Numbers counted from 1 and spans of them, such as `[1, 3-5]`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Numbers(pub Vec<NumberSpan>);
+
+/// The numbers from `first` to `last`, and the place of the text that names them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct NumberSpan {
+    /// First number, at least 1.
+    pub first: u32,
+    /// Last number, at least `first`.
+    pub last: u32,
+    /// Its place.
+    pub span: Span,
+}
+
+impl Setting for Numbers {
+    const SHAPE: Shape = Shape::Numbers;
+
+    fn from_field(field: &Field, _: &mut Collector) -> Option<Self> {
+        let Value::Numbers(spans) = &field.value else {
+            return None;
+        };
+        let spans = spans.iter();
+        let spans = spans.map(|&(first, last, span)| NumberSpan { first, last, span });
+        Some(Self(spans.collect()))
+    }
+
+    fn text(&self) -> String {
+        let spans = self.0.iter().map(|s| match s.first == s.last {
+            true => s.first.to_string(),
+            false => format!("{}-{}", s.first, s.last),
+        });
+        format!("[{}]", spans.collect::<Vec<_>>().join(", "))
     }
 }
 

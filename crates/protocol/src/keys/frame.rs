@@ -1,144 +1,148 @@
 //! Keys of the skin's frame and of the sync presses.
 
-use super::{
-    DEPTH, LENGTH, POINT, POINT_ITEM, POSITIVE_LENGTH, POSITIVE_SPAN, SPAN, count, default,
-    optional, required,
-};
-use crate::shape::{Shape, Table, Word};
+use skinrig_model::{HostDuration, OUTLINE_SHAPE, Point2, SkinOutline};
+use skinrig_settings::{Collector, Field, Setting, Settings};
 
-pub(crate) static FRAME: Table = Table {
-    name: "frame",
-    doc: "The skin's outline and what must not be touched.",
-    keys: &[
-        default(
-            "outline",
-            Shape::WordOr(OUTLINES, &OUTLINE),
-            "paper",
-            "The skin's outline.",
-        ),
-        default(
-            "margin",
-            LENGTH,
-            "0 mm",
-            "Every press stays at least this far inside the outline: half the width of the tip, and some.",
-        ),
-        optional(
-            "keep_outs",
-            Shape::List {
-                of: &Shape::Map(&KEEP_OUT),
-                min: 0,
-                max: 1000,
+use super::ranges::{DEPTH_MM, LENGTH_MM, POSITIVE_LENGTH_MM, POSITIVE_SPAN_S, SPAN_S};
+use crate::area::{Area, KeepOut, Surroundings};
+
+/// The skin's outline and what must not be touched.
+#[derive(Settings)]
+pub(crate) struct Frame {
+    /// The skin's outline.
+    #[setting(default = "paper", value = SkinOutline::PAPER)]
+    #[setting(shape = OUTLINE_SHAPE, read = SkinOutline::read, show = Setting::text)]
+    pub outline: SkinOutline,
+    /// Every press stays at least this far inside the outline: half the width of the tip, and some.
+    #[setting(default = "0 mm", range = LENGTH_MM)]
+    pub margin_mm: f64,
+    /// Areas that the tip must not enter.
+    #[setting(items = 0..=1000)]
+    pub keep_outs: Option<Vec<KeepOutKeys>>,
+}
+
+impl Frame {
+    /// The surroundings of the skin.
+    pub(crate) fn surroundings(&self) -> Surroundings {
+        let keep_outs = self.keep_outs.iter().flatten();
+        Surroundings {
+            outline: self.outline,
+            margin_mm: self.margin_mm,
+            keep_outs: (1..)
+                .zip(keep_outs)
+                .filter_map(|(n, keys)| keys.keep_out(n))
+                .collect(),
+        }
+    }
+}
+
+/// An area that the tip must not enter: a circle, a rectangle or a polygon.
+#[derive(Settings)]
+#[settings(name = "keep_out", exactly_one("circle", "rectangle", "polygon"))]
+pub(crate) struct KeepOutKeys {
+    /// A circle.
+    circle: Option<Circle>,
+    /// A rectangle along the axes.
+    rectangle: Option<Rectangle>,
+    /// A polygon by its corners, in order around it.
+    #[setting(items = 3..=1000)]
+    polygon: Option<Vec<Point2>>,
+    /// The tip stays at least this far away from the area.
+    #[setting(default = "0 mm", range = LENGTH_MM)]
+    margin_mm: f64,
+    /// Height of the obstacle above the surface; travel at or above it may pass over. Without it nothing passes over.
+    #[setting(range = LENGTH_MM)]
+    height_mm: Option<f64>,
+    /// What stands there, for messages and pictures.
+    name: Option<String>,
+}
+
+impl KeepOutKeys {
+    fn keep_out(&self, number: usize) -> Option<KeepOut> {
+        let name = self.name.clone();
+        Some(KeepOut {
+            name: name.unwrap_or_else(|| format!("keep-out {number}")),
+            area: match self {
+                Self {
+                    circle: Some(c), ..
+                } => Area::Circle {
+                    centre: c.centre,
+                    radius_mm: c.radius_mm,
+                },
+                Self {
+                    rectangle: Some(r), ..
+                } => Area::Polygon(r.corners().to_vec()),
+                _ => Area::Polygon(self.polygon.clone()?),
             },
-            "Areas that the tip must not enter.",
-        ),
-    ],
-    exactly_one: &[],
-};
+            margin_mm: self.margin_mm,
+            height_mm: self.height_mm,
+        })
+    }
+}
 
-pub(crate) const OUTLINES: &[Word] = &[(
-    "paper",
-    "the published skin: 100 x 100 mm about (10, 2) mm, right corners chamfered by 20 mm, left corners rounded with 25 mm",
-)];
+/// A circle.
+#[derive(Settings)]
+struct Circle {
+    /// Its centre.
+    centre: Point2,
+    /// Its radius.
+    #[setting(range = POSITIVE_LENGTH_MM)]
+    radius_mm: f64,
+}
 
-pub(crate) static OUTLINE: Table = Table {
-    name: "outline",
-    doc: "A rectangle whose right corners (larger x) are chamfered and whose left corners are rounded.",
-    keys: &[
-        required("centre", POINT, "Middle of the rectangle."),
-        required("width", POSITIVE_LENGTH, "Full extent along x."),
-        required("height", POSITIVE_LENGTH, "Full extent along y."),
-        default(
-            "chamfer",
-            LENGTH,
-            "0 mm",
-            "Length cut from each side at the two right corners.",
-        ),
-        default("radius", LENGTH, "0 mm", "Radius of the two left corners."),
-    ],
-    exactly_one: &[],
-};
+/// A rectangle along the axes.
+#[derive(Settings)]
+#[settings(finish = Self::not_empty)]
+struct Rectangle {
+    /// The corner with the smaller x and y.
+    min: Point2,
+    /// The corner with the larger x and y.
+    max: Point2,
+}
 
-pub(crate) static KEEP_OUT: Table = Table {
-    name: "keep_out",
-    doc: "An area that the tip must not enter: a circle, a rectangle or a polygon.",
-    keys: &[
-        optional("circle", Shape::Map(&CIRCLE), "A circle."),
-        optional(
-            "rectangle",
-            Shape::Map(&RECTANGLE),
-            "A rectangle along the axes.",
-        ),
-        optional(
-            "polygon",
-            Shape::List {
-                of: &POINT_ITEM,
-                min: 3,
-                max: 1000,
-            },
-            "A polygon by its corners, in order around it.",
-        ),
-        default(
-            "margin",
-            LENGTH,
-            "0 mm",
-            "The tip stays at least this far away from the area.",
-        ),
-        optional(
-            "height",
-            LENGTH,
-            "Height of the obstacle above the surface; travel at or above it may pass over. Without it nothing passes over.",
-        ),
-        optional(
-            "name",
-            Shape::Text,
-            "What stands there, for messages and pictures.",
-        ),
-    ],
-    exactly_one: &[&["circle", "rectangle", "polygon"]],
-};
+impl Rectangle {
+    fn corners(&self) -> [Point2; 4] {
+        let (min, max) = (self.min, self.max);
+        let corner = Point2::new;
+        [
+            min,
+            corner(max.x_mm, min.y_mm),
+            max,
+            corner(min.x_mm, max.y_mm),
+        ]
+    }
 
-pub(crate) static CIRCLE: Table = Table {
-    name: "circle",
-    doc: "A circle.",
-    keys: &[
-        required("centre", POINT, "Its centre."),
-        required("radius", POSITIVE_LENGTH, "Its radius."),
-    ],
-    exactly_one: &[],
-};
+    fn not_empty(self, field: &Field, out: &mut Collector) -> Option<Self> {
+        let (min, max) = (self.min, self.max);
+        if min.x_mm >= max.x_mm || min.y_mm >= max.y_mm {
+            let found = format!(
+                "({}, {}) and ({}, {}) mm",
+                min.x_mm, min.y_mm, max.x_mm, max.y_mm
+            );
+            out.error(field.span, field.path.as_str(), "the rectangle is empty")
+                .expected("`min` smaller than `max` in x and y")
+                .found(found);
+        }
+        Some(self)
+    }
+}
 
-pub(crate) static RECTANGLE: Table = Table {
-    name: "rectangle",
-    doc: "A rectangle along the axes.",
-    keys: &[
-        required("min", POINT, "The corner with the smaller x and y."),
-        required("max", POINT, "The corner with the larger x and y."),
-    ],
-    exactly_one: &[],
-};
-
-pub(crate) static SYNC: Table = Table {
-    name: "sync",
-    doc: "Presses before everything else. The paper: 3 presses 1 s apart at the centre, then 3 s.",
-    keys: &[
-        required("count", count(1, 1000), "How many presses."),
-        required(
-            "interval",
-            POSITIVE_SPAN,
-            "Time from the begin of one sync press to the begin of the next.",
-        ),
-        optional("at", POINT, "Where; the centre of the outline when absent."),
-        default(
-            "pause_after",
-            SPAN,
-            "0 s",
-            "Pause after the last sync press, counted from its end.",
-        ),
-        optional(
-            "depth",
-            DEPTH,
-            "How deep; the first depth of the path when absent.",
-        ),
-    ],
-    exactly_one: &[],
-};
+/// Presses before everything else. The paper: 3 presses 1 s apart at the centre, then 3 s.
+#[derive(Settings)]
+#[settings(name = "sync")]
+pub(crate) struct SyncKeys {
+    /// How many presses.
+    #[setting(min = 1, max = 1000)]
+    pub count: u32,
+    /// Time from the start of one sync press to the start of the next.
+    #[setting(range = POSITIVE_SPAN_S)]
+    pub interval_s: f64,
+    /// Where; the centre of the outline when absent.
+    pub at: Option<Point2>,
+    /// Pause after the last sync press, counted from its end.
+    #[setting(default = "0 s", range = SPAN_S)]
+    pub pause_after: HostDuration,
+    /// How deep; the first depth of the path when absent.
+    #[setting(range = DEPTH_MM)]
+    pub depth_mm: Option<f64>,
+}

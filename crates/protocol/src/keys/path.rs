@@ -1,235 +1,201 @@
 //! Keys of the path, the repetitions and the order.
 
-use super::{
-    LENGTH, MOST_POINTS, POINT, POINT_ITEM, POSITIVE_LENGTH, SEED, SPAN, count, default, optional,
-    required,
-};
-use crate::shape::{Range, Shape, Table, Word};
-use skinrig_settings::Dimension::Angle;
+use skinrig_model::{HostDuration, Point2};
+use skinrig_settings::{Choice, Collector, Field, Setting, Settings, Shape};
 
-pub(crate) static PATH: Table = Table {
-    name: "path",
-    doc: "The locations that are pressed: exactly one kind.",
-    keys: &[
-        optional(
-            "meander",
-            Shape::Map(&MEANDER),
-            "A grid, line by line, every second line backwards.",
-        ),
-        optional(
-            "circles",
-            Shape::Map(&CIRCLES),
-            "Rings of presses, counter-clockwise.",
-        ),
-        optional(
-            "points",
-            Shape::List {
-                of: &POINT_ITEM,
-                min: 1,
-                max: MOST_POINTS as usize,
-            },
-            "Explicit locations.",
-        ),
-        optional(
-            "csv",
-            Shape::Map(&CSV),
-            "Locations from a CSV file with the columns `x` and `y`.",
-        ),
-        optional(
-            "random",
-            Shape::Map(&RANDOM),
-            "Random locations inside the outline, with a least distance between any two.",
-        ),
-    ],
-    exactly_one: &[&["meander", "circles", "points", "csv", "random"]],
-};
+use super::ranges::{LENGTH_MM, MOST_POINTS, POSITIVE_LENGTH_MM, SPAN_S};
 
-pub(crate) static MEANDER: Table = Table {
-    name: "meander",
-    doc: "A grid, line by line, every second line backwards.",
-    keys: &[
-        required(
-            "origin",
-            POINT,
-            "The first location: the grid's corner with the smallest x and y.",
-        ),
-        required(
-            "pitch",
-            POSITIVE_LENGTH,
-            "Distance of neighbours along x and along y.",
-        ),
-        required("columns", count(1, 10_000), "Locations along x."),
-        required("rows", count(1, 10_000), "Locations along y."),
-        required(
-            "line_direction",
-            Shape::Choice(AXES),
-            "The axis along which a line runs.",
-        ),
-        optional(
-            "count",
-            count(1, MOST_POINTS),
-            "How many locations are used, from the first; all when absent.",
-        ),
-    ],
-    exactly_one: &[],
-};
+/// The locations that are pressed: exactly one kind.
+#[derive(Settings)]
+#[settings(name = "path", no_default)]
+#[settings(exactly_one("meander", "circles", "points", "csv", "random"))]
+pub(crate) struct Path {
+    /// A grid, line by line, every second line backwards.
+    pub meander: Option<Meander>,
+    /// Rings of presses, counter-clockwise.
+    pub circles: Option<Circles>,
+    /// Explicit locations.
+    #[setting(items = 1..=MOST_POINTS as usize)]
+    pub points: Option<Vec<Point2>>,
+    /// Locations from a CSV file with the columns `x` and `y`.
+    pub csv: Option<Csv>,
+    /// Random locations inside the outline, with a least distance between any two.
+    pub random: Option<Random>,
+}
 
-pub(crate) const AXES: &[Word] = &[
-    (
-        "x",
-        "lines run along x; the next line is one pitch further in y",
-    ),
-    (
-        "y",
-        "lines run along y; the next line is one pitch further in x",
-    ),
-];
+/// A grid, line by line, every second line backwards.
+#[derive(Settings)]
+pub(crate) struct Meander {
+    /// The first location: the grid's corner with the smallest x and y.
+    pub origin: Point2,
+    /// Distance of neighbours along x and along y.
+    #[setting(range = POSITIVE_LENGTH_MM)]
+    pub pitch_mm: f64,
+    /// Locations along x.
+    #[setting(min = 1, max = 10_000)]
+    pub columns: u32,
+    /// Locations along y.
+    #[setting(min = 1, max = 10_000)]
+    pub rows: u32,
+    /// The axis along which a line runs.
+    pub line_direction: LineDirection,
+    /// How many locations are used, from the first; all when absent.
+    #[setting(min = 1, max = MOST_POINTS)]
+    pub count: Option<u32>,
+}
 
-pub(crate) static CIRCLES: Table = Table {
-    name: "circles",
-    doc: "Rings of presses about one centre, each counter-clockwise, in the order given.",
-    keys: &[
-        required("centre", POINT, "Centre of all rings."),
-        required(
-            "rings",
-            Shape::List {
-                of: &Shape::Map(&RING),
-                min: 1,
-                max: 1000,
-            },
-            "The rings.",
-        ),
-        default(
-            "start_angle",
-            Shape::Quantity(&[Angle], Range::between(-360.0, 360.0)),
-            "0 deg",
-            "Direction of each ring's first press from the centre, counter-clockwise from the x axis.",
-        ),
-    ],
-    exactly_one: &[],
-};
+/// The axis along which a line of a grid runs.
+#[derive(Clone, Copy, PartialEq, Choice)]
+pub(crate) enum LineDirection {
+    /// Lines run along x; the next line is one pitch further in y.
+    X,
+    /// Lines run along y; the next line is one pitch further in x.
+    Y,
+}
 
-pub(crate) static RING: Table = Table {
-    name: "ring",
-    doc: "One ring of presses at equal angles.",
-    keys: &[
-        required("radius", POSITIVE_LENGTH, "Its radius."),
-        required("presses", count(1, 10_000), "How many presses."),
-    ],
-    exactly_one: &[],
-};
+/// Rings of presses about one centre, each counter-clockwise, in the order given.
+#[derive(Settings)]
+pub(crate) struct Circles {
+    /// Centre of all rings.
+    pub centre: Point2,
+    /// The rings.
+    #[setting(items = 1..=1000)]
+    pub rings: Vec<Ring>,
+    /// Direction of each ring's first press from the centre, counter-clockwise from the x axis.
+    #[setting(default = "0 deg", min = -360.0, max = 360.0)]
+    pub start_angle_deg: f64,
+}
 
-pub(crate) static CSV: Table = Table {
-    name: "csv",
-    doc: "Locations from a CSV file with a header; the columns `x` and `y` are used.",
-    keys: &[
-        required(
-            "file",
-            Shape::Text,
-            "The file, relative to the protocol's own folder.",
-        ),
-        required(
-            "unit",
-            Shape::Choice(UNITS),
-            "Unit of the columns `x` and `y`.",
-        ),
-        default(
-            "skip_blank_rows",
-            Shape::Flag,
-            "false",
-            "Whether rows with nothing but blanks are skipped; otherwise they are errors.",
-        ),
-        optional(
-            "count",
-            count(1, MOST_POINTS),
-            "How many locations are used, from the first; all when absent.",
-        ),
-    ],
-    exactly_one: &[],
-};
+/// One ring of presses at equal angles.
+#[derive(Settings)]
+pub(crate) struct Ring {
+    /// Its radius.
+    #[setting(range = POSITIVE_LENGTH_MM)]
+    pub radius_mm: f64,
+    /// How many presses.
+    #[setting(min = 1, max = 10_000)]
+    pub presses: u32,
+}
 
-pub(crate) const UNITS: &[Word] = &[
-    ("mm", "millimetres"),
-    ("cm", "centimetres"),
-    ("m", "metres"),
-];
+/// Locations from a CSV file with a header; the columns `x` and `y` are used.
+#[derive(Settings)]
+pub(crate) struct Csv {
+    /// The file, relative to the protocol's own folder.
+    pub file: String,
+    /// Unit of the columns `x` and `y`.
+    pub unit: LengthUnit,
+    /// Whether rows with nothing but blanks are skipped; otherwise they are errors.
+    #[setting(default = "false")]
+    pub skip_blank_rows: bool,
+    /// How many locations are used, from the first; all when absent.
+    #[setting(min = 1, max = MOST_POINTS)]
+    pub count: Option<u32>,
+}
 
-pub(crate) static RANDOM: Table = Table {
-    name: "random",
-    doc: "Random locations: uniform inside the outline, thrown until each is far enough from all others.",
-    keys: &[
-        required("count", count(1, 10_000), "How many locations."),
-        required("spacing", LENGTH, "Least distance of any two locations."),
-        default(
-            "margin",
-            LENGTH,
-            "0 mm",
-            "Least distance from the outline, beyond `frame.margin`.",
-        ),
-        optional(
-            "seed",
-            SEED,
-            "Seed of the locations; the run's seed when absent.",
-        ),
-    ],
-    exactly_one: &[],
-};
+/// Unit of the columns of a CSV file.
+#[derive(Clone, Copy, Choice)]
+pub(crate) enum LengthUnit {
+    /// Millimetres.
+    Mm,
+    /// Centimetres.
+    Cm,
+    /// Metres.
+    M,
+}
 
-pub(crate) static REPETITIONS: Table = Table {
-    name: "repetitions",
-    doc: "How often the whole path is run.",
-    keys: &[
-        default(
-            "count",
-            count(1, 10_000),
-            "1",
-            "How often the whole path is run.",
-        ),
-        default(
-            "between",
-            Shape::Map(&BETWEEN),
-            "{}",
-            "What happens between two repetitions.",
-        ),
-    ],
-    exactly_one: &[],
-};
+impl LengthUnit {
+    /// One unit in mm.
+    pub(crate) const fn in_mm(self) -> f64 {
+        match self {
+            Self::Mm => 1.0,
+            Self::Cm => 10.0,
+            Self::M => 1000.0,
+        }
+    }
+}
 
-pub(crate) static BETWEEN: Table = Table {
-    name: "between",
-    doc: "What happens between two repetitions.",
-    keys: &[
-        default(
-            "return_to_start",
-            Shape::Flag,
-            "true",
-            "Go back above the first location before the pause; otherwise after it.",
-        ),
-        default("pause", SPAN, "0 s", "How long to wait."),
-    ],
-    exactly_one: &[],
-};
+/// Random locations: uniform inside the outline, drawn until each is far enough from all others.
+#[derive(Settings)]
+pub(crate) struct Random {
+    /// How many locations.
+    #[setting(min = 1, max = 10_000)]
+    pub count: u32,
+    /// Least distance of any two locations.
+    #[setting(range = LENGTH_MM)]
+    pub spacing_mm: f64,
+    /// Least distance from the outline, beyond `frame.margin`.
+    #[setting(default = "0 mm", range = LENGTH_MM)]
+    pub margin_mm: f64,
+    /// Seed of the locations; the run's seed when absent.
+    pub seed: Option<u64>,
+}
 
-pub(crate) const ORDER: &[Word] = &[("listed", "the order of the path")];
+/// How often the whole path is run.
+#[derive(Settings)]
+pub(crate) struct Repetitions {
+    /// How often the whole path is run.
+    #[setting(default = "1", min = 1, max = 10_000)]
+    pub count: u32,
+    /// What happens between two repetitions.
+    #[setting(default)]
+    pub between: Between,
+}
 
-pub(crate) static ORDER_TABLE: Table = Table {
-    name: "order",
-    doc: "A shuffled order.",
-    keys: &[required(
-        "shuffled",
-        Shape::Map(&SHUFFLED),
-        "Each repetition runs its presses (all locations at all depths) in its own random order.",
-    )],
-    exactly_one: &[],
-};
+/// What happens between two repetitions.
+#[derive(Settings)]
+pub(crate) struct Between {
+    /// Go back above the first location before the pause; otherwise after it.
+    #[setting(default = "true")]
+    pub return_to_start: bool,
+    /// How long to wait.
+    #[setting(default = "0 s", range = SPAN_S)]
+    pub pause: HostDuration,
+}
 
-pub(crate) static SHUFFLED: Table = Table {
-    name: "shuffled",
-    doc: "A random order.",
-    keys: &[optional(
-        "seed",
-        SEED,
-        "Seed of the order; the run's seed when absent.",
-    )],
-    exactly_one: &[],
-};
+/// In which order the presses of a repetition come.
+pub(crate) enum Order {
+    /// The order of the path.
+    Listed,
+    /// A random one.
+    Shuffled(Shuffled),
+}
+
+/// The order that has a name.
+#[derive(Clone, Copy, Choice)]
+enum KnownOrder {
+    /// The order of the path.
+    Listed,
+}
+
+/// A shuffled order.
+#[derive(Settings)]
+#[settings(name = "order")]
+struct OrderKeys {
+    /// Each repetition runs its presses (all locations at all depths) in its own random order.
+    shuffled: Shuffled,
+}
+
+/// A random order.
+#[derive(Settings)]
+pub(crate) struct Shuffled {
+    /// Seed of the order; the run's seed when absent.
+    pub seed: Option<u64>,
+}
+
+impl Setting for Order {
+    const SHAPE: Shape = Shape::WordOr(KnownOrder::WORDS, OrderKeys::TABLE);
+
+    fn from_field(field: &Field, out: &mut Collector) -> Option<Self> {
+        match field.as_word().and_then(KnownOrder::from_word) {
+            Some(KnownOrder::Listed) => Some(Self::Listed),
+            None => OrderKeys::from_mapping(field, out).map(|keys| Self::Shuffled(keys.shuffled)),
+        }
+    }
+
+    fn text(&self) -> String {
+        match self {
+            Self::Listed => KnownOrder::Listed.text(),
+            Self::Shuffled(shuffled) => format!("{{shuffled: {}}}", shuffled.text()),
+        }
+    }
+}

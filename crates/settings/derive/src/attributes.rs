@@ -2,7 +2,7 @@
 
 use proc_macro2::TokenStream;
 use syn::punctuated::Punctuated;
-use syn::{Attribute, Expr, Lit, LitStr, Meta, Path, Result, Token, parenthesized};
+use syn::{Attribute, Expr, Ident, Lit, LitStr, Meta, Path, Result, Token, parenthesized};
 
 /// The attributes of a struct.
 #[derive(Default)]
@@ -11,6 +11,7 @@ pub struct StructAttributes {
     pub exactly_one: Vec<Vec<String>>,
     pub finish: Option<Path>,
     pub no_default: bool,
+    pub parts: Option<Ident>,
 }
 
 /// The default of a key.
@@ -58,10 +59,14 @@ impl StructAttributes {
                     out.exactly_one.push(strings(meta.input)?);
                 } else if meta.path.is_ident("finish") {
                     out.finish = Some(meta.value()?.parse()?);
+                } else if meta.path.is_ident("parts") {
+                    out.parts = Some(meta.value()?.parse()?);
                 } else if meta.path.is_ident("no_default") {
                     out.no_default = true;
                 } else {
-                    return Err(meta.error("expected name, exactly_one, finish or no_default"));
+                    return Err(
+                        meta.error("expected name, exactly_one, finish, parts or no_default")
+                    );
                 }
                 Ok(())
             })?;

@@ -41,6 +41,30 @@ pub fn settings(input: &DeriveInput) -> Result<TokenStream> {
         Some(path) => quote!(#path(value, field, out)),
         None => quote!(Some(value)),
     };
+    let types = fields.named.iter().map(|f| &f.ty);
+    let visibility = &input.vis;
+    let parts_struct = attributes.parts.map(|parts| {
+        let reads = reads.clone();
+        let (idents, types) = (&idents, types);
+        let doc = format!("What could be read of a [`{ident}`].");
+        quote! {
+            #[doc = #doc]
+            #visibility struct #parts {
+                #(#visibility #idents: Option<#types>,)*
+            }
+
+            impl #ident {
+                /// Reads each key, also when others cannot be read.
+                #visibility fn read_parts(
+                    field: &::skinrig_settings::Field,
+                    out: &mut ::skinrig_settings::Collector,
+                ) -> #parts {
+                    #(#reads)*
+                    #parts { #(#idents),* }
+                }
+            }
+        }
+    });
     let defaults: Option<Vec<&TokenStream>> = parts.iter().map(|p| p.default.as_ref()).collect();
     let default = defaults.filter(|_| !attributes.no_default).map(|values| {
         quote! {
@@ -106,6 +130,8 @@ pub fn settings(input: &DeriveInput) -> Result<TokenStream> {
         }
 
         #default
+
+        #parts_struct
     })
 }
 

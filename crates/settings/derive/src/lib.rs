@@ -4,6 +4,8 @@
 //! - `name = "motion"`: name in the JSON Schema; the struct's own name in snake case when absent.
 //! - `exactly_one("depth", "depths")`: of these keys exactly one must be given. May be repeated.
 //! - `finish = path`: a function `(Self, &Field, &mut Collector) -> Option<Self>` that holds keys against each other.
+//! - `parts = NAME`: a struct of that name with each field as an `Option`, and `Self::read_parts(&Field, &mut Collector)`: what
+//!   could be read of a mapping with mistakes, so that its keys can still be held against each other.
 //! - `no_default`: no `impl Default`, which there is otherwise when no key is required.
 //!
 //! # Attributes of a field: `#[setting(...)]`

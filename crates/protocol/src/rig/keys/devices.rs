@@ -1,7 +1,7 @@
 //! Keys of the robot, the cameras and the trigger box.
 
 use super::{ANGLE, MASS};
-use crate::keys::schedule::CAMERA as NOMINAL_CAMERA;
+use crate::keys::NOMINAL_CAMERA;
 use crate::keys::{ROI, count, default, optional, required};
 use crate::shape::{Range, Shape, Table, Word};
 use skinrig_settings::Dimension::{Acceleration, EventRate, Force, Jerk, Time};
@@ -217,7 +217,7 @@ static CAMERA: Table = Table {
         ),
         optional(
             "roi",
-            Shape::Map(&ROI),
+            Shape::Map(ROI),
             "Pixels that stay on; all when absent.",
         ),
         optional(
@@ -288,7 +288,7 @@ static CAMERA: Table = Table {
         ),
         required(
             "geometry",
-            Shape::Map(&NOMINAL_CAMERA),
+            Shape::Map(NOMINAL_CAMERA),
             "Where the camera stands, as drawn or measured: where calibration starts.",
         ),
     ],

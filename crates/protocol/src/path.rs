@@ -1,108 +1,109 @@
 //! The locations of a path: meander, circles, explicit points, CSV, random.
 
 use std::collections::HashMap;
-use std::path::Path;
 
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use skinrig_model::Point2;
 
 use crate::area::Surroundings;
+use crate::keys::{Circles, Csv, LineDirection, MOST_POINTS, Meander, Path, Random};
 use crate::protocol::Loader;
-use crate::shape::{Field, Keys};
-use skinrig_settings::Collector;
 use skinrig_settings::Span;
 use skinrig_settings::quote;
+use skinrig_settings::{Collector, Field};
 
-/// The kind of path and its locations in order.
+/// The kind of path and its locations in order. `field` is the mapping that `path` was read from.
 pub(crate) fn locations(
-    path: &Field,
+    path: &Path,
+    field: &Field,
     surroundings: Option<&Surroundings>,
     seed: u64,
-    folder: &Path,
+    folder: &std::path::Path,
     loader: Loader<'_>,
     out: &mut Collector,
 ) -> Option<(&'static str, Vec<Point2>)> {
-    let (kind, field) = path.entries().first()?;
-    match kind.as_str() {
-        "meander" => Some(("meander", meander(field, out)?)),
-        "circles" => Some(("circles", circles(field)?)),
-        "points" => {
-            let points = field.items().iter();
-            let points = points.map(|p| p.pair().map(|[x, y]| Point2::new(x, y)));
-            Some(("points", points.collect::<Option<_>>()?))
+    match path {
+        Path {
+            meander: Some(grid),
+            ..
+        } => Some(("meander", meander(grid, field.at("meander"), out)?)),
+        Path {
+            circles: Some(rings),
+            ..
+        } => Some(("circles", circles(rings))),
+        Path {
+            points: Some(points),
+            ..
+        } => Some(("points", points.clone())),
+        Path {
+            csv: Some(file), ..
+        } => Some(("csv", csv(file, field.at("csv"), folder, loader, out)?)),
+        Path {
+            random: Some(darts),
+            ..
+        } => {
+            let field = field.at("random");
+            Some(("random", random(darts, field, surroundings?, seed, out)?))
         }
-        "csv" => Some(("csv", csv(field, folder, loader, out)?)),
-        "random" => Some(("random", random(field, surroundings?, seed, out)?)),
         _ => None,
     }
 }
 
-fn point(f: &Field, key: &str) -> Option<Point2> {
-    f.get(key)?.pair().map(|[x, y]| Point2::new(x, y))
-}
-
-fn meander(f: &Field, out: &mut Collector) -> Option<Vec<Point2>> {
-    let origin = point(f, "origin")?;
-    let pitch = f.quantity("pitch")?;
-    let (columns, rows) = (f.count("columns")?, f.count("rows")?);
+fn meander(grid: &Meander, f: &Field, out: &mut Collector) -> Option<Vec<Point2>> {
+    let (columns, rows) = (grid.columns, grid.rows);
     let all = u64::from(columns) * u64::from(rows);
-    let count = match f.get("count") {
-        Some(field) => {
-            let count = u64::from(f.count("count")?);
-            if count > all {
-                out.error(field.span, field.path.as_str(), "more than the grid has")
-                    .expected(format!("at most {all}, {columns} columns x {rows} rows"))
-                    .found(count.to_string());
-                return None;
-            }
-            count
-        }
-        None => all,
-    };
-    let along_x = f.word("line_direction")? == "x";
-    let length = u64::from(if along_x { columns } else { rows });
-    if count > crate::keys::MOST_POINTS.unsigned_abs() {
-        out.error(f.span, f.path.as_str(), "too many locations")
-            .expected(format!("at most {}", crate::keys::MOST_POINTS))
+    let count = grid.count.map_or(all, u64::from);
+    if count > all {
+        let at = f.at("count");
+        out.error(at.span, at.path.as_str(), "more than the grid has")
+            .expected(format!("at most {all}, {columns} columns x {rows} rows"))
             .found(count.to_string());
         return None;
     }
-    Some(
-        (0..count)
-            .map(|k| {
-                let (line, step) = (k / length, k % length);
-                let step = if line % 2 == 0 {
-                    step
-                } else {
-                    length - 1 - step
-                };
-                let (i, j) = if along_x { (step, line) } else { (line, step) };
-                Point2::new(
-                    origin.x_mm + pitch * i as f64,
-                    origin.y_mm + pitch * j as f64,
-                )
-            })
-            .collect(),
-    )
+    if count > u64::from(MOST_POINTS) {
+        out.error(f.span, f.path.as_str(), "too many locations")
+            .expected(format!("at most {MOST_POINTS}"))
+            .found(count.to_string());
+        return None;
+    }
+    let length = u64::from(match grid.line_direction {
+        LineDirection::X => columns,
+        LineDirection::Y => rows,
+    });
+    let location = |k: u64| {
+        let (line, step) = (k / length, k % length);
+        let step = if line % 2 == 0 {
+            step
+        } else {
+            length - 1 - step
+        };
+        let (i, j) = match grid.line_direction {
+            LineDirection::X => (step, line),
+            LineDirection::Y => (line, step),
+        };
+        Point2::new(
+            grid.origin.x_mm + grid.pitch_mm * i as f64,
+            grid.origin.y_mm + grid.pitch_mm * j as f64,
+        )
+    };
+    Some((0..count).map(location).collect())
 }
 
-fn circles(f: &Field) -> Option<Vec<Point2>> {
-    let centre = point(f, "centre")?;
-    let start = f.quantity("start_angle")?;
+fn circles(circles: &Circles) -> Vec<Point2> {
     let mut points = Vec::new();
-    for ring in f.get("rings")?.items() {
-        let (radius, presses) = (ring.quantity("radius")?, ring.count("presses")?);
-        for k in 0..presses {
-            let angle = (start + 360.0 * f64::from(k) / f64::from(presses)).to_radians();
+    for ring in &circles.rings {
+        for k in 0..ring.presses {
+            let turn = 360.0 * f64::from(k) / f64::from(ring.presses);
+            let angle = (circles.start_angle_deg + turn).to_radians();
             let (sin, cos) = sine_cosine(angle);
             points.push(Point2::new(
-                centre.x_mm + radius * cos,
-                centre.y_mm + radius * sin,
+                circles.centre.x_mm + ring.radius_mm * cos,
+                circles.centre.y_mm + ring.radius_mm * sin,
             ));
         }
     }
-    Some(points)
+    points
 }
 
 /// Sine and cosine, the same on every machine, with the last-bit noise near 0 removed.
@@ -112,10 +113,16 @@ fn sine_cosine(angle: f64) -> (f64, f64) {
     (tidy(sin), tidy(cos))
 }
 
-fn csv(f: &Field, folder: &Path, loader: Loader<'_>, out: &mut Collector) -> Option<Vec<Point2>> {
-    let file = f.get("file")?;
-    let name = f.text("file")?;
-    let path = folder.join(&name);
+fn csv(
+    keys: &Csv,
+    f: &Field,
+    folder: &std::path::Path,
+    loader: Loader<'_>,
+    out: &mut Collector,
+) -> Option<Vec<Point2>> {
+    let file = f.at("file");
+    let name = &keys.file;
+    let path = folder.join(name);
     let shown = path.display().to_string();
     let bytes = match loader(&path) {
         Ok(bytes) => bytes,
@@ -142,34 +149,23 @@ fn csv(f: &Field, folder: &Path, loader: Loader<'_>, out: &mut Collector) -> Opt
             return None;
         }
     };
-    let scale = match f.word("unit")? {
-        "m" => 1000.0,
-        "cm" => 10.0,
-        _ => 1.0,
-    };
-    let skip_blank = f.flag("skip_blank_rows")?;
     let source = out.sources.add(shown, text.trim_start_matches('\u{feff}'));
-    let points = csv_points(source, scale, skip_blank, out)?;
-    let count = match f.get("count") {
-        Some(field) => {
-            let count = f.count("count")? as usize;
-            if count > points.len() {
-                out.error(field.span, field.path.as_str(), "more than the file has")
-                    .expected(format!("at most {}, the rows of {name}", points.len()))
-                    .found(count.to_string());
-                return None;
-            }
-            count
-        }
-        None => points.len(),
-    };
-    if points.is_empty() || points.len() > crate::keys::MOST_POINTS as usize {
+    let points = csv_points(source, keys.unit.in_mm(), keys.skip_blank_rows, out)?;
+    let count = keys.count.map_or(points.len(), |count| count as usize);
+    if count > points.len() {
+        let at = f.at("count");
+        out.error(at.span, at.path.as_str(), "more than the file has")
+            .expected(format!("at most {}, the rows of {name}", points.len()))
+            .found(count.to_string());
+        return None;
+    }
+    if points.is_empty() || points.len() > MOST_POINTS as usize {
         out.error(
             file.span,
             file.path.as_str(),
             "the number of locations is out of range",
         )
-        .expected(format!("1 to {} rows", crate::keys::MOST_POINTS))
+        .expected(format!("1 to {} rows", MOST_POINTS))
         .found(points.len().to_string());
         return None;
     }
@@ -254,11 +250,17 @@ const MOST_MISSES: u32 = 20_000;
 
 /// Dart throwing: uniform points of the enclosing rectangle from `xoshiro256++(seed)`, x before y; a dart counts
 /// when it lies inside the outline by the margins, outside every keep-out, and far enough from every other.
-fn random(f: &Field, around: &Surroundings, seed: u64, out: &mut Collector) -> Option<Vec<Point2>> {
-    let count = f.count("count")? as usize;
-    let spacing = f.quantity("spacing")?;
-    let margin = f.quantity("margin")? + around.margin_mm;
-    let seed = f.whole("seed").map_or(seed, i64::unsigned_abs);
+fn random(
+    keys: &Random,
+    f: &Field,
+    around: &Surroundings,
+    seed: u64,
+    out: &mut Collector,
+) -> Option<Vec<Point2>> {
+    let count = keys.count as usize;
+    let spacing = keys.spacing_mm;
+    let margin = keys.margin_mm + around.margin_mm;
+    let seed = keys.seed.unwrap_or(seed);
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     let outline = &around.outline;
     let corner = Point2::new(
@@ -302,7 +304,7 @@ fn random(f: &Field, around: &Surroundings, seed: u64, out: &mut Collector) -> O
         }
         misses += 1;
         if misses > MOST_MISSES {
-            let field = f.get("count")?;
+            let field = f.at("count");
             out.error(field.span, field.path.as_str(), "the locations do not fit")
                 .expected(format!(
                     "{count} locations {spacing} mm apart, {margin} mm inside the outline"

@@ -1,0 +1,421 @@
+//! A protocol from its keys: what single keys cannot say, checked across keys.
+
+use std::path::Path;
+
+use sha2::{Digest, Sha256};
+use skinrig_model::pulse::MAX_MARKED_PRESS;
+use skinrig_model::{PulseTrain, SkinOutline};
+use skinrig_settings::{Collector, Diagnostics, Field, Settings, Span, open};
+
+use crate::file::hex;
+use crate::keys::{
+    LimitKeys, MotionKeys, MotionParts, Order, ProtocolKeys, SyncKeys, calibration_possible, roles,
+};
+use crate::path::locations;
+use crate::plan::RunLimits;
+use crate::protocol::{Loader, Motion, Pace, Protocol, Sync};
+use crate::surface::{Surface, surface};
+use crate::surface_check::surface_check;
+use crate::timing;
+
+impl Protocol {
+    /// Reads a protocol from the bytes of a file.
+    ///
+    /// `name` is the file's name for messages, and files named in the protocol are looked up in its folder through
+    /// `loader`. Each override is `key.path=value` as given with `--set`.
+    ///
+    /// # Errors
+    /// [`Diagnostics`] with every finding at once.
+    pub fn parse(
+        name: &str,
+        bytes: &[u8],
+        overrides: &[String],
+        loader: Loader<'_>,
+    ) -> Result<Self, Diagnostics> {
+        protocol(name, bytes, overrides, loader, false)
+    }
+
+    /// Reads the protocol of a recording, which may use keys that a new one may not (`analysis.exclude_presses`). Otherwise as
+    /// [`Protocol::parse`].
+    ///
+    /// # Errors
+    /// [`Diagnostics`] with every finding at once.
+    pub fn parse_recorded(
+        name: &str,
+        bytes: &[u8],
+        overrides: &[String],
+        loader: Loader<'_>,
+    ) -> Result<Self, Diagnostics> {
+        protocol(name, bytes, overrides, loader, true)
+    }
+}
+
+/// Reads a protocol; see [`Protocol::parse`].
+fn protocol(
+    name: &str,
+    bytes: &[u8],
+    overrides: &[String],
+    loader: Loader<'_>,
+    recorded: bool,
+) -> Result<Protocol, Diagnostics> {
+    let (mut out, root) = open(name, bytes, overrides, ProtocolKeys::TABLE)?;
+    out.recorded = recorded;
+    let folder = Path::new(name).parent().unwrap_or(Path::new(""));
+    let mut protocol = root.and_then(|root| {
+        let protocol = assemble(&root, folder, loader, &mut out)?;
+        if out.is_clean() {
+            check_timing(&protocol, &root, &mut out);
+        }
+        Some(protocol)
+    });
+    match (&mut protocol, out.is_clean()) {
+        (Some(protocol), true) => {
+            protocol.file_name = name.to_owned();
+            protocol.text = String::from_utf8_lossy(bytes).into_owned();
+            protocol.sha256 = hex(&Sha256::digest(bytes));
+            protocol.overrides = overrides.to_vec();
+        }
+        (None, true) => {
+            let span = Span::default();
+            out.error(span, "", "the file could not be understood")
+                .expected("a protocol")
+                .found("an input that passed every check and still has no meaning")
+                .help("this is a defect of skinrig; please report it with the file");
+        }
+        _ => {}
+    }
+    match protocol {
+        Some(protocol) if out.is_clean() => Ok(protocol),
+        _ => Err(out.finish()),
+    }
+}
+
+/// Every part is read even when another one failed, so that all findings appear at once.
+fn assemble(
+    root: &Field,
+    folder: &Path,
+    loader: Loader<'_>,
+    out: &mut Collector,
+) -> Option<Protocol> {
+    let keys = ProtocolKeys::read_parts(root, out);
+    let surroundings = keys.frame.as_ref().map(|frame| frame.surroundings());
+    let outline = surroundings.as_ref().map(|s| s.outline);
+    let depths_mm = match (&keys.depths_mm, &keys.depth_mm) {
+        (Some(Some(depths)), _) => Some(depths.clone()),
+        (_, Some(Some(depth))) => Some(vec![*depth]),
+        _ => None,
+    };
+    // What could be read is held against each other, also beside keys that could not: their findings are in `out` already.
+    let told = &mut Collector::default();
+    let limits = LimitKeys::read_parts(root.at("limits"), told);
+    let motion = MotionKeys::read_parts(root.at("motion"), told);
+    depths_within(root, limits.max_depth_mm, out);
+    check_motion(
+        &motion,
+        limits.max_speed_mm_s,
+        depths_mm.as_deref(),
+        root,
+        out,
+    );
+    let path = keys.path.as_ref().and_then(|path| {
+        let seed = keys.seed.unwrap_or(1);
+        let field = root.at("path");
+        locations(
+            path,
+            field,
+            surroundings.as_ref(),
+            seed,
+            folder,
+            loader,
+            out,
+        )
+    });
+    let count = keys.repetitions.as_ref().map(|r| r.count);
+    let evaluation = root.at("evaluation");
+    let roles = count.and_then(|count| roles(evaluation, count, out));
+    if let (Some(roles), Some(analysis)) = (&roles, &keys.analysis) {
+        calibration_possible(roles, analysis, evaluation, out);
+    }
+    let press = root.get("press").map(|f| {
+        let surface = surface(f)?;
+        band_fits(&surface, f, motion.clearance_mm, limits.max_depth_mm, out);
+        Some(surface)
+    });
+    let check = root
+        .get("surface_check")
+        .map(|f| surface_check(f, press.as_ref().and_then(Option::as_ref), out));
+
+    let (path_kind, locations) = path?;
+    let (depths_mm, roles, outline) = (depths_mm?, roles?, outline?);
+    let sync = keys.sync?.map(|keys| sync(&keys, outline, &depths_mm));
+    let sync = sync.map_or(Some(None), |sync| sync.map(Some))?;
+    let presses = locations.len() as u64 * depths_mm.len() as u64 * roles.len() as u64
+        + sync.as_ref().map_or(0, |s: &Sync| u64::from(s.count));
+    // The last number that a mark can carry tests the trigger line.
+    if presses > u64::from(MAX_MARKED_PRESS) {
+        out.error(root.at("path").span, "path", "too many presses")
+            .expected(format!("at most {MAX_MARKED_PRESS} presses in all"))
+            .found(presses.to_string())
+            .help("split the campaign into several protocols");
+        return None;
+    }
+    let (limits, motion, seed) = (keys.limits?, keys.motion?, keys.seed?);
+    let between = keys.repetitions?.between;
+    Some(Protocol {
+        file_name: String::new(),
+        text: String::new(),
+        sha256: String::new(),
+        overrides: Vec::new(),
+        name: keys.name?,
+        description: keys.description?,
+        operator: keys.operator?,
+        prototype: keys.prototype?,
+        seed,
+        scene: keys.scene?.scene(),
+        surroundings: surroundings?,
+        sync,
+        locations,
+        path_kind,
+        roles,
+        return_to_start: between.return_to_start,
+        pause_between: between.pause,
+        shuffle_seed: match keys.order? {
+            Order::Listed => None,
+            Order::Shuffled(shuffled) => Some(shuffled.seed.unwrap_or(seed)),
+        },
+        depths_mm,
+        limits: run_limits(&limits, &motion),
+        max_consecutive_invalid: limits.max_consecutive_invalid,
+        motion: Motion {
+            approach: motion.approach,
+            indent: motion.indent,
+            hold: motion.hold,
+            retract: motion.retract,
+            travel_mm_s: motion.travel_mm_s,
+            period_s: motion.period_s,
+            home: match motion.home {
+                Some(home) => home,
+                None => outline.centre.at_height(motion.clearance_mm),
+            },
+        },
+        retakes: keys.retakes?,
+        surface_check: check.map_or(Some(None), |s| s.map(Some))?,
+        suspend: keys.suspend?,
+        faults: keys.faults?.unwrap_or_default(),
+        marks: keys.triggers?.marks,
+        surface: press.map_or(Some(None), |s| s.map(Some))?,
+        analysis: keys.analysis?,
+        cameras: keys.cameras?.requests(),
+        key_places: crate::findings::places(root, &out.sources),
+    })
+}
+
+/// No press and no sync press is deeper than the limit.
+fn depths_within(root: &Field, max_mm: Option<f64>, out: &mut Collector) {
+    let Some(max_mm) = max_mm else { return };
+    let listed = root.get("depths").map_or(&[][..], Field::items).iter();
+    let sync = root.get("sync").and_then(|sync| sync.get("depth"));
+    for field in listed.chain(root.get("depth")).chain(sync) {
+        let Some(depth_mm) = field.as_quantity().filter(|d| *d > max_mm) else {
+            continue;
+        };
+        out.error(
+            field.span,
+            field.path.as_str(),
+            "deeper than the limit allows",
+        )
+        .expected(format!("at most {max_mm} mm, `limits.max_depth`"))
+        .found(format!("{depth_mm} mm"))
+        .help("press less deep, or raise `limits.max_depth` if the skin bears it");
+    }
+}
+
+/// Holds the motion against itself, the fastest allowed speed and the depths.
+fn check_motion(
+    motion: &MotionParts,
+    max_speed_mm_s: Option<f64>,
+    depths_mm: Option<&[f64]>,
+    root: &Field,
+    out: &mut Collector,
+) {
+    let clearance_mm = motion.clearance_mm;
+    let deepest_mm = depths_mm.map(|d| d.iter().copied().fold(0.0, f64::max));
+    let both_mm = clearance_mm.zip(deepest_mm).map(|(c, d)| c + d);
+    let travel = motion.travel_mm_s.map(Pace::Speed);
+    // A speed needs no distance; a time does.
+    for (key, pace, distance_mm) in [
+        ("motion.approach", motion.approach, clearance_mm),
+        ("motion.indent", motion.indent, deepest_mm),
+        ("motion.retract", motion.retract, both_mm),
+        ("motion.travel", travel, Some(0.0)),
+    ] {
+        let speed_mm_s = match (pace, distance_mm) {
+            (Some(Pace::Speed(speed_mm_s)), _) => speed_mm_s,
+            (Some(pace), Some(distance_mm)) => pace.speed_mm_s(distance_mm),
+            _ => continue,
+        };
+        if let Some(max_mm_s) = max_speed_mm_s.filter(|max| speed_mm_s > *max) {
+            out.error(root.at(key).span, key, "faster than the limit allows")
+                .expected(format!("at most {max_mm_s} mm/s, `limits.max_speed`"))
+                .found(format!("{speed_mm_s} mm/s"))
+                .help("move more slowly, or raise `limits.max_speed`");
+        }
+    }
+    if let (Some(Some(period_s)), Some(hold)) = (motion.period_s, motion.hold)
+        && hold.as_secs_f64() >= period_s
+    {
+        let field = root.at("motion.hold");
+        out.error(
+            field.span,
+            "motion.hold",
+            "the hold is longer than the period",
+        )
+        .expected(format!("less than `motion.period`, {period_s} s"))
+        .found(format!("{} s", hold.as_secs_f64()))
+        .help("shorten the hold or lengthen the period");
+    }
+    let shallowest_mm = depths_mm.and_then(|d| d.iter().copied().reduce(f64::min));
+    let room_mm = clearance_mm.zip(shallowest_mm).map(|(c, d)| c.min(d));
+    if let (Some(settle), Some(room_mm)) = (&motion.settle, room_mm)
+        && settle.tolerance_mm >= room_mm
+    {
+        out.error(
+            root.at("motion.settle").span,
+            "motion.settle.tolerance",
+            "the tolerance hides the press",
+        )
+        .expected(format!(
+            "less than the smallest depth and the clearance, {room_mm} mm"
+        ))
+        .found(format!("{} mm", settle.tolerance_mm));
+    }
+    if let (Some(Some(home)), Some(clearance_mm)) = (motion.home, clearance_mm)
+        && home.z_mm < clearance_mm
+    {
+        let field = root.at("motion.home");
+        out.error(field.span, "motion.home", "home is below clearance height")
+            .expected(format!(
+                "z of at least {clearance_mm} mm, `motion.clearance`"
+            ))
+            .found(format!("{} mm", home.z_mm));
+    }
+}
+
+fn run_limits(limits: &LimitKeys, motion: &MotionKeys) -> RunLimits {
+    let (min, max) = (limits.workspace.min, limits.workspace.max);
+    RunLimits {
+        workspace_min_mm: [min.x_mm, min.y_mm, min.z_mm],
+        workspace_max_mm: [max.x_mm, max.y_mm, max.z_mm],
+        clearance_mm: motion.clearance_mm,
+        max_depth_mm: limits.max_depth_mm,
+        max_speed_mm_s: limits.max_speed_mm_s,
+        max_force_n: limits.max_force_n,
+        position_tolerance_mm: motion.settle.tolerance_mm,
+        settle_time: motion.settle.time,
+        max_acceleration_mm_s2: limits.max_acceleration_mm_s2,
+        on_trip: limits.on_trip,
+    }
+}
+
+fn sync(keys: &SyncKeys, outline: SkinOutline, depths_mm: &[f64]) -> Option<Sync> {
+    Some(Sync {
+        count: keys.count,
+        interval_s: keys.interval_s,
+        at: keys.at.unwrap_or(outline.centre),
+        pause_after: keys.pause_after,
+        depth_mm: keys.depth_mm.or_else(|| depths_mm.first().copied())?,
+    })
+}
+
+/// The band in which a touch is believed lies below clearance height and above the floor.
+fn band_fits(
+    surface: &Surface,
+    f: &Field,
+    clearance_mm: Option<f64>,
+    max_depth_mm: Option<f64>,
+    out: &mut Collector,
+) {
+    let Surface::Touch(search) = surface else {
+        return;
+    };
+    for (limit, key) in [
+        (clearance_mm, "motion.clearance"),
+        (max_depth_mm, "limits.max_depth"),
+    ] {
+        if let Some(limit) = limit.filter(|limit| search.band_mm >= *limit) {
+            let span = f.get("band").map_or(f.span, |b| b.span);
+            out.error(
+                span,
+                "press.band",
+                "the search would begin or end too far off",
+            )
+            .expected(format!("less than {limit} mm, `{key}`"))
+            .found(format!("{} mm", search.band_mm));
+            return;
+        }
+    }
+}
+
+/// Whether everything fits into its period, and marks do not overlap. Needs the plan.
+fn check_timing(protocol: &Protocol, root: &Field, out: &mut Collector) {
+    let plan = protocol.compile();
+    if let Some(late) = timing::first_misfit(&plan) {
+        let (path, span, key) = if late.sync {
+            (
+                "sync.interval",
+                root.at("sync.interval").span,
+                "sync presses begin",
+            )
+        } else {
+            (
+                "motion.period",
+                root.at("motion.period").span,
+                "presses begin",
+            )
+        };
+        out.error(span, path, "the presses do not fit into their time")
+            .expected(format!(
+                "at least {:.3} s: what {} takes with {:.0} % in reserve (motion {:.3} s, hold and settling {:.3} s, travel to the next {:.3} s)",
+                late.needed_s,
+                late.press,
+                (timing::FIT_RESERVE - 1.0) * 100.0,
+                late.motion_s,
+                late.still_s,
+                late.travel_s
+            ))
+            .found(format!("{key} every {:.3} s", late.period_s))
+            .help("lengthen it, move faster, or lower `motion.clearance` or `motion.hold`");
+    }
+    let train_s = PulseTrain::DURATION_US as f64 * 1e-6;
+    for press in timing::distinct_presses(&plan) {
+        let moments = timing::moments_s(&plan.limits, press);
+        let chosen: Vec<_> = press
+            .marks
+            .iter()
+            .filter_map(|m| moments.iter().find(|(k, _)| k == m))
+            .collect();
+        for pair in chosen.windows(2) {
+            if let [(a, from), (b, to)] = pair
+                && to - from < train_s
+            {
+                out.error(
+                    root.at("triggers.marks").span,
+                    "triggers.marks",
+                    "two marks overlap",
+                )
+                .expected(format!(
+                    "at least {:.1} ms between marks, the length of a coded pulse",
+                    train_s * 1e3
+                ))
+                .found(format!(
+                    "{:.1} ms from `{}` to `{}`",
+                    (to - from) * 1e3,
+                    a.name(),
+                    b.name()
+                ))
+                .help("remove one of the two marks, or move more slowly between them");
+                return;
+            }
+        }
+    }
+}

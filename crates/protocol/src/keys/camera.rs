@@ -1,0 +1,113 @@
+//! Keys of cameras: what is written to them, and where they stand.
+
+use std::collections::BTreeMap;
+
+use skinrig_model::{CameraModel, LensModel, Point2, SENSOR_HEIGHT, SENSOR_WIDTH};
+use skinrig_settings::{Collector, Field, Setting, Settings};
+
+use crate::protocol::CameraRequest;
+
+/// Settings of the two cameras.
+#[derive(Settings)]
+pub(crate) struct Cameras {
+    /// Camera 1.
+    pub camera1: Option<CameraKeys>,
+    /// Camera 2.
+    pub camera2: Option<CameraKeys>,
+}
+
+impl Cameras {
+    /// What is asked of camera 1 and camera 2.
+    pub(crate) fn requests(self) -> [CameraRequest; 2] {
+        [self.camera1, self.camera2].map(|keys| {
+            let keys = keys.unwrap_or_default();
+            CameraRequest {
+                biases: keys.biases.unwrap_or_default(),
+                roi: keys.roi,
+            }
+        })
+    }
+}
+
+/// Settings of one camera; everything absent keeps the device's default.
+#[derive(Settings)]
+#[settings(name = "camera")]
+pub(crate) struct CameraKeys {
+    /// Bias values by name, in the device's own unit.
+    biases: Option<BTreeMap<String, i64>>,
+    /// Pixels that stay on; all when absent.
+    #[setting(shape = Roi::SHAPE, read = Roi::read, show = Roi::show)]
+    roi: Option<[u16; 4]>,
+}
+
+/// A rectangle of pixels that stay on.
+#[derive(Settings)]
+pub(crate) struct Roi {
+    /// First column.
+    #[setting(max = 639)]
+    x: u16,
+    /// First row.
+    #[setting(max = 479)]
+    y: u16,
+    /// Columns.
+    #[setting(min = 1, max = 640)]
+    width: u16,
+    /// Rows.
+    #[setting(min = 1, max = 480)]
+    height: u16,
+}
+
+impl Roi {
+    /// First column, first row, columns, rows.
+    pub(crate) fn read(field: &Field, out: &mut Collector) -> Option<[u16; 4]> {
+        let Self {
+            x,
+            y,
+            width,
+            height,
+        } = Self::from_mapping(field, out)?;
+        if x + width > SENSOR_WIDTH || y + height > SENSOR_HEIGHT {
+            out.error(field.span, field.path.as_str(), "larger than the sensor")
+                .expected("x + width of at most 640 and y + height of at most 480")
+                .found(format!("{} and {}", x + width, y + height));
+        }
+        Some([x, y, width, height])
+    }
+
+    pub(crate) fn show([x, y, width, height]: &[u16; 4]) -> String {
+        format!("{{x: {x}, y: {y}, width: {width}, height: {height}}}")
+    }
+}
+
+/// A camera as drawn or measured.
+#[derive(Settings)]
+pub(crate) struct NominalCamera {
+    /// Its optical centre.
+    position: Point2,
+    /// Where its axis points; the centre of the outline when absent.
+    pub aim: Option<Point2>,
+    /// Turn of the axis away from the aim, clockwise.
+    #[setting(default = "0 deg", min = -90.0, max = 90.0)]
+    skew_deg: f64,
+    /// Half of the horizontal field of view.
+    #[setting(above = 0.0, max = 90.0)]
+    half_field_of_view_deg: f64,
+    /// Distortion W of the lens.
+    #[setting(default = "0", min = -1.0, max = 1.0)]
+    distortion: f64,
+}
+
+impl NominalCamera {
+    /// The camera; it aims at `centre` unless the file says otherwise.
+    pub(crate) fn model(&self, centre: Point2) -> CameraModel {
+        CameraModel {
+            position: self.position,
+            aim: self.aim.unwrap_or(centre),
+            skew_deg: self.skew_deg,
+            lens: LensModel::Exponential {
+                half_fov_deg: self.half_field_of_view_deg,
+                w: self.distortion,
+            },
+        }
+    }
+}

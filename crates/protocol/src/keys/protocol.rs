@@ -1,0 +1,102 @@
+//! Keys of a protocol as a whole.
+
+use skinrig_model::AnalysisSettings;
+use skinrig_settings::{Collector, Field, Settings, Shape};
+
+use super::camera::Cameras;
+use super::evaluation::Evaluation;
+use super::frame::{Frame, SyncKeys};
+use super::motion::{LimitKeys, MotionKeys, Triggers};
+use super::path::{Order, Path, Repetitions};
+use super::ranges::{DEPTH_MM, VERSION};
+use super::scene::SceneKeys;
+use crate::faults::{self, PlantedFault};
+use crate::protocol::Prototype;
+use crate::retakes::Retakes;
+use crate::suspend::Suspend;
+
+/// A skinrig protocol: where, how deep and how often the skin is pressed, and what the presses are for.
+#[derive(Settings)]
+#[settings(name = "protocol", parts = ProtocolParts, exactly_one("depth", "depths"))]
+pub(crate) struct ProtocolKeys {
+    /// Version of the protocol language: 1.
+    #[setting(min = VERSION, max = VERSION)]
+    pub skinrig: u32,
+    /// Short name of the experiment.
+    pub name: String,
+    /// What the experiment is for, in a few sentences.
+    pub description: Option<String>,
+    /// Who runs it. Stored with the session.
+    pub operator: String,
+    /// Which skin is pressed. Stored with the session.
+    pub prototype: Prototype,
+    /// Seed of everything random in the run that has no seed of its own. Stored with the session.
+    #[setting(default = "1")]
+    pub seed: u64,
+    /// What a simulated rig must be good for. A real bench ignores it.
+    pub scene: SceneKeys,
+    /// The skin in its own frame: mm, z out of the surface, z = 0 at the touched surface.
+    #[setting(default)]
+    pub frame: Frame,
+    /// Presses before everything else that let camera clocks be aligned without triggers.
+    pub sync: Option<SyncKeys>,
+    /// The locations that are pressed: exactly one kind of path.
+    pub path: Path,
+    /// How often the whole path is run, and what happens between.
+    #[setting(default)]
+    pub repetitions: Repetitions,
+    /// In which order the presses of a repetition come.
+    #[setting(default = "listed")]
+    pub order: Order,
+    /// Indentation depth of every press, below the touched surface.
+    #[setting(range = DEPTH_MM)]
+    pub depth_mm: Option<f64>,
+    /// Several indentation depths: each repetition runs the whole path once per depth, in this order.
+    #[setting(range = DEPTH_MM, items = 1..=1000)]
+    pub depths_mm: Option<Vec<f64>>,
+    /// How the robot moves.
+    #[setting(default)]
+    pub motion: MotionKeys,
+    /// What must never happen. Checked for every segment of motion before a device is opened, and enforced while running.
+    pub limits: LimitKeys,
+    /// How presses find the surface; absent: as the rig file says, at z = 0 of the frame when it says nothing.
+    #[setting(shape = Shape::Map(&crate::surface::PRESS), read = given, show = nothing)]
+    pub press: Option<()>,
+    /// Touches the surface at some points before the first press and ends the run when it is not where the frame says; no check
+    /// when absent.
+    #[setting(shape = Shape::Map(&crate::surface_check::SURFACE_CHECK), read = given, show = nothing)]
+    pub surface_check: Option<()>,
+    /// How often a press is taken again because its data were lost or it came too late.
+    #[setting(default = "{}", value = Retakes::default(), shape = Shape::Map(&crate::retakes::RETAKES), read = retakes, show = nothing)]
+    pub retakes: Retakes,
+    /// When the run waits by itself until a disturbance is over.
+    #[setting(default = "{}", value = Suspend::default(), shape = Shape::Map(&crate::suspend::SUSPEND), read = crate::suspend::suspend, show = nothing)]
+    pub suspend: Suspend,
+    /// The trigger line to the cameras.
+    #[setting(default)]
+    pub triggers: Triggers,
+    /// Which repetitions calibrate the camera geometry and which are scored. Presses that calibrate never score.
+    pub evaluation: Evaluation,
+    /// Settings of the analysis that follows the run.
+    #[setting(default)]
+    pub analysis: AnalysisSettings,
+    /// Settings written to the cameras before the run and read back.
+    #[setting(default)]
+    pub cameras: Cameras,
+    /// Faults made on purpose, each KIND@WHEN such as camera1-stalled@hold:3 (docs/faults.md). On the simulated rig only.
+    #[setting(shape = faults::SHAPE, read = faults::faults, show = nothing)]
+    pub faults: Option<Vec<PlantedFault>>,
+}
+
+fn given(_: &Field, _: &mut Collector) -> Option<()> {
+    Some(())
+}
+
+fn retakes(field: &Field, _: &mut Collector) -> Option<Retakes> {
+    crate::retakes::retakes(field)
+}
+
+/// These values are read and never shown.
+fn nothing<T>(_: &T) -> String {
+    String::new()
+}

@@ -1,0 +1,93 @@
+//! The moments of a press relative to its press time.
+
+use serde::Serialize;
+use skinrig_model::{HostDuration, HostTime, PressTiming};
+use skinrig_settings::{Collector, Field, Settings, ValueRange};
+
+/// A moment relative to the press time, s; may be before it.
+const MOMENT_S: ValueRange = ValueRange::between(-3600.0, 3600.0);
+
+/// The moments of a press relative to its press time, in this order.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Settings)]
+#[settings(name = "phases", parts = PhaseParts)]
+pub struct PressPhases {
+    /// The downward motion begins.
+    #[setting(range = MOMENT_S)]
+    pub approach: HostDuration,
+    /// The tip reaches the surface.
+    #[setting(range = MOMENT_S)]
+    pub contact: HostDuration,
+    /// The tip settled at its depth.
+    #[setting(range = MOMENT_S)]
+    pub at_depth: HostDuration,
+    /// The upward motion begins.
+    #[setting(range = MOMENT_S)]
+    pub retract: HostDuration,
+    /// The tip leaves the surface.
+    #[setting(range = MOMENT_S)]
+    pub release: HostDuration,
+    /// The tip is back at clearance height.
+    #[setting(range = MOMENT_S)]
+    pub clear: HostDuration,
+}
+
+impl PressPhases {
+    /// The moments of a press since the begin of its downward motion, as host times from 0.
+    #[must_use]
+    pub fn since_approach(&self) -> PressTiming {
+        let at = |moment: HostDuration| HostTime(moment.0 - self.approach.0);
+        PressTiming {
+            approach: at(self.approach),
+            contact: at(self.contact),
+            at_depth: at(self.at_depth),
+            retract: at(self.retract),
+            release: at(self.release),
+            clear: at(self.clear),
+        }
+    }
+
+    /// From the begin of the downward motion to the return to clearance height, s.
+    pub(crate) fn length_s(&self) -> f64 {
+        self.clear.as_secs_f64() - self.approach.as_secs_f64()
+    }
+
+    /// The moments of the press at `t`.
+    #[must_use]
+    pub fn at(&self, t: HostTime) -> PressTiming {
+        PressTiming {
+            approach: t + self.approach,
+            contact: t + self.contact,
+            at_depth: t + self.at_depth,
+            retract: t + self.retract,
+            release: t + self.release,
+            clear: t + self.clear,
+        }
+    }
+
+    /// The moments of the mapping `field` follow one another.
+    pub(crate) fn check_order(field: &Field, out: &mut Collector) {
+        let parts = Self::read_parts(field, &mut Collector::default());
+        let moments = [
+            ("approach", parts.approach),
+            ("contact", parts.contact),
+            ("at_depth", parts.at_depth),
+            ("retract", parts.retract),
+            ("release", parts.release),
+            ("clear", parts.clear),
+        ];
+        for pair in moments.windows(2) {
+            if let [(earlier, Some(a)), (later, Some(b))] = pair
+                && a >= b
+            {
+                let at = field.at(later);
+                out.error(
+                    at.span,
+                    at.path.as_str(),
+                    "the moments of a press are out of order",
+                )
+                .expected(format!("after `{earlier}`, {} s", a.as_secs_f64()))
+                .found(format!("{} s", b.as_secs_f64()));
+            }
+        }
+    }
+}
