@@ -12,9 +12,11 @@ use serde_json::Value;
 
 /// Who may use whom among our own crates, besides tests. Twin of the table in `ARCHITECTURE.md`.
 const ALLOWED: &[(&str, &[&str])] = &[
-    ("skinrig-model", &[]),
+    ("skinrig-settings-derive", &[]),
+    ("skinrig-settings", &["skinrig-settings-derive"]),
+    ("skinrig-model", &["skinrig-settings"]),
     ("skinrig-formats", &["skinrig-model"]),
-    ("skinrig-protocol", &["skinrig-model"]),
+    ("skinrig-protocol", &["skinrig-model", "skinrig-settings"]),
     ("skinrig-device", &["skinrig-model"]),
     ("skinrig-drd-abi", &[]),
     (
@@ -39,7 +41,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
         &["skinrig-protocol", "skinrig-device", "skinrig-model"],
     ),
     ("skinrig-recorder", &["skinrig-model"]),
-    ("skinrig-analysis", &["skinrig-model"]),
+    ("skinrig-analysis", &["skinrig-model", "skinrig-settings"]),
     ("skinrig-compare", &["skinrig-analysis", "skinrig-model"]),
     (
         "skinrig-report",
@@ -48,6 +50,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "skinrig-analysis",
             "skinrig-model",
             "skinrig-nightly",
+            "skinrig-settings",
         ],
     ),
     ("skinrig-nightly", &["skinrig-model"]),
@@ -78,6 +81,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "skinrig-model",
             "skinrig-formats",
             "skinrig-protocol",
+            "skinrig-settings",
             "skinrig-device",
             "skinrig-omega3",
             "skinrig-evk1",

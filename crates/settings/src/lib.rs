@@ -1,7 +1,7 @@
 //! Files of settings. Each key is declared once, by the struct that holds it; text is read with places and help.
 //!
 //! A struct with `#[derive(Settings)]` is a mapping of a YAML file: a field gives the key's name, unit, range, default and
-//! documentation. From that one declaration come the reader ([`open`]), `--set`, the JSON Schema ([`schema_json`]), the
+//! documentation. From that one declaration come the reader ([`open`]), `--set`, the JSON Schema (by [`Settings::TABLE`]), the
 //! `Default` of the struct, the check of a value that was built in code ([`Settings::out_of_range`]) and
 //! the rows of a page that shows it ([`Settings::rows`]). An enum with `#[derive(Choice)]` is a key with a choice of words.
 //!
@@ -34,7 +34,6 @@ mod overrides;
 pub mod quantity;
 mod range;
 mod read;
-mod schema;
 mod setting;
 mod shape;
 mod source;
@@ -46,7 +45,6 @@ pub use language::open;
 pub use quantity::Dimension;
 pub use range::ValueRange;
 pub use read::{example, expectation};
-pub use schema::schema_json;
 pub use setting::{
     Choice, NumberSpan, Numbers, OutOfRange, Row, Setting, Settings, in_unit, key_path, whole_units,
 };

@@ -1,6 +1,6 @@
 //! Values with units and ranges, as the command line takes them.
 
-use skinrig_protocol::quantity::{self, Dimension};
+use skinrig_settings::{Dimension, quantity};
 
 /// A limit that something can be above or below.
 pub(super) fn limit_mm(text: &str) -> Result<f64, String> {

@@ -1,6 +1,6 @@
 //! What the operator types, as orders.
 
-use skinrig_protocol::quantity::{self, Dimension};
+use skinrig_settings::{Dimension, quantity};
 
 /// One line.
 #[derive(Debug, Clone, PartialEq)]

@@ -9,6 +9,7 @@ mod traces;
 use serde_json::{Map, Value, json};
 use skinrig_analysis::result::{Analysis, CalibrationResult};
 use skinrig_model::PressId;
+use skinrig_settings::Settings;
 
 use crate::derive;
 use crate::input::ReportInput;
@@ -297,12 +298,9 @@ pub(crate) fn calibration(c: &CalibrationResult) -> Vec<ParameterRow> {
     c.names.iter().enumerate().map(row).collect()
 }
 
-/// The analysis settings as (name, value) texts.
-pub(crate) fn settings(a: &Analysis) -> Vec<(String, String)> {
-    let value = serde_json::to_value(&a.settings).unwrap_or(Value::Null);
-    let text = |v: &Value| v.as_str().map_or_else(|| v.to_string(), str::to_owned);
-    value
-        .as_object()
-        .map(|m| m.iter().map(|(k, v)| (k.clone(), text(v))).collect())
-        .unwrap_or_default()
+/// The settings of the analysis as (key, value as typed in a protocol, meaning).
+pub(crate) fn settings(a: &Analysis) -> Vec<(String, String, &'static str)> {
+    let given = a.settings.rows().into_iter();
+    let given = given.filter(|row| !row.value.is_empty());
+    given.map(|row| (row.key, row.value, row.doc)).collect()
 }
