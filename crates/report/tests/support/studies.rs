@@ -141,7 +141,11 @@ pub fn latency(noise: &mut Noise, presses: &[PressResult]) -> Latency {
         }),
         reduced: Some(ReducedLatency {
             factor: 1024,
-            thresholds: (3.0, 8.0, 6),
+            thresholds: ThresholdGrid {
+                from: 3.0,
+                to: 8.0,
+                count: 6,
+            },
             target_rate: 0.85,
             threshold: Some(3.0),
             detected_rate: estimate(0.89, 0.03, 300),
