@@ -3,11 +3,12 @@
 use std::fs::File;
 use std::io::{ErrorKind, Read};
 use std::path::Path;
+use std::sync::LazyLock;
 use std::time::Duration;
 
-use sqlx::migrate::Migrator;
+use sqlx::migrate::{Migration, MigrationType, Migrator};
 use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection, SqliteJournalMode, SqliteSynchronous};
-use sqlx::{ConnectOptions, Connection, Row, Sqlite, Transaction};
+use sqlx::{ConnectOptions, Connection, Row, SqlSafeStr, Sqlite, Transaction};
 
 use super::error::{Fault, HistoryError};
 
@@ -16,7 +17,20 @@ pub const HISTORY_SCHEMA_VERSION: u32 = 1;
 /// `skrh` in ASCII (`PRAGMA application_id`).
 pub const HISTORY_APPLICATION_ID: u32 = u32::from_be_bytes(*b"skrh");
 
-static MIGRATOR: Migrator = sqlx::migrate!("../migrations/history");
+/// Every migration, oldest first: version, description and SQL.
+const MIGRATIONS: [(i64, &str, &str); 1] = [(
+    20261122000000,
+    "history",
+    include_str!("../../../migrations/history/20261122000000_history.sql"),
+)];
+
+static MIGRATOR: LazyLock<Migrator> = LazyLock::new(|| {
+    let migrations = MIGRATIONS.into_iter().map(|(version, description, sql)| {
+        let kind = MigrationType::Simple;
+        Migration::new(version, description.into(), kind, sql.into_sql_str(), false)
+    });
+    Migrator::with_migrations(migrations.collect())
+});
 
 /// How long to wait for another program that writes. A write takes milliseconds.
 const BUSY: Duration = Duration::from_secs(30);
