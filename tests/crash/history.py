@@ -3,7 +3,7 @@
     python3 tests/crash/history.py SESSION...
 
 It shares no code with what writes sessions: it reads the tables with sqlite3, unfolds the chunks and reads the trigger trains out of
-the cameras' bytes as docs/session-file.md and crates/model/src/pulse.rs describe them. Prints what is wrong; ends with 1 when anything
+the cameras' bytes as docs/reference/session-file.md and crates/model/src/pulse.rs describe them. Prints what is wrong; ends with 1 when anything
 is, else with 0. It expects a complete EVT2 session of a rig whose trigger line works, in which every press is valid in the end. A press
 may be taken again because a process was gone, or because the rig or the operator cost an attempt; after a run that came to its end
 only such presses are.

@@ -338,7 +338,7 @@ fn rows(text: &str, is_number: impl Fn(&str) -> bool) -> Vec<Vec<String>> {
 
 #[test]
 fn every_question_of_the_guide_has_a_number_of_its_own_and_a_key_that_exists() {
-    let text = read("docs/first-contact.md");
+    let text = read("docs/how-to/bench.md");
     let number = |cell: &str| {
         let (kind, rest) = cell.split_at_checked(1).unwrap_or_default();
         ["R", "C", "T", "B"].contains(&kind)
@@ -386,7 +386,7 @@ fn every_question_of_the_guide_has_a_number_of_its_own_and_a_key_that_exists() {
 
 #[test]
 fn the_steps_of_the_guide_are_counted() {
-    let text = read("docs/first-contact.md");
+    let text = read("docs/how-to/bench.md");
     let steps = rows(&text, |cell| cell.parse::<usize>().is_ok());
     let numbers: Vec<usize> = steps.iter().map(|s| s[0].parse().unwrap()).collect();
     assert_eq!(numbers, (1..=steps.len()).collect::<Vec<_>>());
@@ -396,7 +396,7 @@ fn the_steps_of_the_guide_are_counted() {
 #[test]
 fn every_command_of_the_guides_is_one_of_the_program() {
     let mut seen = 0;
-    for file in ["docs/first-contact.md", "docs/bench.md", "hil/README.md"] {
+    for file in ["docs/how-to/bench.md", "hil/README.md"] {
         let text = read(file);
         for command in text.split('`').filter(|c| c.starts_with("skinrig ")) {
             let words = command

@@ -1,6 +1,6 @@
-//! Faults on purpose, each in each phase of a run: what becomes of it is what docs/faults.md says, and wrong data never pass.
+//! Faults on purpose, each in each phase of a run: what becomes of it is what docs/reference/runs.md says, and wrong data never pass.
 //!
-//! With `SKINRIG_WRITE_DOCS=1` the table of docs/faults.md is written instead of compared.
+//! With `SKINRIG_WRITE_DOCS=1` the table of docs/reference/runs.md is written instead of compared.
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on must fail")]
 
 use std::collections::BTreeMap;
@@ -480,7 +480,7 @@ const BEGIN: &str = "<!-- the table is written by tests/tests/faults.rs -->\n";
 const END: &str = "<!-- end of the table -->";
 
 fn compare(table: &str) {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/faults.md");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/reference/runs.md");
     let text = std::fs::read_to_string(&path).unwrap();
     let (before, rest) = text.split_once(BEGIN).unwrap();
     let (documented, after) = rest.split_once(END).unwrap();
@@ -490,7 +490,7 @@ fn compare(table: &str) {
         let next = "SKINRIG_WRITE_DOCS=1 cargo test -p skinrig-tests --test faults";
         assert_eq!(
             documented, table,
-            "docs/faults.md is not up to date; next: {next}"
+            "docs/reference/runs.md is not up to date; next: {next}"
         );
     }
 }

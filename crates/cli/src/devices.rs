@@ -105,7 +105,7 @@ fn print(lines: &[Line], rig: Option<&RigFile>) {
     }
     if lines.iter().all(|l| l.state != "ready") {
         outln!(
-            "\nno device is ready. The simulated rig needs none: `skinrig run protocols/demo.yaml`; docs/bench.md tells how to wire a bench"
+            "\nno device is ready. The simulated rig needs none: `skinrig run protocols/demo.yaml`; docs/how-to/bench.md tells how to wire a bench"
         );
     }
 }

@@ -237,7 +237,7 @@ impl Core<'_> {
                     "true",
                     s.read_back.as_str(),
                     s.read_back == "true",
-                    "initialise the robot by hand (calibration pole into the pit), or see docs/bench.md",
+                    "initialise the robot by hand (calibration pole into the pit), or see docs/how-to/bench.md",
                 )
                 .about(CheckKind::State(role)),
                 None => PreflightCheck::skipped(
@@ -320,7 +320,7 @@ impl Core<'_> {
                     }
                 }),
                 watch.is_some_and(|w| w.saw_mark(camera, channel)),
-                "check the trigger cable, its channel in the rig file, and levels (docs/bench.md)",
+                "check the trigger cable, its channel in the rig file, and levels (docs/how-to/bench.md)",
             )
             .about(CheckKind::Trigger(DeviceRole::of_camera(camera))));
         }

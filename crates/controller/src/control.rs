@@ -99,7 +99,7 @@ impl ControlHandle {
         self.replace(HALT, 0);
     }
 
-    /// How many requests were made. One is heard, that is, has had the effect that `docs/run-states.md` says or has none, when
+    /// How many requests were made. One is heard, that is, has had the effect that `docs/reference/runs.md` says or has none, when
     /// [`heard`](Self::heard) is at least what this gave after it.
     #[must_use]
     pub fn asked(&self) -> u64 {

@@ -1,6 +1,6 @@
 //! The transition table of a run: state and event give the next state and what to do.
 //!
-//! `docs/run-states.md` shows the same table; a test writes it out and compares.
+//! `docs/reference/runs.md` shows the same table; a test writes it out and compares.
 
 /// Where a run is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -416,12 +416,12 @@ mod tests {
 
     #[test]
     fn the_documented_table_is_this_one() {
-        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/run-states.md");
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/reference/runs.md");
         let text = std::fs::read_to_string(path).unwrap_or_default();
         let table = markdown();
         assert!(
             text.contains(&table),
-            "docs/run-states.md does not hold this table:\n{table}"
+            "docs/reference/runs.md does not hold this table:\n{table}"
         );
     }
 }

@@ -5,7 +5,7 @@
 //! Every file is written under another name and gets its own when it is whole; nothing is overwritten unless asked, and nothing
 //! is written outside the given folder.
 //!
-//! What each column means is in `docs/python.md`.
+//! What each column means is in `docs/reference/exports.md`.
 
 pub mod bundle;
 mod cameras;

@@ -227,7 +227,7 @@ impl From<ReducedThresholdGrid> for ThresholdGrid {
     }
 }
 
-/// Parameters of the contact map reconstruction error; none of them is published, see `docs/paper.md`.
+/// Parameters of the contact map reconstruction error; none of them is published, see `docs/reference/paper.md`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default)]
 #[settings(name = "cmre")]
@@ -244,7 +244,7 @@ pub struct CmreSettings {
     pub sr_mm: f64,
 }
 
-/// Limits of the alignment certificate (docs/time-base.md gives the reasons); a session beyond one of them is invalid.
+/// Limits of the alignment certificate (docs/reference/time-base.md gives the reasons); a session beyond one of them is invalid.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, Settings)]
 #[serde(default)]
 #[settings(name = "alignment")]

@@ -7,7 +7,7 @@ use crate::keys::{count, default};
 use crate::shape::{Field, Key, Keys, Table};
 
 /// How often a press that brought no data through no fault of the skin is taken again: at once, in place, as a new
-/// attempt. Which causes are meant stands in `docs/run-states.md`.
+/// attempt. Which causes are meant stands in `docs/reference/runs.md`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Retakes {
     /// Attempts beyond the first at one press.

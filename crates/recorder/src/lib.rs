@@ -3,7 +3,7 @@
 //! A session is written by a [`SessionWriter`] on threads of its own: records go in, an [`Intent`] or
 //! [`Outcome`] comes back only when it and everything before it is on the disk. [`SessionReader`] reads it
 //! while it grows and after it is sealed; [`verify()`] recomputes all of it; [`list`] describes a folder.
-//! The layout is in `docs/session-file.md` and, column by column, in `migrations/`.
+//! The layout is in `docs/reference/session-file.md` and, column by column, in `migrations/`.
 //!
 //! This crate knows bytes, checksums and SQL. It knows no device and no event encoding.
 //!

@@ -147,7 +147,8 @@ fn nothing(subject: &str, sent: usize, n: usize, found: &mut Findings) {
         found.unmeasured(subject, metric);
     }
     let what = format!("expected the {sent} trains that the box sent, found {n} that can be read");
-    let next = "check the trigger cable, its channel in the rig file, and levels (docs/bench.md)";
+    let next =
+        "check the trigger cable, its channel in the rig file, and levels (docs/how-to/bench.md)";
     found
         .evidence
         .push(Evidence::new(EvidenceKind::TriggerFault, subject, what).next(next));

@@ -201,8 +201,7 @@ impl Line {
         if !elsewhere.is_empty() {
             what += &format!("; edges on channel {elsewhere:?}");
         }
-        let next =
-            "check the trigger cable, its channel in the rig file, and levels (docs/bench.md)";
+        let next = "check the trigger cable, its channel in the rig file, and levels (docs/how-to/bench.md)";
         found
             .evidence
             .push(Evidence::new(EvidenceKind::TriggerFault, subject, what).next(next));

@@ -1,4 +1,4 @@
-//! Every bound that a test of this suite holds, by its name in `docs/numerics.md`, and the worst error seen.
+//! Every bound that a test of this suite holds, by its name in `docs/reference/numerics.md`, and the worst error seen.
 
 use std::cell::RefCell;
 use std::fmt::Display;
@@ -84,7 +84,7 @@ impl Drop for Watch {
 
 #[test]
 fn the_document_states_the_bounds_that_are_held() {
-    let document = include_str!("../../../docs/numerics.md");
+    let document = include_str!("../../../docs/reference/numerics.md");
     let row = |name: &str| {
         let mut rows = document
             .lines()

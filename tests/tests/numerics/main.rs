@@ -1,5 +1,5 @@
 //! Stable at the extremes: the fast code beside a slow, obvious reference of higher precision, within bounds that
-//! `docs/numerics.md` states and these tests hold. `-- --nocapture` prints the worst error seen against each bound.
+//! `docs/reference/numerics.md` states and these tests hold. `-- --nocapture` prints the worst error seen against each bound.
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 

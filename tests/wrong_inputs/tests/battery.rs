@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use skinrig_wrong_inputs::cases::{Case, all};
 use skinrig_wrong_inputs::judge::{Allowed, Judged, Observed, judge};
 
-/// A row of the table in `docs/wrong-inputs.md`.
+/// A row of the table in `docs/reference/wrong-inputs.md`.
 fn row(case: &Case, judged: &Judged) -> String {
     let unknowable = case.allowed.iter().find_map(|allowed| match allowed {
         Allowed::Unknowable(why) => Some(*why),
@@ -79,9 +79,12 @@ fn nor_does_any_of_ten_seeds() {
 
 #[test]
 fn every_case_stands_in_the_table_of_the_docs() {
-    let page = include_str!("../../../docs/wrong-inputs.md");
+    let page = include_str!("../../../docs/reference/wrong-inputs.md");
     for case in all() {
         let row = format!("| {} | {} | ", case.group, case.name);
-        assert!(page.contains(&row), "docs/wrong-inputs.md lacks: {row}");
+        assert!(
+            page.contains(&row),
+            "docs/reference/wrong-inputs.md lacks: {row}"
+        );
     }
 }

@@ -1,7 +1,7 @@
 //! The plausibility audit: independent laws that every sane session obeys, and the fault that most likely broke one.
 //!
 //! Each law is judged on its own, in its own file. A fault often breaks several laws; what follows from a finding
-//! that is more certain is left out, so that one fault gives one finding. Bounds and their sources: `docs/audit.md`.
+//! that is more certain is left out, so that one fault gives one finding. Bounds and their sources: `docs/reference/audit.md`.
 
 mod advice;
 mod burst;

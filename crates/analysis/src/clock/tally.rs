@@ -3,7 +3,7 @@
 //! The model: the planned presses were made, perhaps some more before or after them in the same rhythm, and each was seen by
 //! both cameras, one or none with shares that are not known. All other bursts came at any time or a press period after another
 //! one, in both cameras at once or in one, with rates that are not known. Shares and rates are integrated out (Dirichlet priors), so that every count has the
-//! weight that the recording itself gives it. `docs/time-base.md` has the formulae and the priors.
+//! weight that the recording itself gives it. `docs/explanation/time-base.md` has the formulae and the priors.
 
 use super::bursts::Train;
 use super::search::period_us;

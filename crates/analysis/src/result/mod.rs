@@ -138,7 +138,7 @@ pub struct ClockFit {
     /// Rate difference, parts per million.
     pub drift_ppm: f64,
     /// Standard error of the drift, ppm: 1.96 of it are half of the 95 % interval, for rates that change evenly or in small steps. Of
-    /// rates that swing it may be too small (`docs/time-base.md`).
+    /// rates that swing it may be too small (`docs/reference/time-base.md`).
     pub drift_se_ppm: f64,
     /// Root mean square residual, µs.
     pub residual_rms_us: f64,

@@ -1,7 +1,7 @@
 //! One time base: host, trigger box, both cameras and the robot on one another, and the certificate of it.
 //!
 //! `host` bounds the host's clock by the exchanges with the box, `edges` finds the trains that the box sent among what
-//! each camera saw, `smooth` fits both. Camera time over host time is the two together. `docs/time-base.md` has the
+//! each camera saw, `smooth` fits both. Camera time over host time is the two together. `docs/explanation/time-base.md` has the
 //! formulae and the limits.
 
 mod base;

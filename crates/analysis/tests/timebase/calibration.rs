@@ -48,7 +48,7 @@ const UNEVEN: f64 = 43.82;
 /// Sessions of 5 min and more, at most.
 const LONG: u64 = 500;
 
-/// What lies beyond [`STATED`], as `docs/time-base.md` says, and between which shares it lies.
+/// What lies beyond [`STATED`], as `docs/reference/time-base.md` says, and between which shares it lies.
 const EXCEPTIONS: [(&str, &str, RangeInclusive<f64>); 12] = [
     // Wider than it says, on the safe side.
     (HOUR, "camera from box", 0.93..=0.985),
@@ -273,7 +273,7 @@ fn conditions() -> Vec<(&'static str, Conditions)> {
     ]
 }
 
-/// Prints the table of `docs/time-base.md`.
+/// Prints the table of `docs/reference/time-base.md`.
 #[test]
 #[ignore = "half an hour: SKINRIG_CI_LONG=1 .ci/run, or BENCHES=2000 cargo test -p skinrig-analysis --test timebase intervals_hold_in_every_condition -- --ignored --nocapture"]
 fn intervals_hold_in_every_condition() {

@@ -92,7 +92,7 @@ pub struct RunArgs {
     #[arg(long, conflicts_with = "replay")]
     pub real_time: bool,
 
-    /// Make this fault on purpose, for rehearsals on the simulated rig, such as camera1-stalled@hold:3 (docs/faults.md lists
+    /// Make this fault on purpose, for rehearsals on the simulated rig, such as camera1-stalled@hold:3 (docs/reference/runs.md lists
     /// them). Can be given several times.
     #[arg(long = "fault", value_name = "FAULT", conflicts_with = "replay")]
     pub faults: Vec<PlantedFault>,
@@ -136,7 +136,7 @@ pub struct ResumeArgs {
     #[arg(long)]
     pub allow_other_device: bool,
 
-    /// Make this fault on purpose, for rehearsals on the simulated rig, such as camera1-stalled@hold:3 (docs/faults.md lists
+    /// Make this fault on purpose, for rehearsals on the simulated rig, such as camera1-stalled@hold:3 (docs/reference/runs.md lists
     /// them). Can be given several times.
     #[arg(long = "fault", value_name = "FAULT")]
     pub faults: Vec<PlantedFault>,

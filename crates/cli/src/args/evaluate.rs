@@ -22,7 +22,7 @@ pub struct AnalyzeArgs {
     #[arg(long, value_name = "NAME", value_parser = crate::analyses::parse)]
     pub name: Option<String>,
 
-    /// Make the choices of the public analysis code (docs/paper.md lists them) and report its numbers beside; `--set`
+    /// Make the choices of the public analysis code (docs/reference/paper.md lists them) and report its numbers beside; `--set`
     /// still wins.
     #[arg(long)]
     pub reference_code: bool,

@@ -141,7 +141,7 @@ impl ExportKind {
     }
 }
 
-/// Which tables `export` writes; docs/python.md describes their columns.
+/// Which tables `export` writes; docs/reference/exports.md describes their columns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum ExportTable {
     /// One row per press, with what both cameras saw and where the skin says it was touched.

@@ -152,7 +152,7 @@ pub enum Command {
         after_help = "Examples:\n  skinrig compare sessions/OLD.session.sqlite sessions/NEW.session.sqlite --margin rmse=0.5mm\n  \
         skinrig compare \"mold 3\" \"mold 4\" \"mold 5\" --sessions sessions/ --limits protocols/comparison.limits.yaml\n\n\
         Each skin is compared with the first, place by place. Skins that may not be compared end with exit code 2 and the reason;\n\
-        --despite KEY goes on in spite of it, and the table and the page say so. docs/comparison.md has the rules."
+        --despite KEY goes on in spite of it, and the table and the page say so. docs/reference/comparison.md has the rules."
     )]
     Compare(CompareArgs),
 

@@ -82,7 +82,10 @@ fn refusal(result: &Comparison, args: &CompareArgs) -> Option<String> {
                 .zip(&d.values)
                 .map(|(skin, value)| format!("{} {value}", skin.letter))
                 .collect();
-            let next = d.next.as_deref().unwrap_or("see docs/comparison.md");
+            let next = d
+                .next
+                .as_deref()
+                .unwrap_or("see docs/reference/comparison.md");
             format!(
                 "{}: {} ({})\n  next: {next}, or go on in spite of it with --despite {}",
                 d.what,
@@ -103,7 +106,7 @@ fn refusal(result: &Comparison, args: &CompareArgs) -> Option<String> {
         !known && !result.differences.iter().any(|d| d.key == key.as_str())
     });
     idle.map(|key| {
-        format!("--despite {key}: expected the key of a blocking difference, found one that no rule has\n  next: leave it out, or see docs/comparison.md")
+        format!("--despite {key}: expected the key of a blocking difference, found one that no rule has\n  next: leave it out, or see docs/reference/comparison.md")
     })
 }
 

@@ -25,7 +25,7 @@ pub enum HilCommand {
         2  bad input: command line, suite, rig file, golden protocol; a plan that does not fit the suite's budget\n  \
         3  infrastructure: computer, disk, cable, permission; another program or another suite holds the bench\n  \
         4  INVALID: a device of the rig was at fault, so the night says nothing about the skin\n\n\
-        ctrl-C ends the suite with the check under way; what was not measured is INCONCLUSIVE. docs/nightly.md has the rules."
+        ctrl-C ends the suite with the check under way; what was not measured is INCONCLUSIVE. docs/reference/nightly.md has the rules."
     )]
     Run(HilRunArgs),
 
@@ -43,7 +43,7 @@ pub enum HilCommand {
         0  nothing moved, or there are too few nights to say\n  \
         1  an alarm: something moved and is still off\n  \
         2  bad input: no history, another program's file, a bench or series that it does not have\n\n\
-        docs/trends.md says how an alarm is raised, and how seldom a false one."
+        docs/reference/nightly.md says how an alarm is raised, and how seldom a false one."
     )]
     Trend(HilTrendArgs),
 

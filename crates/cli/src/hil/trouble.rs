@@ -11,7 +11,7 @@ use skinrig_protocol::rig::{BoxSetup, RigFile};
 use skinrig_trigger_box::serial::SerialDial;
 use skinrig_trigger_box::{Dial, OpenError};
 
-const DEVICES: &str = "`skinrig devices` shows what is connected, and docs/bench.md how";
+const DEVICES: &str = "`skinrig devices` shows what is connected, and docs/how-to/bench.md how";
 
 fn trouble(kind: EvidenceKind, subject: &str, what: &dyn std::fmt::Display) -> Trouble {
     Box::new(Evidence::new(kind, subject, what.to_string()).next(DEVICES))

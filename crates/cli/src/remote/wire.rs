@@ -14,7 +14,7 @@ pub const MOST_NOTE_CHARS: usize = 2_000;
 /// Longest name of an operator, characters.
 pub const MOST_NAME_CHARS: usize = 64;
 
-/// What the operator wants of the run; `docs/run-states.md` says what each does.
+/// What the operator wants of the run; `docs/reference/runs.md` says what each does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
 #[serde(rename_all = "snake_case")]
 pub enum What {

@@ -1,4 +1,4 @@
-//! Exports read back by the programs they are made for, and the code of `docs/python.md`.
+//! Exports read back by the programs they are made for, and the code of `docs/how-to/python.md`.
 //!
 //! Python with the packages of `tests/python/requirements.txt` comes from `SKINRIG_PYTHON`, its interpreter.
 
@@ -217,7 +217,7 @@ fn assert_documented(page: &str, table: &Truth) {
     for name in &table.order {
         assert!(
             page.contains(&format!("`{name}`")),
-            "docs/python.md: {name}"
+            "docs/reference/exports.md: {name}"
         );
     }
 }
@@ -237,7 +237,7 @@ fn exports_are_read_back_in_python_and_the_page_about_it_runs() {
     // The analysis itself: its document leaves out the bulk that only figures need.
     let analysis = skinrig::results::analyze_session(&session, Default::default());
     let analysis = analysis.map_err(|e| e.message).unwrap().analysis;
-    let page = std::fs::read_to_string(format!("{ROOT}/docs/python.md")).unwrap();
+    let page = std::fs::read_to_string(format!("{ROOT}/docs/reference/exports.md")).unwrap();
     for (name, table) in [
         ("presses", presses(&session, &analysis)),
         ("results", results(&document)),
@@ -260,6 +260,7 @@ fn exports_are_read_back_in_python_and_the_page_about_it_runs() {
     let compared: u32 = compared.split(' ').next().unwrap().parse().unwrap();
     assert!(compared >= 3 * 69 + 2 * 4 * 6, "{compared}");
 
+    let page = std::fs::read_to_string(format!("{ROOT}/docs/how-to/python.md")).unwrap();
     let code: Vec<&str> = page.split("```python\n").skip(1).collect();
     let code = code.iter().map(|block| block.split("```").next().unwrap());
     let code = code.collect::<String>();

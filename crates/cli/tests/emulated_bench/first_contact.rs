@@ -1,4 +1,4 @@
-//! Steps 14 to 21 of docs/first-contact.md, as printed, on the emulated bench. Emulated; nobody has seen them on hardware.
+//! Steps 14 to 21 of docs/how-to/bench.md, as printed, on the emulated bench. Emulated; nobody has seen them on hardware.
 
 use std::fs;
 use std::io::{BufRead, BufReader, Read, Write};

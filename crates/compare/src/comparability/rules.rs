@@ -51,7 +51,7 @@ const SAME_RIG: &str = "compare sessions of one kind of rig";
 const SAME_TIP: &str = "press both skins with the same tip";
 const NO_FAULT: &str = "record without --fault";
 
-/// The rules. `docs/comparison.md` shows them to users.
+/// The rules. `docs/reference/comparison.md` shows them to users.
 pub const RULES: &[Rule] = &[
     blocking(
         "rig.kind",

@@ -1,7 +1,7 @@
 //! The statistics of comparing skins: intervals, tests, verdicts and sample sizes, with locations as clusters.
 //!
 //! Presses at one location share its error and are not independent: whatever is computed here draws, or counts, whole
-//! locations. `docs/comparison.md` says which interval and which test serves which kind of metric, why, and how they
+//! locations. `docs/explanation/comparison.md` says which interval and which test serves which kind of metric, why, and how they
 //! behave on simulated skins.
 //!
 //! A [`Sample`] is what one prototype contributes for one metric. [`estimate`] gives its value, [`compare`] the

@@ -199,7 +199,7 @@ fn of_a_rate_of_hardly_any_counts() {
     assert!(1.0 - none.covered < 0.05 + trial.band(), "{none:?}");
 }
 
-/// The table of `docs/comparison.md`.
+/// The table of `docs/explanation/comparison.md`.
 #[test]
 #[ignore = "takes minutes: SKINRIG_CI_LONG=1 .ci/run, or cargo test -p skinrig-compare --test statistics -- --ignored --nocapture"]
 fn table_of_levels() {

@@ -196,7 +196,7 @@ fn every_fault_at_every_stage_ends_safely() {
             | Fault::DeadPress { .. } => {
                 assert_eq!(r.end, RunEnd::Completed, "{case}: {r:?}");
             }
-            // Whole runs with each of them, into a session and its analysis, are in the table of docs/faults.md.
+            // Whole runs with each of them, into a session and its analysis, are in the table of docs/reference/runs.md.
             other => panic!("{case}: expected a fault with an expectation here, found {other:?}"),
         }
         if let RunEnd::Faulted(_) = r.end {

@@ -86,7 +86,7 @@ impl Reference {
         let r = self.correlation;
         let alike = (3.0 + 4.0 * r + 2.0 * r * r) / 3.0;
         // Centre and spread are estimated, and the worse the fewer nights there are. Of the variance of a new night's score, 1.6/n is
-        // the median's; the rest makes up for spreads that came out too small (simulated: `docs/trends.md`).
+        // the median's; the rest makes up for spreads that came out too small (simulated: `docs/reference/nightly.md`).
         let estimated = 1.0 + 8.0 / n;
         self.raw(value) / (alike * estimated).sqrt()
     }

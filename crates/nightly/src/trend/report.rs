@@ -11,7 +11,7 @@ use super::run_length::{Rule, rules};
 use crate::cause::Cause;
 
 /// Nights between two false alarms of all series together, were references known, scores normal and nights strangers to each other.
-/// None of it holds: what comes out is one in more than 100 nights (`docs/trends.md`).
+/// None of it holds: what comes out is one in more than 100 nights (`docs/reference/nightly.md`).
 pub const NIGHTS_PER_FALSE_ALARM: f64 = 1200.0;
 
 /// Metrics without a level to stay at: free space falls from night to night by design, and has its limit.

@@ -195,7 +195,7 @@ fn touches_of_an_arm_that_moves_badly_are_inconclusive() {
 /// The tables of the rules are in the documentation, word for word.
 #[test]
 fn the_documentation_has_the_rules() {
-    let docs = include_str!("../../../../docs/nightly.md");
+    let docs = include_str!("../../../../docs/reference/nightly.md");
     for r in RULES.iter().chain(ACROSS) {
         let kinds: Vec<&str> = r.seen.iter().map(|k| k.name()).collect();
         let seen = if kinds.is_empty() {
@@ -210,7 +210,10 @@ fn the_documentation_has_the_rules() {
             r.verdict.name(),
             r.reason
         );
-        assert!(docs.contains(&row), "expected in docs/nightly.md:\n{row}");
+        assert!(
+            docs.contains(&row),
+            "expected in docs/reference/nightly.md:\n{row}"
+        );
     }
 }
 

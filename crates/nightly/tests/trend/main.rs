@@ -3,7 +3,7 @@
 //!
 //!     cargo test --release -p skinrig-nightly --test trend -- --ignored --nocapture
 //!
-//! prints the tables of `docs/trends.md`.
+//! prints the tables of `docs/reference/nightly.md`.
 #![expect(clippy::unwrap_used, reason = "a test that fails must say so")]
 
 mod nights;
@@ -178,7 +178,7 @@ fn few_nights_are_learnt_from_and_invalid_ones_are_not() {
 }
 
 #[test]
-#[ignore = "the tables of docs/trends.md take minutes: SKINRIG_CI_LONG=1 .ci/run, or cargo test --release -p skinrig-nightly --test trend -- --ignored --nocapture"]
+#[ignore = "the tables of docs/reference/nightly.md take minutes: SKINRIG_CI_LONG=1 .ci/run, or cargo test --release -p skinrig-nightly --test trend -- --ignored --nocapture"]
 fn the_trade() {
     let counts: Vec<usize> = (0..200).map(false_alarms).collect();
     let total: usize = counts.iter().sum();

@@ -83,7 +83,7 @@ pub(crate) struct ProtocolKeys {
     /// Settings written to the cameras before the run and read back.
     #[setting(default)]
     pub cameras: Cameras,
-    /// Faults made on purpose, each KIND@WHEN such as camera1-stalled@hold:3 (docs/faults.md). On the simulated rig only.
+    /// Faults made on purpose, each KIND@WHEN such as camera1-stalled@hold:3 (docs/reference/runs.md). On the simulated rig only.
     #[setting(shape = faults::SHAPE, read = faults::faults, show = nothing)]
     pub faults: Option<Vec<PlantedFault>>,
 }

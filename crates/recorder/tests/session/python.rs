@@ -1,4 +1,4 @@
-//! The Python of `docs/session-file.md` reads the same events as the reader.
+//! The Python of `docs/reference/session-file.md` reads the same events as the reader.
 
 use std::process::Command;
 
@@ -7,7 +7,7 @@ use skinrig_recorder::SessionReader;
 
 use crate::common::{ALIGNMENT_US, sealed};
 
-const DOC: &str = include_str!("../../../../docs/session-file.md");
+const DOC: &str = include_str!("../../../../docs/reference/session-file.md");
 
 #[test]
 fn the_documented_python_reads_a_presss_events() {

@@ -15,7 +15,7 @@ pub struct InvalidOpticalSetting {
 }
 
 /// Constants of the optical model. "Assumption" marks values without a public source; the defaults are chosen
-/// so that event counts, polarities and spreads resemble the published ones (`docs/optical-model.md`).
+/// so that event counts, polarities and spreads resemble the published ones (`docs/explanation/optical-model.md`).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OpticalConfig {
     // ---- emitters

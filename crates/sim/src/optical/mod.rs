@@ -3,7 +3,7 @@
 //! Light of emitters travels in the plane of the skin to the camera; the dent of the tip takes light from the
 //! rays that cross it and returns some from its flanks; each pixel turns changes of its log intensity into
 //! events. Where the skin was touched is never told to the events: localisation errors come out of the
-//! optics. Formulas, constants and limits: `docs/optical-model.md`.
+//! optics. Formulas, constants and limits: `docs/explanation/optical-model.md`.
 //!
 //! Data flows `light` (once) -> `dent` (once per touched place) -> `pixels` (every millisecond that changes)
 //! with `noise` beside.

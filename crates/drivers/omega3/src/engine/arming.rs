@@ -39,7 +39,7 @@ fn carries(envelope: &Envelope, mass_kg: Option<f64>, reported_n: f64) -> String
 fn cap(envelope: &Envelope, limits: &MotionLimits) -> String {
     format!(
         "Its motors may use {:.3} of their torque: if the arm sinks with that, raise `limits.max_force` ({} N) or settle \
-         `robot.motor_force.gravity_ratio` ({}), docs/first-contact.md",
+         `robot.motor_force.gravity_ratio` ({}), docs/how-to/bench.md",
         envelope.ratio_of(limits.max_force_n),
         limits.max_force_n,
         envelope.gravity_ratio
