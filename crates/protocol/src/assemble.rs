@@ -14,8 +14,7 @@ use crate::keys::{
 use crate::path::locations;
 use crate::plan::RunLimits;
 use crate::protocol::{Loader, Motion, Pace, Protocol, Sync};
-use crate::surface::{Surface, surface};
-use crate::surface_check::surface_check;
+use crate::surface::Surface;
 use crate::timing;
 
 impl Protocol {
@@ -136,14 +135,23 @@ fn assemble(
     if let (Some(roles), Some(analysis)) = (&roles, &keys.analysis) {
         calibration_possible(roles, analysis, evaluation, out);
     }
-    let press = root.get("press").map(|f| {
-        let surface = surface(f)?;
-        band_fits(&surface, f, motion.clearance_mm, limits.max_depth_mm, out);
-        Some(surface)
+    let press = keys.press.as_ref().and_then(Option::as_ref);
+    if let Some(surface) = press {
+        let field = root.at("press");
+        band_fits(
+            surface,
+            field,
+            motion.clearance_mm,
+            limits.max_depth_mm,
+            out,
+        );
+    }
+    let check = keys.surface_check.map(|check| match check {
+        Some(check) => check
+            .touching(press, root.at("surface_check"), out)
+            .map(Some),
+        None => Some(None),
     });
-    let check = root
-        .get("surface_check")
-        .map(|f| surface_check(f, press.as_ref().and_then(Option::as_ref), out));
 
     let (path_kind, locations) = path?;
     let (depths_mm, roles, outline) = (depths_mm?, roles?, outline?);
@@ -199,11 +207,11 @@ fn assemble(
             },
         },
         retakes: keys.retakes?,
-        surface_check: check.map_or(Some(None), |s| s.map(Some))?,
+        surface_check: check??,
         suspend: keys.suspend?,
         faults: keys.faults?.unwrap_or_default(),
         marks: keys.triggers?.marks,
-        surface: press.map_or(Some(None), |s| s.map(Some))?,
+        surface: keys.press?,
         analysis: keys.analysis?,
         cameras: keys.cameras?.requests(),
         key_places: crate::findings::places(root, &out.sources),

@@ -6,9 +6,9 @@ use std::str::FromStr;
 use serde::Serialize;
 use skinrig_model::{CameraId, HostDuration};
 
-use crate::shape::{Field, Shape, Value};
 use skinrig_settings::{Collector, closest};
 use skinrig_settings::{Dimension, quantity};
+use skinrig_settings::{Field, Shape, Value};
 
 /// A fault that a run makes on purpose.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

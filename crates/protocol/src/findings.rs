@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use crate::check::{Violation, check};
 use crate::plan::Plan;
 use crate::protocol::Protocol;
-use crate::shape::Field;
+use skinrig_settings::Field;
 use skinrig_settings::{Diagnostic, Diagnostics};
 use skinrig_settings::{Location, Sources};
 

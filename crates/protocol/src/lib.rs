@@ -13,7 +13,6 @@
 
 pub mod area;
 mod assemble;
-mod build;
 pub mod check;
 mod compile;
 pub mod faults;
@@ -31,7 +30,6 @@ mod retakes;
 pub mod rig;
 pub mod schedule;
 mod schema;
-mod shape;
 pub mod suite;
 pub mod summary;
 pub mod surface;

@@ -1,29 +1,19 @@
-//! How often presses are taken again.
+//! When a press is taken again.
 
 use serde::{Deserialize, Serialize};
 use skinrig_model::{PressHistory, PressVerdict};
+use skinrig_settings::Settings;
 
-use crate::keys::{count, default};
-use crate::shape::{Field, Key, Keys, Table};
-
-/// How often a press that brought no data through no fault of the skin is taken again: at once, in place, as a new
-/// attempt. Which causes are meant stands in `docs/reference/runs.md`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+/// How often a press is taken again, at once and in place, because its data were lost or it came too late.
+/// `docs/reference/runs.md` lists the causes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Settings)]
 pub struct Retakes {
-    /// Attempts beyond the first at one press.
+    /// Attempts beyond the first at one press; 0 for none.
+    #[setting(default = "2", max = 100)]
     pub per_press: u32,
-    /// Retakes between the start of a run, or its being resumed, and its end: a rig that loses data all the time is to be
-    /// repaired, not to be worn out.
+    /// Retakes of all presses together; a resumed run counts from 0 again. A rig that keeps losing data needs repair.
+    #[setting(default = "20", max = 100_000)]
     pub per_session: u32,
-}
-
-impl Default for Retakes {
-    fn default() -> Self {
-        Self {
-            per_press: 2,
-            per_session: 20,
-        }
-    }
 }
 
 impl Retakes {
@@ -51,35 +41,4 @@ impl Retakes {
             }
         }
     }
-}
-
-/// The keys of `retakes`.
-pub(crate) static RETAKES: Table = Table {
-    name: "retakes",
-    doc: "How often a press is taken again, at once and in place, because its data were lost or it came too late.",
-    keys: KEYS,
-    exactly_one: &[],
-};
-
-const KEYS: &[Key] = &[
-    default(
-        "per_press",
-        count(0, 100),
-        "2",
-        "Attempts beyond the first at one press; 0 for none.",
-    ),
-    default(
-        "per_session",
-        count(0, 100_000),
-        "20",
-        "Retakes of all presses together; a resumed run counts from 0 again.",
-    ),
-];
-
-/// Reads a mapping of the table `retakes`.
-pub(crate) fn retakes(f: &Field) -> Option<Retakes> {
-    Some(Retakes {
-        per_press: f.count("per_press")?,
-        per_session: f.count("per_session")?,
-    })
 }

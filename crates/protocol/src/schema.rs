@@ -20,19 +20,19 @@ pub fn schedule_schema_json() -> String {
 /// The JSON Schema of a rig file for `--rig`.
 #[must_use]
 pub fn rig_schema_json() -> String {
-    render(&crate::rig::keys::RIG, "skinrig rig")
+    render(crate::rig::RigFile::TABLE, "skinrig rig")
 }
 
 /// The JSON Schema of the limits for `skinrig compare`.
 #[must_use]
 pub fn limits_schema_json() -> String {
-    render(&crate::limits::LIMITS, "skinrig limits")
+    render(crate::limits::Limits::TABLE, "skinrig limits")
 }
 
 /// The JSON Schema of a suite for `skinrig hil run`.
 #[must_use]
 pub fn suite_schema_json() -> String {
-    render(&crate::suite::keys::SUITE, "skinrig suite")
+    render(crate::suite::Suite::TABLE, "skinrig suite")
 }
 
 /// The JSON Schema of the files of a table, for editors: documentation, completion, checks while typing.
@@ -83,12 +83,19 @@ fn object(table: &'static Table, definitions: &mut Definitions) -> Map<String, V
     if !required.is_empty() {
         object.insert("required".into(), json!(required));
     }
-    if !table.exactly_one.is_empty() {
-        let groups: Vec<Value> = table
-            .exactly_one
-            .iter()
-            .map(|group| json!({"oneOf": group.iter().map(|k| json!({"required": [k]})).collect::<Vec<_>>()}))
-            .collect();
+    let each_required = |names: &mut dyn Iterator<Item = &'static str>| -> Vec<Value> {
+        names.map(|k| json!({"required": [k]})).collect()
+    };
+    let mut groups: Vec<Value> = table
+        .exactly_one
+        .iter()
+        .map(|group| json!({"oneOf": each_required(&mut group.iter().copied())}))
+        .collect();
+    let any = each_required(&mut table.at_least_one());
+    if !any.is_empty() {
+        groups.push(json!({"anyOf": any}));
+    }
+    if !groups.is_empty() {
         object.insert("allOf".into(), json!(groups));
     }
     object
@@ -97,7 +104,7 @@ fn object(table: &'static Table, definitions: &mut Definitions) -> Map<String, V
 /// A default as JSON; lists and mappings by their own defaults.
 fn plain_default(shape: &Shape, text: &str) -> Value {
     match shape {
-        Shape::Map(_) => json!({}),
+        Shape::Map(_) | Shape::Named(_) => json!({}),
         Shape::Whole { .. } | Shape::Number(_) | Shape::Flag => {
             serde_json::from_str(text).unwrap_or(Value::Null)
         }

@@ -55,7 +55,7 @@ impl Plan {
     /// spaces, shortest form of every number that reads back as itself).
     #[must_use]
     pub fn digest(&self) -> String {
-        crate::build::hex(&Sha256::digest(self.to_json().as_bytes()))
+        crate::file::hex(&Sha256::digest(self.to_json().as_bytes()))
     }
 
     /// The plan as canonical JSON, as stored in a session.

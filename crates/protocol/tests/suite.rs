@@ -55,11 +55,12 @@ checks:
     let said = findings(text);
     for part in [
         "suite.yaml:3:9",
-        "a check that cannot fail",
+        "add `differences: {at_most: 0}`",
         "`trigger_loopback`",
         "suite.yaml:7:",
         "no value is good",
-        "a limit that nothing can break",
+        "suite.yaml:10:",
+        "at least one of `at_most` or `at_least`",
     ] {
         assert!(said.contains(part), "no {part} in:\n{said}");
     }

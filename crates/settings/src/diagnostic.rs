@@ -1,5 +1,6 @@
 //! What is wrong with an input: every finding with its place, what was expected, what was found, what to do.
 
+use std::collections::BTreeMap;
 use std::fmt;
 
 use serde::Serialize;
@@ -150,6 +151,8 @@ pub struct Collector {
     pub sources: Sources,
     /// True for the text of a recording, which may be older than today's keys.
     pub recorded: bool,
+    /// Values of environment variables, for readers of texts with `${NAME}`.
+    pub variables: BTreeMap<String, String>,
     found: Vec<(Span, Diagnostic)>,
 }
 
@@ -196,6 +199,7 @@ impl Collector {
         Self {
             sources,
             recorded: false,
+            variables: BTreeMap::new(),
             found: Vec::new(),
         }
     }

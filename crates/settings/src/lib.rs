@@ -48,7 +48,7 @@ pub use read::{example, expectation};
 pub use setting::{
     Choice, NumberSpan, Numbers, OutOfRange, Row, Setting, Settings, in_unit, key_path, whole_units,
 };
-pub use shape::{Key, Need, Shape, Table, Word};
+pub use shape::{Key, Need, Shape, Table, Word, count_keys, join_keys};
 pub use skinrig_settings_derive::{Choice, Settings};
 pub use source::{Location, Sources, Span};
 pub use yaml::{LARGEST_TEXT, decode, quote};

@@ -1,6 +1,6 @@
 //! Reads a node tree by its table: every structural error at once, and the values that could be read.
 
-use crate::diagnostic::{Collector, did_you_mean, one_of};
+use crate::diagnostic::{Collector, closest, did_you_mean, one_of};
 use crate::field::{Field, Value};
 use crate::quantity::{self, Dimension};
 use crate::range::ValueRange;
@@ -56,36 +56,31 @@ pub(crate) fn read_table(
         }
     }
     let head = head_of(node, out);
-    for key in table.keys {
-        if entries.iter().any(|e| e.key == key.name) {
-            continue;
-        }
+    let given = |name: &str| entries.iter().any(|e| e.key == name);
+    // A misspelt key is reported once, as an unknown key.
+    let misspelt = |names: &[&'static str]| {
+        let mut unknown = entries
+            .iter()
+            .filter(|e| !table.keys.iter().any(|k| k.name == e.key));
+        unknown.any(|e| closest(&e.key, names.iter().copied()).is_some())
+    };
+    for key in table.keys.iter().filter(|k| !given(k.name)) {
         match key.need {
-            Need::Optional => {}
-            Need::Required => {
-                // A misspelt key is reported once, as an unknown key.
-                let slip = entries.iter().any(|e| {
-                    !table.keys.iter().any(|k| k.name == e.key)
-                        && crate::diagnostic::closest(&e.key, [key.name]).is_some()
-                });
-                if !slip {
-                    out.error(head, join(path, key.name), "a required key is missing")
-                        .expected(format!("`{}`: {}", key.name, expectation(&key.shape)))
-                        .found("no such key")
-                        .help(format!("add `{}: {}`", key.name, example(&key.shape)));
-                }
+            Need::Required if !misspelt(&[key.name]) => {
+                out.error(head, join(path, key.name), "a required key is missing")
+                    .expected(format!("`{}`: {}", key.name, expectation(&key.shape)))
+                    .found("no such key")
+                    .help(format!("add `{}`", entry_example(key)));
             }
+            Need::Required | Need::Optional | Need::AtLeastOne => {}
             Need::Default(text) => {
                 if let Some(value) = default_value(key, text) {
-                    let path = join(path, key.name);
-                    values.push((
-                        key.name.to_owned(),
-                        Field {
-                            span: node.span,
-                            path,
-                            ..value
-                        },
-                    ));
+                    let field = Field {
+                        span: node.span,
+                        path: join(path, key.name),
+                        ..value
+                    };
+                    values.push((key.name.to_owned(), field));
                 }
             }
         }
@@ -97,17 +92,8 @@ pub(crate) fn read_table(
             .collect();
         match given.as_slice() {
             [_] => {}
-            [] => {
-                let slip = entries.iter().any(|e| {
-                    !table.keys.iter().any(|k| k.name == e.key)
-                        && crate::diagnostic::closest(&e.key, group.iter().copied()).is_some()
-                });
-                if !slip {
-                    out.error(head, path, "a required key is missing")
-                        .expected(format!("exactly one of {}", one_of(group.iter().copied())))
-                        .found("none of them");
-                }
-            }
+            [] if misspelt(group) => {}
+            [] => none_given(table, group, "exactly one", head, path, out),
             [_, others @ ..] => {
                 for other in others {
                     out.error(
@@ -122,11 +108,37 @@ pub(crate) fn read_table(
             }
         }
     }
+    let any: Vec<&'static str> = table.at_least_one().collect();
+    if !any.is_empty() && !any.iter().any(|name| given(name)) && !misspelt(&any) {
+        none_given(table, &any, "at least one", head, path, out);
+    }
     Some(Field {
         span: node.span,
         path: path.to_owned(),
         value: Value::Map(values),
     })
+}
+
+/// None of the keys of a group is there.
+fn none_given(
+    table: &Table,
+    group: &[&'static str],
+    how_many: &str,
+    head: Span,
+    path: &str,
+    out: &mut Collector,
+) {
+    let first = table.keys.iter().find(|k| group.contains(&k.name));
+    let help = first.map(|key| format!("add `{}`", entry_example(key)));
+    let names = one_of(group.iter().copied());
+    let (expected, found) = match group {
+        [_] => (names, "no such key"),
+        _ => (format!("{how_many} of {names}"), "none of them"),
+    };
+    out.error(head, path, "a required key is missing")
+        .expected(expected)
+        .found(found)
+        .maybe_help(help);
 }
 
 /// The first line of a mapping, to point at when something is missing from it.
@@ -462,31 +474,65 @@ pub fn expectation(shape: &Shape) -> String {
     }
 }
 
-/// A value of this shape that could be typed.
+/// An entry of a mapping as it could be typed: `depth: 4 mm`.
+fn entry_example(key: &Key) -> String {
+    let declared = key.example.map(str::to_owned);
+    let value = declared.unwrap_or_else(|| example(&key.shape));
+    format!("{}: {value}", key.name)
+}
+
+/// A value of this shape as it could be typed.
 #[must_use]
 pub fn example(shape: &Shape) -> String {
     match shape {
-        Shape::Text => "...".to_owned(),
-        Shape::Whole { min, .. } => min.max(&1).to_string(),
-        Shape::Number(range) => range.max.to_string(),
+        Shape::Text => "example".to_owned(),
+        Shape::Whole { min, max } => 0.clamp(*min, *max).to_string(),
+        Shape::Number(range) => plain_number(range).to_string(),
         Shape::Flag => "true".to_owned(),
-        Shape::Quantity(wanted, _) => wanted.first().map_or("...", |d| d.example()).to_owned(),
+        Shape::Quantity(wanted, range) => wanted
+            .first()
+            .map_or_else(String::new, |d| quantity_example(*d, range)),
         Shape::Choice(words) | Shape::WordOr(words, _) => {
-            words.first().map_or("...", |(w, _)| *w).to_owned()
+            words.first().map_or("", |(w, _)| *w).to_owned()
         }
         Shape::Tuple(of, names) => format!("[{}]", vec![example(of); names.len()].join(", ")),
-        Shape::List { of, .. } => format!("[{}]", example(of)),
+        Shape::List { of, min, .. } => {
+            format!("[{}]", vec![example(of); (*min).max(1)].join(", "))
+        }
         Shape::Map(table) => {
-            let first = |k: &&Key| matches!(k.need, Need::Required);
-            let inner: Vec<String> = table
+            let first_of = |group: &[&str]| {
+                let mut keys = table.keys.iter();
+                keys.find(|k| group.contains(&k.name)).map(|k| k.name)
+            };
+            let any: Vec<&str> = table.at_least_one().collect();
+            let groups = table.exactly_one.iter().copied().chain([any.as_slice()]);
+            let chosen: Vec<&str> = groups.filter_map(first_of).collect();
+            let needed = |k: &&Key| k.need == Need::Required || chosen.contains(&k.name);
+            let entries: Vec<String> = table
                 .keys
                 .iter()
-                .filter(first)
-                .map(|k| format!("{}: {}", k.name, example(&k.shape)))
+                .filter(needed)
+                .map(entry_example)
                 .collect();
-            format!("{{{}}}", inner.join(", "))
+            format!("{{{}}}", entries.join(", "))
         }
         Shape::Named(_) => "{}".to_owned(),
         Shape::Numbers => "[1]".to_owned(),
+    }
+}
+
+/// A short number inside a range.
+fn plain_number(range: &ValueRange) -> f64 {
+    let candidates = [1.0, 0.5, 0.1, 0.01, range.max];
+    let inside = candidates.into_iter().find(|n| range.contains(*n));
+    inside.unwrap_or(range.min)
+}
+
+/// The usual example of a dimension where the range allows it.
+fn quantity_example(dimension: Dimension, range: &ValueRange) -> String {
+    let usual = dimension.example();
+    match quantity::parse(usual, &[dimension]) {
+        Ok(q) if range.contains(q.value) => usual.to_owned(),
+        _ => format!("{} {}", plain_number(range), dimension.usual_unit()),
     }
 }

@@ -1,6 +1,7 @@
 //! Types that can be the value of a key, and structs that declare the keys of a mapping.
 
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 
 use crate::diagnostic::Collector;
 use crate::field::{Field, Value};
@@ -114,6 +115,18 @@ impl Setting for String {
 
     fn text(&self) -> String {
         self.clone()
+    }
+}
+
+impl Setting for PathBuf {
+    const SHAPE: Shape = Shape::Text;
+
+    fn from_field(field: &Field, _: &mut Collector) -> Option<Self> {
+        field.as_text().map(Self::from)
+    }
+
+    fn text(&self) -> String {
+        self.display().to_string()
     }
 }
 

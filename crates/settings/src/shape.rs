@@ -18,7 +18,16 @@ pub struct Table {
     pub exactly_one: &'static [&'static [&'static str]],
 }
 
+impl Table {
+    /// The keys of which at least one must be given.
+    pub fn at_least_one(&self) -> impl Iterator<Item = &'static str> + use<> {
+        let keys = self.keys.iter();
+        keys.filter(|k| k.need == Need::AtLeastOne).map(|k| k.name)
+    }
+}
+
 /// One key of a mapping.
+#[derive(Clone, Copy)]
 pub struct Key {
     /// As typed.
     pub name: &'static str,
@@ -28,6 +37,8 @@ pub struct Key {
     pub shape: Shape,
     /// Whether it must be there.
     pub need: Need,
+    /// A value for the help when it is missing; `None`: one that fits the shape.
+    pub example: Option<&'static str>,
 }
 
 /// Whether a key must be there.
@@ -37,6 +48,8 @@ pub enum Need {
     Required,
     /// Has no value when missing.
     Optional,
+    /// Has no value when missing, but of the keys of a mapping with this need at least one must be there.
+    AtLeastOne,
     /// Has this value when missing: a text that the key's shape reads.
     Default(&'static str),
 }
@@ -45,6 +58,7 @@ pub enum Need {
 pub type Word = (&'static str, &'static str);
 
 /// What a value looks like.
+#[derive(Clone, Copy)]
 pub enum Shape {
     /// A text that is not blank.
     Text,
@@ -82,6 +96,42 @@ pub enum Shape {
     Named(&'static Shape),
     /// A list of numbers from 1 and of spans such as `2-10`.
     Numbers,
+}
+
+/// How many keys there are in several mappings.
+#[doc(hidden)]
+#[must_use]
+pub const fn count_keys(parts: &[&[Key]]) -> usize {
+    let (mut part, mut count) = (0, 0);
+    while part < parts.len() {
+        count += parts[part].len();
+        part += 1;
+    }
+    count
+}
+
+/// The keys of several mappings in one, `N` altogether.
+#[doc(hidden)]
+#[must_use]
+pub const fn join_keys<const N: usize>(parts: &[&[Key]]) -> [Key; N] {
+    let mut keys = [Key {
+        name: "",
+        doc: "",
+        shape: Shape::Flag,
+        need: Need::Optional,
+        example: None,
+    }; N];
+    let (mut part, mut at) = (0, 0);
+    while part < parts.len() {
+        let mut i = 0;
+        while i < parts[part].len() {
+            keys[at] = parts[part][i];
+            i += 1;
+            at += 1;
+        }
+        part += 1;
+    }
+    keys
 }
 
 impl Shape {

@@ -18,6 +18,3 @@ pub(crate) use path::{Circles, Csv, LineDirection, Meander, Order, Path, Random}
 pub(crate) use protocol::ProtocolKeys;
 pub(crate) use ranges::MOST_POINTS;
 pub(crate) use schedule::{Evaluate, ScheduleKeys};
-
-mod old;
-pub(crate) use old::*;

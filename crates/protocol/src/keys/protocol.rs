@@ -1,7 +1,7 @@
 //! Keys of a protocol as a whole.
 
 use skinrig_model::AnalysisSettings;
-use skinrig_settings::{Collector, Field, Settings, Shape};
+use skinrig_settings::Settings;
 
 use super::camera::Cameras;
 use super::evaluation::Evaluation;
@@ -13,6 +13,8 @@ use super::scene::SceneKeys;
 use crate::faults::{self, PlantedFault};
 use crate::protocol::Prototype;
 use crate::retakes::Retakes;
+use crate::surface::Surface;
+use crate::surface_check::SurfaceCheck;
 use crate::suspend::Suspend;
 
 /// A skinrig protocol: where, how deep and how often the skin is pressed, and what the presses are for.
@@ -60,17 +62,15 @@ pub(crate) struct ProtocolKeys {
     /// What must never happen. Checked for every segment of motion before a device is opened, and enforced while running.
     pub limits: LimitKeys,
     /// How presses find the surface; absent: as the rig file says, at z = 0 of the frame when it says nothing.
-    #[setting(shape = Shape::Map(&crate::surface::PRESS), read = given, show = nothing)]
-    pub press: Option<()>,
+    pub press: Option<Surface>,
     /// Touches the surface at some points before the first press and ends the run when it is not where the frame says; no check
     /// when absent.
-    #[setting(shape = Shape::Map(&crate::surface_check::SURFACE_CHECK), read = given, show = nothing)]
-    pub surface_check: Option<()>,
+    pub surface_check: Option<SurfaceCheck>,
     /// How often a press is taken again because its data were lost or it came too late.
-    #[setting(default = "{}", value = Retakes::default(), shape = Shape::Map(&crate::retakes::RETAKES), read = retakes, show = nothing)]
+    #[setting(default)]
     pub retakes: Retakes,
     /// When the run waits by itself until a disturbance is over.
-    #[setting(default = "{}", value = Suspend::default(), shape = Shape::Map(&crate::suspend::SUSPEND), read = crate::suspend::suspend, show = nothing)]
+    #[setting(default)]
     pub suspend: Suspend,
     /// The trigger line to the cameras.
     #[setting(default)]
@@ -84,19 +84,6 @@ pub(crate) struct ProtocolKeys {
     #[setting(default)]
     pub cameras: Cameras,
     /// Faults made on purpose, each KIND@WHEN such as camera1-stalled@hold:3 (docs/reference/runs.md). On the simulated rig only.
-    #[setting(shape = faults::SHAPE, read = faults::faults, show = nothing)]
+    #[setting(shape = faults::SHAPE, read = faults::faults)]
     pub faults: Option<Vec<PlantedFault>>,
-}
-
-fn given(_: &Field, _: &mut Collector) -> Option<()> {
-    Some(())
-}
-
-fn retakes(field: &Field, _: &mut Collector) -> Option<Retakes> {
-    crate::retakes::retakes(field)
-}
-
-/// These values are read and never shown.
-fn nothing<T>(_: &T) -> String {
-    String::new()
 }

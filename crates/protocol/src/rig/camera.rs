@@ -1,203 +1,188 @@
-//! Cameras and trigger box of a bench, each from its own keys.
+//! The cameras of a bench.
 
-use super::build::Places;
-use super::{BoxSetup, CameraSetup, SyncRole};
-use crate::build::{biases, nominal_camera, roi};
-use crate::shape::{Field, Keys, Value};
-use skinrig_model::Point2;
-use skinrig_settings::Collector;
+use std::collections::BTreeMap;
+use std::fmt;
+use std::path::PathBuf;
 
-/// The EVK1's trigger input that its sync line uses when it is a slave.
+use serde::Serialize;
+use skinrig_model::{CameraModel, Point2};
+use skinrig_settings::{Choice, Collector, Field, Setting, Settings, Shape};
+
+use super::variables;
+use crate::keys::{NominalCamera, Roi};
+
+/// The EVK1's trigger inputs: main, loop-back of its own output, auxiliary.
+const EVK1_INPUTS: [u8; 3] = [0, 6, AUXILIARY];
+/// The trigger input that the EVK1's sync line uses when it is a slave.
 const AUXILIARY: u8 = 7;
 
-/// Camera 1 and camera 2, with what must hold between them.
-pub(super) fn cameras(
-    f: &Field,
-    places: &Places<'_>,
-    out: &mut Collector,
-) -> Option<[CameraSetup; 2]> {
-    let mut camera = |key| f.get(key).and_then(|c| camera(c, places, out));
-    let [Some(one), Some(two)] = [camera("camera1"), camera("camera2")] else {
-        return None;
-    };
-    let second = f.get("camera2")?;
-    if one.serial == two.serial {
-        let span = second.get("serial").map_or(second.span, |s| s.span);
-        out.error(span, "cameras.camera2.serial", "both cameras are the same")
-            .expected("two different serial numbers")
-            .found(format!("`{}` twice", one.serial));
-    }
-    let pair = (one.sync, two.sync);
-    let fits = matches!(
-        pair,
-        (SyncRole::Standalone, SyncRole::Standalone)
-            | (SyncRole::Master, SyncRole::Slave)
-            | (SyncRole::Slave, SyncRole::Master)
-    );
-    if !fits {
-        let span = second.get("sync").map_or(second.span, |s| s.span);
-        out.error(span, "cameras.camera2.sync", "the sync modes do not fit")
-            .expected("both `standalone`, or one `master` and one `slave`")
-            .found(format!("{:?} and {:?}", pair.0, pair.1).to_lowercase());
-    }
-    if out.is_clean() && one.trigger_channel != two.trigger_channel {
-        let span = second
-            .get("trigger_channel")
-            .map_or(second.span, |s| s.span);
-        out.error(
-            span,
-            "cameras.camera2.trigger_channel",
-            "the trigger channels differ",
-        )
-        .expected("the same channel on both cameras: analyses read one")
-        .found(format!(
-            "{} and {}",
-            one.trigger_channel, two.trigger_channel
-        ));
-    }
-    Some([one, two])
+/// One event camera. What is absent keeps the device's default; a protocol may override biases and region.
+#[derive(Debug, Clone, PartialEq, Serialize, Settings)]
+#[settings(
+    name = "rig_camera",
+    check(Self::has_input, model, sync, trigger_channel),
+    check(Self::has_time_base, model),
+    check(Self::shares_time, model, sync)
+)]
+pub struct CameraSetup {
+    /// Which camera.
+    #[setting(default = "evk1")]
+    pub model: CameraKind,
+    /// Its serial number, as `skinrig devices` shows it; for an EVK1 without one the port, as `usb-BUS-PORT.PORT`.
+    #[setting(example = "\"00000815\"")]
+    pub serial: String,
+    /// Expected FPGA version; another one fails the preflight.
+    pub fpga: Option<String>,
+    /// Bias values by name, in the device's own unit (EVK1: mV). They win over those of `bias_file`.
+    #[setting(default)]
+    pub biases: BTreeMap<String, i64>,
+    /// A `.bias` file, relative to this one; `${NAME}` stands for an environment variable.
+    #[setting(read = variables::path)]
+    pub bias_file: Option<PathBuf>,
+    /// Pixels that stay on (x, y, width, height); all when absent.
+    #[setting(shape = Roi::SHAPE, read = Roi::read)]
+    pub roi: Option<[u16; 4]>,
+    /// The sensor's activity gate: nothing passes while its total rate is below this. Off when absent.
+    #[setting(min = 10_000, max = 10_000_000)]
+    pub noise_filter_ev_s: Option<u32>,
+    /// EVK1: a longer step of the camera's time base counts as lost data, and spoils the press. Absent: steps are noted at the end,
+    /// because how often a real camera sends its time base is not published.
+    #[setting(min = 64, max = 10e6)]
+    pub max_time_high_gap_us: Option<u64>,
+    /// EVK1: how a step of the camera's overflow counter is handled. What a real camera counts there is not published; choose `note`
+    /// for one that counts without a loss, or presses are spoilt for nothing.
+    #[setting(key = "overflow_counter", default = "loss", through = OverflowRule)]
+    pub overflow_is_loss: bool,
+    /// Addresses of registers, such as `"0x0204"`, that a real camera was seen to read back differently: which do is not published.
+    #[setting(default = "[]", shape = ADDRESSES, read = addresses)]
+    pub read_back_exceptions: Vec<u32>,
+    /// EVK1: status bytes of register reads, such as `"0x00"`, with which the value counts as well as with 0x40. `--tolerant` shows
+    /// which your camera sends.
+    #[setting(default = "[]", shape = ADDRESSES, read = bytes)]
+    pub read_status: Vec<u8>,
+    /// EVK1: how a bus reset that fails before a run is handled.
+    #[setting(key = "failed_reset", default = "refused", through = ResetRule)]
+    pub failed_reset_is_accepted: bool,
+    /// EVK1: how a failed transfer of the event stream is handled. A stall and a lost device end the stream in any case.
+    #[setting(key = "failed_transfers", default = "end", through = TransferRule)]
+    pub failed_transfer_is_loss: bool,
+    /// Every mismatch with the documented behaviour is accepted and reported. The command line's `--tolerant`, not a key.
+    #[setting(skip)]
+    pub tolerant: bool,
+    /// Whose time base the camera follows.
+    #[setting(default = "standalone")]
+    pub sync: SyncRole,
+    /// The trigger input that the box is wired to (EVK1: 0 main, 7 auxiliary, 6 loop-back of its own output).
+    #[setting(default = "0", max = 31)]
+    pub trigger_channel: u8,
+    /// How long after an edge at its trigger input the camera stamps it, in whole microseconds: not published, to be measured on your
+    /// bench. Analyses subtract it from the camera's edges; the session keeps them as they came.
+    #[setting(default = "0 us", max = 1000)]
+    pub trigger_delay_us: u16,
+    /// Where the camera stands, as drawn or measured: where calibration starts.
+    #[setting(shape = NominalCamera::SHAPE, read = geometry, example = GEOMETRY)]
+    pub geometry: CameraModel,
 }
 
-/// A trigger box needs a trigger input on both cameras.
-pub(super) fn wired(cameras: &[CameraSetup; 2], trigger_box: &Field, out: &mut Collector) {
-    if let Some(camera) = cameras.iter().find(|c| !c.has_trigger()) {
-        out.error(
-            trigger_box.span,
-            trigger_box.path.as_str(),
-            "a camera cannot see the trigger box",
-        )
-        .expected("two cameras whose driver offers a trigger input: `evk1` or `evk4`")
-        .found(format!("`model: {}`", camera.model))
-        .help("leave `trigger_box` out: the cameras' times are then tied to nothing, and sessions cannot be labelled by marks");
+const GEOMETRY: &str =
+    "{position: [45 mm, -38 mm], aim: [10 mm, 2 mm], half_field_of_view: 60 deg}";
+
+/// A camera that skinrig drives.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Choice)]
+#[serde(rename_all = "snake_case")]
+pub enum CameraKind {
+    /// Prophesee EVK1, VGA, Gen3.1.
+    Evk1,
+    /// Prophesee EVK4, in builds with `--features evk4`; recorded in full, analysed within 640 x 480 pixels.
+    Evk4,
+    /// Prophesee EVK3 HD, as `evk4`; no trigger input, so only without a trigger box and standalone.
+    Evk3Hd,
+    /// CenturyArks SilkyEvCam VGA, as `evk3_hd`; no biases either.
+    SilkyVga,
+}
+
+impl CameraKind {
+    /// Whether the camera's driver offers a trigger input and a shared time base.
+    #[must_use]
+    pub const fn has_trigger(self) -> bool {
+        match self {
+            Self::Evk1 | Self::Evk4 => true,
+            Self::Evk3Hd | Self::SilkyVga => false,
+        }
     }
 }
 
-fn camera(f: &Field, places: &Places<'_>, out: &mut Collector) -> Option<CameraSetup> {
-    let bias_file = f.get("bias_file").map(|b| places.path(b, out));
-    let read_back_exceptions = f
-        .get("read_back_exceptions")
-        .and_then(|list| addresses(list, out));
-    let read_status = f.get("read_status").and_then(|list| bytes(list, out));
-    let roi = f.get("roi").map(|r| roi(r, out));
-    let sync = match f.word("sync")? {
-        "master" => SyncRole::Master,
-        "slave" => SyncRole::Slave,
-        _ => SyncRole::Standalone,
-    };
-    let model = f.word("model")?;
-    let channel = f.get("trigger_channel")?;
-    let trigger_channel = f
-        .count("trigger_channel")
-        .and_then(|c| u8::try_from(c).ok())?;
-    let delay = f.get("trigger_delay")?;
-    let delay_us = f.quantity("trigger_delay")? * 1e6;
-    if (delay_us - delay_us.round()).abs() > 1e-6 {
-        out.error(
-            delay.span,
-            delay.path.as_str(),
-            "cameras stamp edges in whole microseconds",
-        )
-        .expected("whole microseconds, such as `3 us`")
-        .found(format!("{delay_us} us"));
+impl fmt::Display for CameraKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.word())
     }
-    if model == "evk1" && ![0, 6, AUXILIARY].contains(&trigger_channel) {
-        out.error(
-            channel.span,
-            channel.path.as_str(),
-            "the EVK1 has no such trigger input",
-        )
-        .expected("0 (main), 6 (loop-back of its own output) or 7 (auxiliary)")
-        .found(trigger_channel.to_string());
-    }
-    if model == "evk1" && sync == SyncRole::Slave && trigger_channel == AUXILIARY {
-        out.error(
-            channel.span,
-            channel.path.as_str(),
-            "a slave's auxiliary input carries the sync clock",
-        )
-        .expected("0, the main trigger input")
-        .found(trigger_channel.to_string());
-    }
-    if let (Some(gap), true) = (f.get("max_time_high_gap"), model != "evk1") {
-        out.error(
-            gap.span,
-            gap.path.as_str(),
-            "the camera's time base is not watched",
-        )
-        .expected("`max_time_high_gap` with `model: evk1` only")
-        .found(format!("`model: {model}`"));
-    }
-    let untriggered = matches!(model, "evk3_hd" | "silky_vga");
-    if untriggered && sync != SyncRole::Standalone {
-        let span = f.get("sync").map_or(f.span, |s| s.span);
-        out.error(
-            span,
-            format!("{}.sync", f.path),
-            "the camera's driver shares no time base",
-        )
-        .expected(format!("`standalone` for `model: {model}`"))
-        .found(format!("`{sync:?}`").to_lowercase());
-    }
-    let nominal = f.get("geometry")?;
-    if nominal.get("aim").is_none() {
-        out.error(
-            nominal.span,
-            nominal.path.as_str(),
-            "where the camera aims is missing",
-        )
-        .expected("`aim`: a rig file knows no outline whose centre could stand for it")
-        .found("no such key")
-        .help("add `aim: [10 mm, 2 mm]`, the point that the camera's axis goes through");
-        return None;
-    }
-    let geometry = nominal_camera(nominal, Point2::new(0.0, 0.0))?;
-    Some(CameraSetup {
-        model,
-        serial: f.text("serial")?,
-        fpga: f.text("fpga"),
-        biases: f.get("biases").map(biases).unwrap_or_default(),
-        bias_file: bias_file.map_or(Some(None), |b| b.map(Some))?,
-        roi: roi.map_or(Some(None), |r| r.map(Some))?,
-        noise_filter_ev_s: f.quantity("noise_filter").map(|r| r.round() as u32),
-        read_back_exceptions: read_back_exceptions?,
-        read_status: read_status?,
-        failed_reset_is_accepted: f.word("failed_reset")? == "accepted",
-        failed_transfer_is_loss: f.word("failed_transfers")? == "loss",
-        tolerant: false,
-        max_time_high_gap_us: f
-            .quantity("max_time_high_gap")
-            .map(|s| (s * 1e6).round() as u64),
-        overflow_is_loss: f.word("overflow_counter")? == "loss",
-        sync,
-        trigger_channel,
-        trigger_delay_us: delay_us.round() as u16,
-        geometry,
-    })
 }
 
-/// Bytes, hexadecimal.
-fn bytes(list: &Field, out: &mut Collector) -> Option<Vec<u8>> {
-    let words = addresses(list, out)?;
-    let mut bytes = Vec::new();
-    for (word, item) in words.into_iter().zip(list.items()) {
-        let Ok(byte) = u8::try_from(word) else {
-            out.error(item.span, item.path.as_str(), "not a byte")
-                .expected("`0x00` to `0xff`")
-                .found(format!("`{word:#x}`"));
-            return None;
-        };
-        bytes.push(byte);
-    }
-    Some(bytes)
+/// Whose time base a camera follows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Choice)]
+#[serde(rename_all = "snake_case")]
+pub enum SyncRole {
+    /// Its own.
+    Standalone,
+    /// Its own, given to the other camera.
+    Master,
+    /// The other camera's.
+    Slave,
 }
+
+#[derive(Clone, Copy, Choice)]
+enum ResetRule {
+    /// The camera is not opened.
+    Refused,
+    /// The run goes on without a note.
+    Accepted,
+}
+
+impl From<ResetRule> for bool {
+    fn from(rule: ResetRule) -> Self {
+        matches!(rule, ResetRule::Accepted)
+    }
+}
+
+#[derive(Clone, Copy, Choice)]
+enum TransferRule {
+    /// The run ends.
+    End,
+    /// Lost data: a gap in the session, and the press is spoilt.
+    Loss,
+}
+
+impl From<TransferRule> for bool {
+    fn from(rule: TransferRule) -> Self {
+        matches!(rule, TransferRule::Loss)
+    }
+}
+
+#[derive(Clone, Copy, Choice)]
+enum OverflowRule {
+    /// Lost data: a gap in the session, and the press is spoilt.
+    Loss,
+    /// A note at the end of the session.
+    Note,
+}
+
+impl From<OverflowRule> for bool {
+    fn from(rule: OverflowRule) -> Self {
+        matches!(rule, OverflowRule::Loss)
+    }
+}
+
+const ADDRESSES: Shape = Shape::List {
+    of: &Shape::Text,
+    min: 0,
+    max: 100,
+};
 
 /// Register addresses, hexadecimal.
 fn addresses(list: &Field, out: &mut Collector) -> Option<Vec<u32>> {
     let mut addresses = Vec::new();
     for item in list.items() {
-        let Value::Text(text) = &item.value else {
-            return None;
-        };
+        let text = item.as_text()?;
         let hex = text.strip_prefix("0x").map(|h| u32::from_str_radix(h, 16));
         let Some(Ok(address)) = hex else {
             out.error(item.span, item.path.as_str(), "not an address")
@@ -210,29 +195,161 @@ fn addresses(list: &Field, out: &mut Collector) -> Option<Vec<u32>> {
     Some(addresses)
 }
 
-pub(super) fn trigger_box(f: &Field, places: &Places<'_>, out: &mut Collector) -> Option<BoxSetup> {
-    let port = f.get("port").and_then(|p| places.text(p, out));
-    let wiring = f.get("wiring")?;
-    let output = |key| wiring.word(key);
-    let outputs = [output("output1")?, output("output2")?, output("output3")?];
-    let lines = |camera| outputs.iter().filter(|o| **o == camera).count();
-    if let Some(camera) = ["camera1", "camera2"].into_iter().find(|c| lines(*c) != 1) {
-        out.error(
-            wiring.span,
-            wiring.path.as_str(),
-            "a camera's trigger line is not clear",
-        )
-        .expected(format!("exactly one output that goes to `{camera}`"))
-        .found(lines(camera).to_string());
+/// Bytes, hexadecimal.
+fn bytes(list: &Field, out: &mut Collector) -> Option<Vec<u8>> {
+    let mut bytes = Vec::new();
+    for (word, item) in addresses(list, out)?.into_iter().zip(list.items()) {
+        let Ok(byte) = u8::try_from(word) else {
+            out.error(item.span, item.path.as_str(), "not a byte")
+                .expected("`0x00` to `0xff`")
+                .found(format!("`{word:#x}`"));
+            return None;
+        };
+        bytes.push(byte);
     }
-    Some(BoxSetup {
-        port: port?,
-        serial: f.text("serial"),
-        firmware: f.text("firmware"),
-        outputs,
-        input: wiring.word("input")?,
-        // In range by the key.
-        sync_period_ms: (f.quantity("sync_period")? * 1e3).round() as u16,
-        max_drift_ppm: f.number("max_drift_ppm")?,
-    })
+    Some(bytes)
+}
+
+fn geometry(f: &Field, out: &mut Collector) -> Option<CameraModel> {
+    if f.get("aim").is_none() {
+        out.error(f.span, f.path.as_str(), "where the camera aims is missing")
+            .expected("`aim`: a rig file knows no outline whose centre could stand for it")
+            .found("no such key")
+            .help("add `aim: [10 mm, 2 mm]`, the point that the camera's axis goes through");
+        return None;
+    }
+    let camera = NominalCamera::from_field(f, out)?;
+    Some(camera.model(Point2::new(0.0, 0.0)))
+}
+
+impl CameraSetup {
+    /// Whether the camera's driver offers a trigger input.
+    #[must_use]
+    pub const fn has_trigger(&self) -> bool {
+        self.model.has_trigger()
+    }
+
+    /// What is wrong with a trigger input, and what is expected.
+    fn input_fault(
+        model: CameraKind,
+        sync: SyncRole,
+        channel: u8,
+    ) -> Option<(&'static str, &'static str)> {
+        if model != CameraKind::Evk1 {
+            None
+        } else if !EVK1_INPUTS.contains(&channel) {
+            Some((
+                "the EVK1 has no such trigger input",
+                "0 (main), 6 (loop-back of its own output) or 7 (auxiliary)",
+            ))
+        } else if sync == SyncRole::Slave && channel == AUXILIARY {
+            Some((
+                "a slave's auxiliary input carries the sync clock",
+                "0, the main trigger input",
+            ))
+        } else {
+            None
+        }
+    }
+
+    fn has_input(
+        model: &CameraKind,
+        sync: &SyncRole,
+        channel: &u8,
+        field: &Field,
+        out: &mut Collector,
+    ) {
+        if let Some((message, expected)) = Self::input_fault(*model, *sync, *channel) {
+            let at = field.at("trigger_channel");
+            out.error(at.span, at.path.as_str(), message)
+                .expected(expected)
+                .found(channel.to_string());
+        }
+    }
+
+    fn has_time_base(model: &CameraKind, field: &Field, out: &mut Collector) {
+        if let (Some(gap), true) = (field.get("max_time_high_gap"), *model != CameraKind::Evk1) {
+            let message = "the camera's time base is not watched";
+            out.error(gap.span, gap.path.as_str(), message)
+                .expected("`max_time_high_gap` with `model: evk1` only")
+                .found(format!("`model: {model}`"));
+        }
+    }
+
+    fn shares_time(model: &CameraKind, sync: &SyncRole, field: &Field, out: &mut Collector) {
+        if !model.has_trigger() && *sync != SyncRole::Standalone {
+            let at = field.at("sync");
+            let message = "the camera's driver shares no time base";
+            out.error(at.span, at.path.as_str(), message)
+                .expected(format!("`standalone` for `model: {model}`"))
+                .found(format!("`{}`", sync.word()));
+        }
+    }
+}
+
+/// The two event cameras.
+#[derive(Settings)]
+#[settings(
+    name = "rig_cameras",
+    check(Self::are_two, camera1, camera2),
+    check(Self::sync_fits, camera1, camera2),
+    check(Self::share_a_channel, camera1, camera2)
+)]
+struct CamerasKeys {
+    /// Camera 1.
+    camera1: CameraSetup,
+    /// Camera 2.
+    #[setting(example = CAMERA2)]
+    camera2: CameraSetup,
+}
+
+const CAMERA2: &str = "{serial: \"00001754\", geometry: {position: [45 mm, 42 mm], aim: [10 mm, 2 mm], half_field_of_view: 60 deg}}";
+
+/// The mapping of [`cameras`].
+pub(super) const CAMERAS: Shape = CamerasKeys::SHAPE;
+
+/// Camera 1 and camera 2.
+pub(super) fn cameras(f: &Field, out: &mut Collector) -> Option<[CameraSetup; 2]> {
+    CamerasKeys::from_mapping(f, out).map(|keys| [keys.camera1, keys.camera2])
+}
+
+impl CamerasKeys {
+    fn are_two(one: &CameraSetup, two: &CameraSetup, field: &Field, out: &mut Collector) {
+        if one.serial == two.serial {
+            let at = field.at("camera2.serial");
+            out.error(at.span, at.path.as_str(), "both cameras are the same")
+                .expected("two different serial numbers")
+                .found(format!("`{}` twice", one.serial));
+        }
+    }
+
+    fn sync_fits(one: &CameraSetup, two: &CameraSetup, field: &Field, out: &mut Collector) {
+        let fits = matches!(
+            (one.sync, two.sync),
+            (SyncRole::Standalone, SyncRole::Standalone)
+                | (SyncRole::Master, SyncRole::Slave)
+                | (SyncRole::Slave, SyncRole::Master)
+        );
+        if !fits {
+            let at = field.at("camera2.sync");
+            out.error(at.span, at.path.as_str(), "the sync modes do not fit")
+                .expected("both `standalone`, or one `master` and one `slave`")
+                .found(format!("{} and {}", one.sync.word(), two.sync.word()));
+        }
+    }
+
+    fn share_a_channel(one: &CameraSetup, two: &CameraSetup, field: &Field, out: &mut Collector) {
+        let is_valid = |c: &CameraSetup| {
+            CameraSetup::input_fault(c.model, c.sync, c.trigger_channel).is_none()
+        };
+        if is_valid(one) && is_valid(two) && one.trigger_channel != two.trigger_channel {
+            let at = field.at("camera2.trigger_channel");
+            out.error(at.span, at.path.as_str(), "the trigger channels differ")
+                .expected("the same channel on both cameras: analyses read one")
+                .found(format!(
+                    "{} and {}",
+                    one.trigger_channel, two.trigger_channel
+                ));
+        }
+    }
 }

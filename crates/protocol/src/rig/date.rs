@@ -3,6 +3,7 @@
 use std::fmt;
 
 use serde::{Serialize, Serializer};
+use skinrig_settings::{Collector, Field, Setting, Shape};
 
 /// A day of the Gregorian calendar, written `2026-11-20`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -56,6 +57,25 @@ impl Date {
 impl fmt::Display for Date {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{:04}-{:02}-{:02}", self.year, self.month, self.day)
+    }
+}
+
+impl Setting for Date {
+    const SHAPE: Shape = Shape::Text;
+
+    fn from_field(field: &Field, out: &mut Collector) -> Option<Self> {
+        let text = field.as_text()?;
+        let date = Self::parse(text);
+        if date.is_none() {
+            out.error(field.span, field.path.as_str(), "not a date")
+                .expected("year-month-day such as `2026-11-20`")
+                .found(format!("`{text}`"));
+        }
+        date
+    }
+
+    fn text(&self) -> String {
+        self.to_string()
     }
 }
 

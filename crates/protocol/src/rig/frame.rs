@@ -1,40 +1,241 @@
 //! Where the skin lies: given, or fitted to touched points.
 
+use serde::Serialize;
 use skinrig_model::{Point3, RigidTransform, Robot, Skin};
+use skinrig_settings::{Collector, Field, Settings, ValueRange};
 
-use super::{Date, Frame, TouchOff, TouchedPoint, fit};
-use crate::shape::{Field, Keys};
-use skinrig_settings::Collector;
+use super::date::Date;
+use super::fit;
 
+/// Coordinates of the robot and of the skin, mm.
+pub(super) const COORDINATE: ValueRange = ValueRange::between(-1000.0, 1000.0);
+const TURN: ValueRange = ValueRange::between(-180.0, 180.0);
 /// Touched points must spread at least this far from a line, mm: a slip of 0.3 mm in one of them then tilts the
 /// skin by no more than 2 degrees.
 const LEAST_SPREAD_MM: f64 = 10.0;
 /// The skin's normal must be within this angle of the robot's z axis, along which the force is measured.
 const MOST_TILT_DEG: f64 = 45.0;
 
-pub(super) fn frame(f: &Field, out: &mut Collector) -> Option<Frame> {
-    let frame = match (f.get("given"), f.get("touch_off")) {
-        (Some(given), None) => given_frame(given, out),
-        (None, Some(touched)) => touch_off(touched, out),
-        _ => None, // told by the table
-    }?;
-    let up = frame.robot_from_skin.rotation[2][2].clamp(-1.0, 1.0);
-    let tilt = up.acos().to_degrees();
-    if tilt > MOST_TILT_DEG {
-        let help = if tilt > 135.0 {
-            "the skin would face down: are the points mirrored, or x and y exchanged?"
-        } else {
-            "mount the skin facing up: the force is measured along the robot's z axis"
+/// Where the skin lies in the robot's frame, and how that is known.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Frame {
+    /// The transform.
+    pub robot_from_skin: RigidTransform<Robot, Skin>,
+    /// When it was measured.
+    pub date: Date,
+    /// The touched points that it was fitted to; `None` when it was given.
+    pub touch_off: Option<TouchOff>,
+}
+
+/// Touched points and how well they fit.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct TouchOff {
+    /// At least three.
+    pub points: Vec<TouchedPoint>,
+    /// Root mean square of the points' distances from the fit, mm.
+    pub rms_mm: f64,
+    /// Largest of them, mm.
+    pub worst_mm: f64,
+    /// Largest that is allowed, mm.
+    pub max_residual_mm: f64,
+}
+
+/// A touched point.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct TouchedPoint {
+    /// For messages.
+    pub name: String,
+    /// Where it is on the skin.
+    pub skin: Point3<Skin>,
+    /// Where the tip was.
+    pub robot: Point3<Robot>,
+    /// Distance of the tip from where the fit puts the point, mm.
+    pub residual_mm: f64,
+}
+
+/// Where the skin lies in the robot's frame. Skin: z out of the surface, z = 0 at the surface. Robot: z away from the sample
+/// (`robot.axes`).
+#[derive(Settings)]
+#[settings(
+    name = "rig_frame",
+    exactly_one("given", "touch_off"),
+    builds(Frame, FrameKeys::frame)
+)]
+struct FrameKeys {
+    /// The skin's place as measured by other means.
+    given: Option<GivenKeys>,
+    /// Points that were touched with the tip: `skinrig jog` prints this block.
+    touch_off: Option<TouchOffKeys>,
+}
+
+/// Robot = Rz(yaw) Ry(pitch) Rx(roll) skin + origin.
+#[derive(Settings)]
+#[settings(name = "given_frame")]
+struct GivenKeys {
+    /// The skin's origin in the robot's frame.
+    #[setting(range = COORDINATE, example = "[0 mm, 0 mm, -20 mm]")]
+    origin_mm: [f64; 3],
+    /// Turn about the robot's z, applied last.
+    #[setting(default = "0 deg", range = TURN)]
+    yaw_deg: f64,
+    /// Turn about y.
+    #[setting(default = "0 deg", range = TURN)]
+    pitch_deg: f64,
+    /// Turn about x, applied first.
+    #[setting(default = "0 deg", range = TURN)]
+    roll_deg: f64,
+    /// Date of the measurement: year-month-day, for example `2026-11-20`.
+    #[setting(example = "2026-11-20")]
+    date: Date,
+}
+
+/// Points whose skin coordinates are known and whose robot coordinates were measured by touching them.
+#[derive(Settings)]
+#[settings(name = "touch_off")]
+struct TouchOffKeys {
+    /// Date of the touches: year-month-day, for example `2026-11-20`.
+    #[setting(example = "2026-11-20")]
+    date: Date,
+    /// At least three points that do not lie on one line; four or more show slips better.
+    #[setting(items = 3..=1000, example = THREE_POINTS)]
+    points: Vec<TouchedKeys>,
+    /// Largest distance of a point from the rigid fit.
+    #[setting(default = "0.3 mm", above = 0, max = 10)]
+    max_residual_mm: f64,
+}
+
+const THREE_POINTS: &str = "[{skin: [0 mm, 0 mm, 0 mm], robot: [0 mm, 0 mm, -20 mm]}, \
+     {skin: [40 mm, 0 mm, 0 mm], robot: [40 mm, 0 mm, -20 mm]}, \
+     {skin: [0 mm, 40 mm, 0 mm], robot: [0 mm, 40 mm, -20 mm]}]";
+
+/// One touched point.
+#[derive(Settings)]
+#[settings(name = "touched_point")]
+struct TouchedKeys {
+    /// For messages.
+    name: Option<String>,
+    /// Where it is on the skin.
+    #[setting(range = COORDINATE)]
+    skin_mm: [f64; 3],
+    /// Where the robot's tip was when it touched.
+    #[setting(range = COORDINATE)]
+    robot_mm: [f64; 3],
+}
+
+impl FrameKeys {
+    fn frame(self, field: &Field, out: &mut Collector) -> Option<Frame> {
+        let frame = match (self.given, self.touch_off) {
+            (Some(given), None) => given.frame(),
+            (None, Some(touched)) => touched.frame(field.at("touch_off"), out)?,
+            (None, None) | (Some(_), Some(_)) => return None, // reported as exactly one of them
         };
-        out.error(f.span, f.path.as_str(), "the skin does not face up")
-            .expected(format!(
-                "the skin's normal within {MOST_TILT_DEG} deg of the robot's z axis"
-            ))
-            .found(format!("{tilt:.1} deg"))
-            .help(help);
-        return None;
+        let up = frame.robot_from_skin.rotation[2][2].clamp(-1.0, 1.0);
+        let tilt = up.acos().to_degrees();
+        if tilt > MOST_TILT_DEG {
+            let help = if tilt > 135.0 {
+                "the skin would face down: are the points mirrored, or x and y exchanged?"
+            } else {
+                "mount the skin facing up: the force is measured along the robot's z axis"
+            };
+            out.error(field.span, field.path.as_str(), "the skin does not face up")
+                .expected(format!(
+                    "the skin's normal within {MOST_TILT_DEG} deg of the robot's z axis"
+                ))
+                .found(format!("{tilt:.1} deg"))
+                .help(help);
+            return None;
+        }
+        Some(frame)
     }
-    Some(frame)
+}
+
+impl GivenKeys {
+    fn frame(self) -> Frame {
+        Frame {
+            robot_from_skin: turned(self.yaw_deg, self.pitch_deg, self.roll_deg, self.origin_mm),
+            date: self.date,
+            touch_off: None,
+        }
+    }
+}
+
+impl TouchOffKeys {
+    fn frame(self, field: &Field, out: &mut Collector) -> Option<Frame> {
+        let list = field.at("points");
+        let pairs: Vec<(Point3<Skin>, Point3<Robot>)> = self
+            .points
+            .iter()
+            .map(|p| (point(p.skin_mm), point(p.robot_mm)))
+            .collect();
+        let skin = self.points.iter().map(|p| p.skin_mm).collect::<Vec<_>>();
+        let robot = self.points.iter().map(|p| p.robot_mm).collect();
+        for (key, points) in [("skin", skin), ("robot", robot)] {
+            let spread = fit::off_line_mm(&points);
+            if spread.is_nan() || spread < LEAST_SPREAD_MM {
+                let message = "the points lie on one line, or nearly";
+                out.error(list.span, list.path.as_str(), message)
+                    .expected(format!(
+                        "points at least {LEAST_SPREAD_MM} mm off their common line, `{key}` coordinates"
+                    ))
+                    .found(format!("{spread:.3} mm"))
+                    .help("touch points near three or four corners of the skin");
+                return None;
+            }
+        }
+        let robot_from_skin = fit::rigid(&pairs)?;
+        let points: Vec<TouchedPoint> = (1..)
+            .zip(self.points)
+            .zip(pairs)
+            .map(|((n, keys), (skin, robot)): ((u32, _), _)| TouchedPoint {
+                name: keys.name.unwrap_or_else(|| format!("point {n}")),
+                skin,
+                robot,
+                residual_mm: robot_from_skin.apply(skin).distance_mm(robot),
+            })
+            .collect();
+        let squares: f64 = points.iter().map(|p| p.residual_mm.powi(2)).sum();
+        let touched = TouchOff {
+            rms_mm: (squares / points.len() as f64).sqrt(),
+            worst_mm: points.iter().map(|p| p.residual_mm).fold(0.0, f64::max),
+            max_residual_mm: self.max_residual_mm,
+            points,
+        };
+        touched.fits(list, out).then_some(Frame {
+            robot_from_skin,
+            date: self.date,
+            touch_off: Some(touched),
+        })
+    }
+}
+
+impl TouchOff {
+    /// Whether every point is near enough to the fit; `list` is where the points stand.
+    fn fits(&self, list: &Field, out: &mut Collector) -> bool {
+        let worst = self
+            .points
+            .iter()
+            .zip(list.items())
+            .max_by(|a, b| a.0.residual_mm.total_cmp(&b.0.residual_mm));
+        let Some((point, item)) = worst.filter(|_| self.worst_mm > self.max_residual_mm) else {
+            return true;
+        };
+        let message = "the points do not fit a rigid motion";
+        out.error(item.span, list.path.as_str(), message)
+            .expected(format!(
+                "every point within {} mm of the fit, `max_residual`",
+                self.max_residual_mm
+            ))
+            .found(format!(
+                "`{}` {:.3} mm away, all points {:.3} mm root mean square",
+                point.name, self.worst_mm, self.rms_mm
+            ))
+            .help("touch the points again, this one first; check its skin coordinates");
+        false
+    }
+}
+
+fn point<F>([x_mm, y_mm, z_mm]: [f64; 3]) -> Point3<F> {
+    Point3::new(x_mm, y_mm, z_mm)
 }
 
 /// The transform with this translation (mm) and R = Rz(yaw) Ry(pitch) Rx(roll), degrees.
@@ -54,111 +255,4 @@ pub(super) fn turned(
         ],
         shift_mm,
     )
-}
-
-fn date(f: &Field, out: &mut Collector) -> Option<Date> {
-    let (field, text) = (f.get("date")?, f.text("date")?);
-    let date = Date::parse(&text);
-    if date.is_none() {
-        out.error(field.span, field.path.as_str(), "not a date")
-            .expected("year-month-day such as `2026-11-20`")
-            .found(format!("`{text}`"));
-    }
-    date
-}
-
-fn given_frame(f: &Field, out: &mut Collector) -> Option<Frame> {
-    let date = date(f, out);
-    Some(Frame {
-        robot_from_skin: turned(
-            f.quantity("yaw")?,
-            f.quantity("pitch")?,
-            f.quantity("roll")?,
-            f.get("origin")?.triple()?,
-        ),
-        date: date?,
-        touch_off: None,
-    })
-}
-
-fn touch_off(f: &Field, out: &mut Collector) -> Option<Frame> {
-    let date = date(f, out);
-    let list = f.get("points")?;
-    let pairs: Vec<(Point3<Skin>, Point3<Robot>)> = list
-        .items()
-        .iter()
-        .map(|item| {
-            let place = |key| item.get(key)?.triple();
-            let ([a, b, c], [x, y, z]) = (place("skin")?, place("robot")?);
-            Some((Point3::new(a, b, c), Point3::new(x, y, z)))
-        })
-        .collect::<Option<_>>()?;
-    for (what, points) in [
-        (
-            "skin",
-            pairs.iter().map(|p| p.0.to_array()).collect::<Vec<_>>(),
-        ),
-        ("robot", pairs.iter().map(|p| p.1.to_array()).collect()),
-    ] {
-        let spread = fit::off_line_mm(&points);
-        if spread.is_nan() || spread < LEAST_SPREAD_MM {
-            out.error(
-                list.span,
-                list.path.as_str(),
-                "the points lie on one line, or nearly",
-            )
-            .expected(format!(
-                "points at least {LEAST_SPREAD_MM} mm off their common line, `{what}` coordinates"
-            ))
-            .found(format!("{spread:.3} mm"))
-            .help("touch points near three or four corners of the skin");
-            return None;
-        }
-    }
-    let robot_from_skin = fit::rigid(&pairs)?;
-    let max_residual_mm = f.quantity("max_residual")?;
-    let points: Vec<TouchedPoint> = (1..)
-        .zip(list.items())
-        .zip(&pairs)
-        .map(|((n, item), (skin, robot)): ((u32, _), _)| TouchedPoint {
-            name: item.text("name").unwrap_or_else(|| format!("point {n}")),
-            skin: *skin,
-            robot: *robot,
-            residual_mm: robot_from_skin.apply(*skin).distance_mm(*robot),
-        })
-        .collect();
-    let squares: f64 = points.iter().map(|p| p.residual_mm.powi(2)).sum();
-    let touched = TouchOff {
-        rms_mm: (squares / points.len() as f64).sqrt(),
-        worst_mm: points.iter().map(|p| p.residual_mm).fold(0.0, f64::max),
-        max_residual_mm,
-        points,
-    };
-    if touched.worst_mm > max_residual_mm {
-        let worst = touched
-            .points
-            .iter()
-            .zip(list.items())
-            .max_by(|a, b| a.0.residual_mm.total_cmp(&b.0.residual_mm));
-        let (name, span) = worst.map_or(("", list.span), |(p, item)| (&p.name, item.span));
-        out.error(
-            span,
-            list.path.as_str(),
-            "the points do not fit a rigid motion",
-        )
-        .expected(format!(
-            "every point within {max_residual_mm} mm of the fit, `max_residual`"
-        ))
-        .found(format!(
-            "`{name}` {:.3} mm away, all points {:.3} mm root mean square",
-            touched.worst_mm, touched.rms_mm
-        ))
-        .help("touch the points again, this one first; check its skin coordinates");
-        return None;
-    }
-    Some(Frame {
-        robot_from_skin,
-        date: date?,
-        touch_off: Some(touched),
-    })
 }

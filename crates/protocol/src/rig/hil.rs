@@ -1,62 +1,40 @@
 //! What a suite of checks may do on a bench.
 
 use serde::Serialize;
+use skinrig_settings::{Choice, Settings};
 
-use super::build::Places;
-use crate::shape::Field;
-use skinrig_settings::Collector;
+use super::variables;
 
-/// What a suite of checks may do.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+/// What a suite of checks (`skinrig hil run`) may do on this bench.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Settings)]
+#[settings(name = "hil")]
 pub struct HilSetup {
-    /// Drills that a bench permits; an emulated one permits all.
+    /// Drills that this bench permits. Emulated benches permit all.
+    #[setting(default = "[]", items = 0..=2)]
     pub drills: Vec<Drill>,
-    /// Programs that switch the lamps.
+    /// Programs that switch the bench's lamps; absent: noise in the dark is not measured.
+    #[setting(key = "light")]
     pub lamps: Option<Lamps>,
 }
 
 /// A drill.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Choice)]
 #[serde(rename_all = "snake_case")]
 pub enum Drill {
-    /// The program that holds the arm is killed.
+    /// The program that holds the arm in free air is killed.
     Watchdog,
-    /// The arm is stopped in the middle of a move.
+    /// The arm is stopped in the middle of a move in free air.
     Stop,
 }
 
-/// Programs that switch the lamps, each with its arguments; they are run without a shell.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+/// Programs that switch the lamps. Each runs without a shell, must exit with 0 within 10 s, and leaves the lamps as its name says.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Settings)]
+#[settings(name = "light")]
 pub struct Lamps {
-    /// Switches them off.
+    /// Switches the lamps off: a program and its arguments; `${NAME}` is looked up in the environment.
+    #[setting(items = 1..=20, read = variables::texts, example = "[/usr/local/bin/lamp, \"off\"]")]
     pub dark: Vec<String>,
     /// Switches them on.
+    #[setting(items = 1..=20, read = variables::texts, example = "[/usr/local/bin/lamp, \"on\"]")]
     pub lit: Vec<String>,
-}
-
-pub(super) fn hil(f: &Field, places: &Places<'_>, out: &mut Collector) -> Option<HilSetup> {
-    let drills = f.get("drills")?.items().iter().map(|d| {
-        Some(match d.as_word()? {
-            "watchdog" => Drill::Watchdog,
-            _ => Drill::Stop,
-        })
-    });
-    let mut program = |light: &Field, key: &str| -> Option<Vec<String>> {
-        let words = light.get(key)?.items().iter();
-        words.map(|w| places.text(w, out)).collect()
-    };
-    let lamps = match f.get("light") {
-        Some(light) => {
-            let (dark, lit) = (program(light, "dark"), program(light, "lit"));
-            Some(Lamps {
-                dark: dark?,
-                lit: lit?,
-            })
-        }
-        None => None,
-    };
-    Some(HilSetup {
-        drills: drills.collect::<Option<_>>()?,
-        lamps,
-    })
 }

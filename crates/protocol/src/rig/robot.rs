@@ -1,184 +1,262 @@
-//! Robot, tip and limits of a bench, each from its own keys.
+//! The robot of a bench.
 
-use super::build::Places;
-use super::{BenchLimits, RobotSetup, Tip};
-use crate::shape::{Field, Keys};
-use skinrig_settings::Collector;
+use std::fmt;
+use std::path::PathBuf;
 
-/// One step of the controller's watchdog, s.
-const WATCHDOG_STEP_S: f64 = 125e-6;
+use serde::Serialize;
+use skinrig_settings::{
+    Choice, Collector, Dimension, Field, Settings, Shape, ValueRange, whole_units,
+};
 
-pub(super) fn tip(f: &Field, out: &mut Collector) -> Option<Tip> {
-    let shape = f.word("shape")?;
-    let (right, wrong) = match shape {
-        "cube" => ("side", "diameter"),
-        _ => ("diameter", "side"),
-    };
-    if let Some(other) = f.get(wrong) {
-        out.error(
-            other.span,
-            other.path.as_str(),
-            "the size does not fit the shape",
-        )
-        .expected(format!("`{right}` for a {shape}"))
-        .found(format!("`{wrong}`"));
-        return None;
-    }
-    Some(Tip {
-        shape,
-        size_mm: f.quantity(right)?,
-        mass_kg: f.quantity("mass"),
-    })
+use super::variables;
+
+/// An omega.3 behind the vendor's library.
+#[derive(Debug, Clone, PartialEq, Serialize, Settings)]
+#[settings(
+    name = "robot",
+    check(Self::may_initialise, auto_init, sample_is_off),
+    check(Self::is_right_handed, axes)
+)]
+pub struct RobotSetup {
+    /// Which robot.
+    #[setting(default = "omega3")]
+    pub model: RobotKind,
+    /// Its serial number, as `skinrig devices` shows it. The library reports 65535 for a robot without one; here 65535 takes the only
+    /// robot that is connected.
+    #[setting(example = "12345")]
+    pub serial: u16,
+    /// Expected firmware version; another one fails the preflight.
+    pub firmware: Option<String>,
+    /// Path of the vendor's libdrd, relative to this file; `${NAME}` stands for an environment variable. Absent: the usual places.
+    #[setting(read = variables::path)]
+    pub library: Option<PathBuf>,
+    /// Expected version of the library; another one fails the preflight.
+    pub library_version: Option<String>,
+    /// How the base is mounted: 0 deg upright, 90 deg lying flat. Wrong values push the arm off.
+    #[setting(default = "0 deg", min = -180, max = 180)]
+    pub device_angle_deg: f64,
+    /// Which axes of the device the robot frame's x, y and z are: z points away from the sample. Right-handed.
+    #[setting(default = "[+x, +y, +z]", value = [DeviceAxis::PlusX, DeviceAxis::PlusY, DeviceAxis::PlusZ])]
+    pub axes: [DeviceAxis; 3],
+    /// Mass that gravity compensation carries; absent: the device's own value. At most 1 kg: a larger mass would lift the arm.
+    #[setting(above = 0, max = 1)]
+    pub effector_mass_kg: Option<f64>,
+    /// The controller drops forces when no command came for this long; a multiple of 125 us.
+    #[setting(key = "watchdog", default = "10 ms", value = 80, shape = WATCHDOG, read = watchdog)]
+    pub watchdog_steps: u8,
+    /// Expected velocity threshold in the device's own unit. Never written; another one fails the preflight.
+    #[setting(min = 1, max = u32::MAX)]
+    pub velocity_threshold: Option<u32>,
+    /// Whether skinrig may let the arm initialise itself. The arm then moves on its own: needs `sample_is_off`.
+    #[setting(default = "false")]
+    pub auto_init: bool,
+    /// Your word that sample, hands and tools are out of the arm's whole reach.
+    #[setting(default = "false")]
+    pub sample_is_off: bool,
+    /// What the robot must report of redundant encoders: the library reports 0 when their check failed and also when there are none.
+    #[setting(key = "redundant_encoders", default = "reported", through = EncoderRule)]
+    pub needs_redundant_encoders: bool,
+    /// How a cap on the motors' torque bounds the force at the tip; settle it with a scale.
+    #[serde(flatten)]
+    #[setting(default)]
+    pub motor_force: MotorForce,
+    /// Integral gain of the regulation; 0: forces do not build up while the tip rests on something.
+    #[setting(default = "0", max = 10)]
+    pub integral_gain: f64,
+    /// Proportional gain; absent: the library's.
+    #[setting(max = 100)]
+    pub proportional_gain: Option<f64>,
+    /// Derivative gain; absent: the library's.
+    #[setting(max = 100)]
+    pub derivative_gain: Option<f64>,
+    /// Largest acceleration of moves.
+    #[setting(default = "200 mm/s2", above = 0, max = 10_000)]
+    pub acceleration_mm_s2: f64,
+    /// Largest jerk of moves.
+    #[setting(default = "4000 mm/s3", above = 0, max = 1e6)]
+    pub jerk_mm_s3: f64,
+    /// Whether a second process brakes the arm when this one dies.
+    #[setting(default = "true")]
+    pub supervisor: bool,
 }
 
-pub(super) fn limits(f: &Field, out: &mut Collector) -> Option<BenchLimits> {
-    let workspace = f.get("workspace")?;
-    let (min, max) = (
-        workspace.get("min")?.triple()?,
-        workspace.get("max")?.triple()?,
-    );
-    for ((axis, low), high) in ["x", "y", "z"].iter().zip(min).zip(max) {
-        if low >= high {
-            out.error(
-                workspace.span,
-                workspace.path.as_str(),
-                "the workspace is empty",
-            )
-            .expected(format!("`min` smaller than `max` in {axis}"))
-            .found(format!("{low} mm and {high} mm"));
+/// A robot that skinrig drives.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Choice)]
+#[serde(rename_all = "snake_case")]
+pub enum RobotKind {
+    /// Force Dimension omega.3.
+    Omega3,
+}
+
+impl fmt::Display for RobotKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.word())
+    }
+}
+
+/// A direction along an axis of the device.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Choice)]
+pub enum DeviceAxis {
+    /// Out of the base, towards the operator.
+    #[serde(rename = "+x")]
+    #[choice(word = "+x")]
+    PlusX,
+    /// Into the base.
+    #[serde(rename = "-x")]
+    #[choice(word = "-x")]
+    MinusX,
+    /// To the operator's right.
+    #[serde(rename = "+y")]
+    #[choice(word = "+y")]
+    PlusY,
+    /// To the operator's left.
+    #[serde(rename = "-y")]
+    #[choice(word = "-y")]
+    MinusY,
+    /// Up.
+    #[serde(rename = "+z")]
+    #[choice(word = "+z")]
+    PlusZ,
+    /// Down.
+    #[serde(rename = "-z")]
+    #[choice(word = "-z")]
+    MinusZ,
+}
+
+impl DeviceAxis {
+    /// Its unit vector in the device's frame.
+    const fn vector(self) -> [f64; 3] {
+        match self {
+            Self::PlusX => [1.0, 0.0, 0.0],
+            Self::MinusX => [-1.0, 0.0, 0.0],
+            Self::PlusY => [0.0, 1.0, 0.0],
+            Self::MinusY => [0.0, -1.0, 0.0],
+            Self::PlusZ => [0.0, 0.0, 1.0],
+            Self::MinusZ => [0.0, 0.0, -1.0],
         }
     }
-    Some(BenchLimits {
-        workspace_min_mm: min,
-        workspace_max_mm: max,
-        max_speed_mm_s: f.quantity("max_speed")?,
-        max_force_n: f.quantity("max_force")?,
-        max_lead_mm: f.quantity("max_lead")?,
-        max_depth_mm: f.quantity("max_depth")?,
-    })
 }
 
-pub(super) fn robot(
-    f: &Field,
-    max_force_n: Option<f64>,
-    places: &Places<'_>,
-    out: &mut Collector,
-) -> Option<RobotSetup> {
-    let library = f.get("library").map(|l| places.path(l, out));
-    let watchdog = f.get("watchdog").and_then(|w| watchdog(w, out));
-    let (auto_init, sample_is_off) = (f.flag("auto_init"), f.flag("sample_is_off"));
-    if (auto_init, sample_is_off) == (Some(true), Some(false)) {
-        let span = f.get("auto_init").map_or(f.span, |a| a.span);
-        out.error(
-            span,
-            "robot.auto_init",
-            "the arm would sweep through the sample",
-        )
-        .expected("`sample_is_off: true` beside it")
-        .found("`sample_is_off: false`")
-        .help("take the sample off and say so, or initialise the arm by hand and write `auto_init: false`");
-    }
-    let axes = f.get("axes").and_then(|a| axes(a, out));
-    let force = f.get("motor_force")?;
-    if let (Some(limit), Some(per_ratio), Some(gravity), Some(least)) = (
-        max_force_n,
-        force.quantity("per_ratio"),
-        force.number("gravity_ratio"),
-        force.number("least_ratio"),
-    ) {
-        let strongest = (1.0 - gravity) * per_ratio;
-        let sinking = gravity + limit / per_ratio < least;
-        if strongest < limit || sinking {
-            let (expected, found) = if sinking {
-                (
-                    format!(
-                        "a limit of more than {:.3} N: below, the arm sinks",
-                        (least - gravity) * per_ratio
-                    ),
-                    format!("{limit} N, `limits.max_force`"),
-                )
-            } else {
-                (
-                    format!("at least {limit} N, `limits.max_force`"),
-                    format!("{strongest:.3} N with all of the motors' torque"),
-                )
-            };
-            out.error(
-                force.span,
-                force.path.as_str(),
-                "the force limit cannot be set",
-            )
-            .expected(expected)
-            .found(found);
-        }
-    }
-    Some(RobotSetup {
-        model: f.word("model")?,
-        serial: f.count("serial").and_then(|n| u16::try_from(n).ok())?,
-        firmware: f.text("firmware"),
-        library: library.map_or(Some(None), |l| l.map(Some))?,
-        library_version: f.text("library_version"),
-        device_angle_deg: f.quantity("device_angle")?,
-        effector_mass_kg: f.quantity("effector_mass"),
-        watchdog_steps: watchdog?,
-        velocity_threshold: f.count("velocity_threshold"),
-        auto_init: auto_init?,
-        sample_is_off: sample_is_off?,
-        needs_redundant_encoders: f.word("redundant_encoders")? == "required",
-        axes: axes?,
-        force_per_ratio_n: force.quantity("per_ratio")?,
-        gravity_ratio: force.number("gravity_ratio")?,
-        least_ratio: force.number("least_ratio")?,
-        reports_sample_force: force.word("reported")? == "by_sample",
-        integral_gain: f.number("integral_gain")?,
-        proportional_gain: f.number("proportional_gain"),
-        derivative_gain: f.number("derivative_gain"),
-        acceleration_mm_s2: f.quantity("acceleration")?,
-        jerk_mm_s3: f.quantity("jerk")?,
-        supervisor: f.flag("supervisor")?,
-    })
+#[derive(Clone, Copy, Choice)]
+enum EncoderRule {
+    /// Anything; it is recorded, and 0 is noted.
+    Reported,
+    /// That they agree (1): for a robot that is known to have them.
+    Required,
 }
+
+impl From<EncoderRule> for bool {
+    fn from(rule: EncoderRule) -> Self {
+        matches!(rule, EncoderRule::Required)
+    }
+}
+
+/// Force at the tip = per_ratio (ratio - gravity_ratio), with ratio the share of the motors' torque that may be used.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Settings)]
+#[settings(name = "motor_force")]
+pub struct MotorForce {
+    /// Largest force over all poses that was measured on a scale, by ratio. The default is the device's nominal force; the true one
+    /// depends on the pose.
+    #[serde(rename = "force_per_ratio_n")]
+    #[setting(default = "12 N", above = 0, max = 50)]
+    pub per_ratio_n: f64,
+    /// Share that carries the arm itself.
+    #[setting(default = "0", max = 0.9)]
+    pub gravity_ratio: f64,
+    /// Smallest share with which the arm does not sink.
+    #[setting(default = "0.05", max = 1)]
+    pub least_ratio: f64,
+    /// Which force the library reports; settle it with a load cell.
+    #[setting(key = "reported", default = "by_motors", through = ReportedForce)]
+    pub reports_sample_force: bool,
+}
+
+#[derive(Clone, Copy, Choice)]
+enum ReportedForce {
+    /// The force with which the motors push the tip.
+    ByMotors,
+    /// The force with which the tip is pushed back.
+    BySample,
+}
+
+impl From<ReportedForce> for bool {
+    fn from(reported: ReportedForce) -> Self {
+        matches!(reported, ReportedForce::BySample)
+    }
+}
+
+/// One step of the controller's watchdog, µs.
+const WATCHDOG_STEP_US: i64 = 125;
+/// 1 to 255 steps.
+const WATCHDOG: Shape = Shape::Quantity(
+    &[Dimension::Time],
+    ValueRange::between(0.000_125, 0.031_875),
+);
 
 fn watchdog(f: &Field, out: &mut Collector) -> Option<u8> {
-    let steps = f.as_quantity()? / WATCHDOG_STEP_S;
-    if (steps - steps.round()).abs() > 1e-6 {
-        let near = |n: f64| format!("{} us", n * 125.0);
+    let us = whole_units(f, "us", 1e6, out)?;
+    if us % WATCHDOG_STEP_US != 0 {
+        let below = (us / WATCHDOG_STEP_US * WATCHDOG_STEP_US).max(WATCHDOG_STEP_US);
+        let above = us / WATCHDOG_STEP_US * WATCHDOG_STEP_US + WATCHDOG_STEP_US;
         out.error(f.span, f.path.as_str(), "between two steps of the watchdog")
             .expected("a multiple of 125 us")
-            .found(format!("{:.3} us", steps * 125.0))
-            .help(format!(
-                "write `{}` or `{}`",
-                near(steps.floor().max(1.0)),
-                near(steps.ceil())
-            ));
+            .found(format!("{us} us"))
+            .help(format!("write `{below} us` or `{above} us`"));
         return None;
     }
-    Some(steps.round() as u8) // 1 to 255 by the key's range
+    u8::try_from(us / WATCHDOG_STEP_US).ok()
 }
 
-/// Three different axes, right-handed.
-fn axes(f: &Field, out: &mut Collector) -> Option<[&'static str; 3]> {
-    let [x, y, z] = f.items() else { return None };
-    let axes = [x.as_word()?, y.as_word()?, z.as_word()?];
-    let mut m = [[0.0f64; 3]; 3];
-    for (row, axis) in m.iter_mut().zip(axes) {
-        let column = match axis.trim_start_matches(['+', '-']) {
-            "x" => 0,
-            "y" => 1,
-            _ => 2,
-        };
-        row[column] = if axis.starts_with('-') { -1.0 } else { 1.0 };
+impl RobotSetup {
+    fn may_initialise(auto_init: &bool, is_off: &bool, field: &Field, out: &mut Collector) {
+        if *auto_init && !is_off {
+            let at = field.at("auto_init");
+            let message = "the arm would sweep through the sample";
+            out.error(at.span, at.path.as_str(), message)
+                .expected("`sample_is_off: true` beside it")
+                .found("`sample_is_off: false`")
+                .help("take the sample off and say so, or initialise the arm by hand and write `auto_init: false`");
+        }
     }
-    let [a, b, c] = m;
-    let determinant = a[0] * (b[1] * c[2] - b[2] * c[1]) - a[1] * (b[0] * c[2] - b[2] * c[0])
-        + a[2] * (b[0] * c[1] - b[1] * c[0]);
-    if determinant < 0.5 {
-        out.error(f.span, f.path.as_str(), "the axes are not right-handed")
-            .expected(
-                "three different axes, z = x cross y, such as `[+x, +y, +z]` or `[+y, -x, +z]`",
-            )
-            .found(format!("[{}]", axes.join(", ")));
-        return None;
+
+    /// Three different axes, right-handed.
+    fn is_right_handed(axes: &[DeviceAxis; 3], field: &Field, out: &mut Collector) {
+        let [a, b, c] = axes.map(DeviceAxis::vector);
+        let determinant = a[0] * (b[1] * c[2] - b[2] * c[1]) - a[1] * (b[0] * c[2] - b[2] * c[0])
+            + a[2] * (b[0] * c[1] - b[1] * c[0]);
+        if determinant < 0.5 {
+            let at = field.at("axes");
+            out.error(at.span, at.path.as_str(), "the axes are not right-handed")
+                .expected(
+                    "three different axes, z = x cross y, such as `[+x, +y, +z]` or `[+y, -x, +z]`",
+                )
+                .found(format!("[{}]", axes.map(Choice::word).join(", ")));
+        }
     }
-    Some(axes)
+}
+
+impl MotorForce {
+    /// Whether a force limit can be set by a cap on the motors' torque; `field` is the mapping of `self`.
+    pub(super) fn check_limit(&self, limit_n: f64, field: &Field, out: &mut Collector) {
+        let strongest = (1.0 - self.gravity_ratio) * self.per_ratio_n;
+        let (expected, found) =
+            if self.gravity_ratio + limit_n / self.per_ratio_n < self.least_ratio {
+                let least = (self.least_ratio - self.gravity_ratio) * self.per_ratio_n;
+                (
+                    format!("a limit of more than {least:.3} N: below, the arm sinks"),
+                    format!("{limit_n} N, `limits.max_force`"),
+                )
+            } else if strongest < limit_n {
+                (
+                    format!("at least {limit_n} N, `limits.max_force`"),
+                    format!("{strongest:.3} N with all of the motors' torque"),
+                )
+            } else {
+                return;
+            };
+        let message = "the force limit cannot be set";
+        out.error(field.span, field.path.as_str(), message)
+            .expected(expected)
+            .found(found);
+    }
 }

@@ -5,6 +5,7 @@ mod common;
 mod errors;
 mod laws;
 mod limits;
+mod missing;
 mod remaining;
 mod rig;
 mod schedules;

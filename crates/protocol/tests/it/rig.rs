@@ -246,7 +246,7 @@ fn what_cannot_be_is_named() {
         "trigger_delay: 0 us",
         "trigger_delay: 2.5 us",
         "cameras.camera1.trigger_delay",
-        "cameras stamp edges in whole microseconds",
+        "not a whole number of its unit",
         "2.5 us",
     );
     finding(
@@ -274,7 +274,7 @@ fn what_cannot_be_is_named() {
         "output2: camera2",
         "output2: camera1",
         "trigger_box.wiring",
-        "a camera's trigger line is not clear",
+        "a camera needs exactly one trigger line",
         "exactly one output",
     );
     finding(

@@ -2,13 +2,18 @@
 
 use proc_macro2::TokenStream;
 use syn::punctuated::Punctuated;
-use syn::{Attribute, Expr, Ident, Lit, LitStr, Meta, Path, Result, Token, parenthesized};
+use syn::{Attribute, Expr, Ident, Lit, LitStr, Meta, Path, Result, Token, Type, parenthesized};
 
 /// The attributes of a struct.
 #[derive(Default)]
 pub struct StructAttributes {
     pub name: Option<String>,
     pub exactly_one: Vec<Vec<String>>,
+    pub version: Option<String>,
+    /// Functions and the fields that each needs.
+    pub checks: Vec<(Path, Vec<Ident>)>,
+    /// The type that is built from the struct, and the function that does.
+    pub builds: Option<(Type, Path)>,
     pub finish: Option<Path>,
     pub no_default: bool,
     pub parts: Option<Ident>,
@@ -38,6 +43,10 @@ pub struct FieldAttributes {
     pub shape: Option<Expr>,
     pub read: Option<Path>,
     pub show: Option<Path>,
+    pub through: Option<Type>,
+    pub example: Option<Expr>,
+    pub at_least_one: bool,
+    pub flatten: bool,
     pub skip: bool,
 }
 
@@ -46,6 +55,27 @@ fn strings(input: syn::parse::ParseStream<'_>) -> Result<Vec<String>> {
     parenthesized!(content in input);
     let list = Punctuated::<LitStr, Token![,]>::parse_terminated(&content)?;
     Ok(list.iter().map(LitStr::value).collect())
+}
+
+/// `(path, field, ...)`
+fn check(input: syn::parse::ParseStream<'_>) -> Result<(Path, Vec<Ident>)> {
+    let content;
+    parenthesized!(content in input);
+    let path = content.parse()?;
+    let mut fields = Vec::new();
+    while content.parse::<Option<Token![,]>>()?.is_some() && !content.is_empty() {
+        fields.push(content.parse()?);
+    }
+    Ok((path, fields))
+}
+
+/// `(Type, path)`
+fn builds(input: syn::parse::ParseStream<'_>) -> Result<(Type, Path)> {
+    let content;
+    parenthesized!(content in input);
+    let ty = content.parse()?;
+    content.parse::<Token![,]>()?;
+    Ok((ty, content.parse()?))
 }
 
 impl StructAttributes {
@@ -57,6 +87,12 @@ impl StructAttributes {
                     out.name = Some(meta.value()?.parse::<LitStr>()?.value());
                 } else if meta.path.is_ident("exactly_one") {
                     out.exactly_one.push(strings(meta.input)?);
+                } else if meta.path.is_ident("version") {
+                    out.version = Some(meta.value()?.parse::<LitStr>()?.value());
+                } else if meta.path.is_ident("check") {
+                    out.checks.push(check(meta.input)?);
+                } else if meta.path.is_ident("builds") {
+                    out.builds = Some(builds(meta.input)?);
                 } else if meta.path.is_ident("finish") {
                     out.finish = Some(meta.value()?.parse()?);
                 } else if meta.path.is_ident("parts") {
@@ -64,9 +100,7 @@ impl StructAttributes {
                 } else if meta.path.is_ident("no_default") {
                     out.no_default = true;
                 } else {
-                    return Err(
-                        meta.error("expected name, exactly_one, finish, parts or no_default")
-                    );
+                    return Err(meta.error("unknown attribute of settings"));
                 }
                 Ok(())
             })?;
@@ -100,6 +134,10 @@ impl FieldAttributes {
                     "shape" => out.shape = Some(meta.value()?.parse()?),
                     "read" => out.read = Some(meta.value()?.parse()?),
                     "show" => out.show = Some(meta.value()?.parse()?),
+                    "through" => out.through = Some(meta.value()?.parse()?),
+                    "example" => out.example = Some(meta.value()?.parse()?),
+                    "at_least_one" => out.at_least_one = true,
+                    "flatten" => out.flatten = true,
                     "skip" => out.skip = true,
                     _ => return Err(meta.error("unknown attribute of a setting")),
                 }
@@ -131,16 +169,22 @@ impl FieldAttributes {
     }
 }
 
+/// The text of a literal, which a macro may have put into a group.
+fn text(value: &Expr) -> Option<String> {
+    match value {
+        Expr::Lit(lit) => match &lit.lit {
+            Lit::Str(text) => Some(text.value().trim().to_owned()),
+            _ => None,
+        },
+        Expr::Group(group) => text(&group.expr),
+        _ => None,
+    }
+}
+
 /// The lines of a doc comment as one text.
 pub fn doc(attributes: &[Attribute]) -> String {
     let lines = attributes.iter().filter_map(|a| match &a.meta {
-        Meta::NameValue(pair) if pair.path.is_ident("doc") => match &pair.value {
-            Expr::Lit(lit) => match &lit.lit {
-                Lit::Str(text) => Some(text.value().trim().to_owned()),
-                _ => None,
-            },
-            _ => None,
-        },
+        Meta::NameValue(pair) if pair.path.is_ident("doc") => text(&pair.value),
         _ => None,
     });
     let lines: Vec<String> = lines.filter(|l| !l.is_empty()).collect();

@@ -2,7 +2,7 @@
 
 use proc_macro2::TokenStream;
 use quote::quote;
-use syn::{Data, DeriveInput, Error, Field, Fields, Ident, Result};
+use syn::{Data, DeriveInput, Error, Field, Fields, Ident, Path, Result, Type};
 
 use crate::attributes::{DefaultText, FieldAttributes, StructAttributes, doc, snake_case};
 use crate::kind::{Kind, inside_option};
@@ -11,7 +11,8 @@ use crate::unit;
 /// The code of one field.
 struct Parts {
     ident: Ident,
-    key: TokenStream,
+    /// A list of keys as an expression; `None`: no key.
+    keys: Option<TokenStream>,
     read: TokenStream,
     rows: TokenStream,
     /// `None`: required.
@@ -31,7 +32,33 @@ pub fn settings(input: &DeriveInput) -> Result<TokenStream> {
     let name = name.unwrap_or_else(|| snake_case(&ident.to_string()));
     let text = doc(&input.attrs);
     let parts: Vec<Parts> = fields.named.iter().map(parts).collect::<Result<_>>()?;
-    let keys = parts.iter().map(|p| &p.key);
+    let version = attributes.version.map(|key| {
+        quote!(&[::skinrig_settings::Key {
+            name: #key,
+            doc: "Version of the language of this file: 1.",
+            shape: ::skinrig_settings::Shape::Whole { min: 1, max: 1 },
+            need: ::skinrig_settings::Need::Required,
+            example: None,
+        }])
+    });
+    let keys: Vec<&TokenStream> = version
+        .iter()
+        .chain(parts.iter().filter_map(|p| p.keys.as_ref()))
+        .collect();
+    let checks = attributes
+        .checks
+        .iter()
+        .map(|(path, fields)| match fields.as_slice() {
+            [] => quote!(#path(field, out);),
+            fields => quote! {
+                if let (#(Some(#fields),)*) = (#(&#fields,)*) {
+                    #path(#(#fields,)* field, out);
+                }
+            },
+        });
+    let built = attributes
+        .builds
+        .map(|(target, path)| built(ident, &target, &path));
     let reads = parts.iter().map(|p| &p.read);
     let rows = parts.iter().map(|p| &p.rows);
     let idents: Vec<&Ident> = parts.iter().map(|p| &p.ident).collect();
@@ -81,7 +108,13 @@ pub fn settings(input: &DeriveInput) -> Result<TokenStream> {
                 static TABLE: ::skinrig_settings::Table = ::skinrig_settings::Table {
                     name: #name,
                     doc: #text,
-                    keys: &[#(#keys)*],
+                    keys: {
+                        const PARTS: &[&[::skinrig_settings::Key]] = &[#(#keys),*];
+                        const COUNT: usize = ::skinrig_settings::count_keys(PARTS);
+                        const KEYS: [::skinrig_settings::Key; COUNT] =
+                            ::skinrig_settings::join_keys(PARTS);
+                        &KEYS
+                    },
                     exactly_one: &[#(#groups),*],
                 };
                 &TABLE
@@ -92,6 +125,7 @@ pub fn settings(input: &DeriveInput) -> Result<TokenStream> {
                 out: &mut ::skinrig_settings::Collector,
             ) -> Option<Self> {
                 #(#reads)*
+                #(#checks)*
                 let value = Self { #(#idents: #idents?),* };
                 #finish
             }
@@ -132,7 +166,43 @@ pub fn settings(input: &DeriveInput) -> Result<TokenStream> {
         #default
 
         #parts_struct
+        #built
     })
+}
+
+/// The type that is built from a mapping.
+fn built(keys: &Ident, target: &Type, path: &Path) -> TokenStream {
+    quote! {
+        impl ::skinrig_settings::Setting for #target {
+            const SHAPE: ::skinrig_settings::Shape =
+                ::skinrig_settings::Shape::Map(<#keys as ::skinrig_settings::Settings>::TABLE);
+
+            fn from_field(
+                field: &::skinrig_settings::Field,
+                out: &mut ::skinrig_settings::Collector,
+            ) -> Option<Self> {
+                let keys = <#keys as ::skinrig_settings::Settings>::from_mapping(field, out)?;
+                #path(keys, field, out)
+            }
+
+            fn text(&self) -> String {
+                String::new()
+            }
+
+            fn add_rows(&self, _: &str, _: &'static str, _: &mut Vec<::skinrig_settings::Row>) {}
+        }
+    }
+}
+
+/// A struct whose keys stand in the mapping of another one.
+fn flattened(ident: Ident, ty: &Type) -> Parts {
+    Parts {
+        keys: Some(quote!(<#ty as ::skinrig_settings::Settings>::TABLE.keys)),
+        read: quote!(let #ident = <#ty as ::skinrig_settings::Settings>::from_mapping(field, out);),
+        rows: quote!(::skinrig_settings::Settings::add_rows(&self.#ident, path, rows);),
+        default: None,
+        ident,
+    }
 }
 
 fn parts(field: &Field) -> Result<Parts> {
@@ -142,17 +212,30 @@ fn parts(field: &Field) -> Result<Parts> {
     let attributes = FieldAttributes::parse(&field.attrs)?;
     if attributes.skip {
         return Ok(Parts {
-            key: quote!(),
+            keys: None,
             read: quote!(let #ident = Some(Default::default());),
             rows: quote!(),
             default: Some(quote!(Default::default())),
             ident,
         });
     }
+    if attributes.flatten {
+        return Ok(flattened(ident, &field.ty));
+    }
     let optional = inside_option(&field.ty);
     let ty = optional.unwrap_or(&field.ty);
     let name = ident.to_string();
-    let in_name = unit::of_name(&name).filter(|_| attributes.unit.as_deref() != Some(""));
+    let in_name = match &attributes.unit {
+        Some(text) if text.is_empty() => None,
+        Some(text) => {
+            let unit = unit::of_text(text);
+            Some((
+                unit.ok_or_else(|| Error::new_spanned(field, "unknown unit"))?,
+                name.as_str(),
+            ))
+        }
+        None => unit::of_name(&name),
+    };
     let kind = Kind::of(ty, in_name.map(|(u, _)| u))?;
     let key = match (&attributes.key, in_name) {
         (Some(key), _) => key.clone(),
@@ -162,11 +245,16 @@ fn parts(field: &Field) -> Result<Parts> {
         _ => name,
     };
     let text = doc(&field.attrs);
-    let shape = match &attributes.shape {
-        Some(shape) => quote!(#shape),
-        None => kind.shape(&attributes),
+    let shape = match (&attributes.shape, &attributes.through) {
+        (Some(shape), _) => quote!(#shape),
+        (None, Some(through)) => quote!(<#through as ::skinrig_settings::Setting>::SHAPE),
+        (None, None) => kind.shape(&attributes),
     };
     let (need, default) = match (&attributes.default, optional) {
+        (None, Some(_)) if attributes.at_least_one => (
+            quote!(::skinrig_settings::Need::AtLeastOne),
+            Some(quote!(None)),
+        ),
         (None, Some(_)) => (
             quote!(::skinrig_settings::Need::Optional),
             Some(quote!(None)),
@@ -177,9 +265,13 @@ fn parts(field: &Field) -> Result<Parts> {
             Some(quote!(<#ty as Default>::default())),
         ),
         (Some(DefaultText::Typed(typed)), _) => {
-            let value = match &attributes.value {
-                Some(value) => quote!(#value),
-                None => kind.default_value(typed)?,
+            let value = match (&attributes.value, &attributes.through) {
+                (Some(value), _) => quote!(#value),
+                (None, Some(through)) => {
+                    let value = Kind::Other(through.clone()).default_value(typed)?;
+                    quote!(<#ty>::from(#value))
+                }
+                (None, None) => kind.default_value(typed)?,
             };
             (
                 quote!(::skinrig_settings::Need::Default(#typed)),
@@ -187,9 +279,12 @@ fn parts(field: &Field) -> Result<Parts> {
             )
         }
     };
-    let reader = match &attributes.read {
-        Some(path) => quote!(#path(f, out)),
-        None => kind.read(),
+    let reader = match (&attributes.read, &attributes.through) {
+        (Some(path), _) => quote!(#path(f, out)),
+        (None, Some(through)) => quote!(
+            <#through as ::skinrig_settings::Setting>::from_field(f, out).map(<#ty>::from)
+        ),
+        (None, None) => kind.read(),
     };
     let read = if optional.is_some() {
         quote! {
@@ -218,7 +313,9 @@ fn parts(field: &Field) -> Result<Parts> {
             })
         }
     };
+    let is_hidden = attributes.shape.is_some() || attributes.through.is_some();
     let add = match (&attributes.show, &kind) {
+        (None, _) if is_hidden => quote!(()),
         (None, Kind::Other(_)) => quote!(::skinrig_settings::Setting::add_rows(
             v,
             &::skinrig_settings::key_path(path, #key),
@@ -245,14 +342,19 @@ fn parts(field: &Field) -> Result<Parts> {
             #add;
         })
     };
+    let example = match &attributes.example {
+        Some(example) => quote!(Some(#example)),
+        None => quote!(None),
+    };
     Ok(Parts {
         ident,
-        key: quote!(::skinrig_settings::Key {
+        keys: Some(quote!(&[::skinrig_settings::Key {
             name: #key,
             doc: #text,
             shape: #shape,
             need: #need,
-        },),
+            example: #example,
+        }])),
         read,
         rows,
         default,

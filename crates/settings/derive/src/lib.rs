@@ -6,6 +6,11 @@
 //! - `finish = path`: a function `(Self, &Field, &mut Collector) -> Option<Self>` that holds keys against each other.
 //! - `parts = NAME`: a struct of that name with each field as an `Option`, and `Self::read_parts(&Field, &mut Collector)`: what
 //!   could be read of a mapping with mistakes, so that its keys can still be held against each other.
+//! - `version = "skinrig_rig"`: a first key with the version of the file's language, 1.
+//! - `check(path, a, b)`: a function `(&A, &B, &Field, &mut Collector)` that holds these fields against each other. It runs
+//!   whenever they could be read, even when other keys could not; without fields always. May be repeated.
+//! - `builds(Type, path)`: the mapping is the file form of `Type`, which gets an `impl Setting`; the function
+//!   `(Self, &Field, &mut Collector) -> Option<Type>` converts. `Type` has no rows.
 //! - `no_default`: no `impl Default`, which there is otherwise when no key is required.
 //!
 //! # Attributes of a field: `#[setting(...)]`
@@ -14,9 +19,14 @@
 //! - `min`, `above`, `max`: the range in the unit of the field; of a duration in seconds. `range = EXPR` is a constant of type
 //!   `ValueRange` in their place.
 //! - `items = 1..=100`: how long a list may be. `names("x", "y")`: the names of a tuple's items.
-//! - `key = "..."`: the key, when it is not the field's name without its unit. `unit = ""`: a number without a unit.
+//! - `key = "..."`: the key, when it is not the field's name without its unit. `unit = "mm"`: the unit, when the name does not end
+//!   in it; `unit = ""`: a number without a unit.
 //! - `shape = EXPR, read = PATH, show = PATH`: a form of its own, its reader `(&Field, &mut Collector) -> Option<T>` and its text
-//!   `(&T) -> String`.
+//!   `(&T) -> String`. A value with a `shape` and without `show` has no row.
+//! - `through = TYPE`: read as this type, which converts into the field's by `Into`. Such a value has no row.
+//! - `example = EXPR`: the value that the help for a missing key suggests.
+//! - `at_least_one`: of the optional keys with this attribute at least one must be given.
+//! - `flatten`: the keys of a struct with `derive(Settings)` stand in this mapping; its groups of keys do not apply.
 //! - `skip`: no key; the field has its type's default.
 //!
 //! `Option<T>` is an optional key, a field without a default a required one.

@@ -54,6 +54,11 @@ pub fn of_name(name: &str) -> Option<(Unit, &str)> {
         .find_map(|u| Some((*u, name.strip_suffix(u.suffix)?)))
 }
 
+/// The unit as typed in files.
+pub fn of_text(text: &str) -> Option<Unit> {
+    UNITS.iter().find(|u| u.name == text).copied()
+}
+
 /// The size of a typed unit in the own unit of `dimension`: the twin of `Dimension::units`, for the units that defaults use.
 fn size(dimension: &str, typed: &str) -> Option<f64> {
     let sizes: &[(&str, f64)] = match dimension {

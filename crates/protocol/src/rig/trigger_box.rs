@@ -1,0 +1,114 @@
+//! The trigger box of a bench.
+
+use serde::Serialize;
+use skinrig_settings::{Choice, Collector, Field, Settings};
+
+use super::variables;
+
+/// The trigger box.
+#[derive(Debug, Clone, PartialEq, Serialize, Settings)]
+#[settings(name = "trigger_box")]
+pub struct BoxSetup {
+    /// Serial port, best one under `/dev/serial/by-id`; `${NAME}` stands for an environment variable. Ports are never guessed.
+    #[setting(read = variables::text, example = "/dev/serial/by-id/usb-Arduino_Uno-if00")]
+    pub port: String,
+    /// The box's own serial number, as `skinrig devices --rig` shows it; absent: any.
+    pub serial: Option<String>,
+    /// Expected firmware version; absent: what this build of skinrig was written for.
+    pub firmware: Option<String>,
+    /// Where each line of the box goes.
+    #[serde(flatten)]
+    #[setting(default)]
+    pub wiring: Wiring,
+    /// From one coded sync train to the next, in whole milliseconds.
+    #[setting(default = "100 ms", min = 18, max = 65_000)]
+    pub sync_period_ms: u16,
+    /// How fast or slow the box's clock may be, parts per million: an Arduino Uno has a ceramic resonator of 5000, a board with a
+    /// crystal 100.
+    #[setting(
+        default = "5000",
+        key = "max_drift_ppm",
+        unit = "",
+        above = 0,
+        max = 20_000
+    )]
+    pub max_drift_ppm: f64,
+}
+
+/// Where the lines of a trigger box go.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct Wiring {
+    /// Outputs 1, 2 and 3.
+    pub outputs: [BoxOutput; 3],
+    /// The time-stamped input.
+    pub input: BoxInput,
+}
+
+/// Where an output of the box goes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Choice)]
+#[serde(rename_all = "snake_case")]
+pub enum BoxOutput {
+    /// Trigger input of camera 1.
+    Camera1,
+    /// Trigger input of camera 2.
+    Camera2,
+    /// Something else, an oscilloscope for example.
+    Other,
+    /// Nothing.
+    None,
+}
+
+/// Source of the box's input.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Choice)]
+#[serde(rename_all = "snake_case")]
+pub enum BoxInput {
+    /// Closes when the tip touches.
+    Contact,
+    /// A light gate that the tip interrupts.
+    Optical,
+    /// Something else.
+    Other,
+    /// Nothing; edges are not recorded.
+    None,
+}
+
+/// Where each line of the box goes. All outputs rise in the same cycle.
+#[derive(Settings)]
+#[settings(name = "wiring", builds(Wiring, WiringKeys::wiring))]
+struct WiringKeys {
+    /// First output.
+    #[setting(default = "camera1")]
+    output1: BoxOutput,
+    /// Second output.
+    #[setting(default = "camera2")]
+    output2: BoxOutput,
+    /// Third output.
+    #[setting(default = "none")]
+    output3: BoxOutput,
+    /// The time-stamped input.
+    #[setting(default = "none")]
+    input: BoxInput,
+}
+
+impl WiringKeys {
+    fn wiring(self, field: &Field, out: &mut Collector) -> Option<Wiring> {
+        let outputs = [self.output1, self.output2, self.output3];
+        for camera in [BoxOutput::Camera1, BoxOutput::Camera2] {
+            let lines = outputs.iter().filter(|o| **o == camera).count();
+            if lines != 1 {
+                let message = "a camera needs exactly one trigger line";
+                out.error(field.span, field.path.as_str(), message)
+                    .expected(format!(
+                        "exactly one output that goes to `{}`",
+                        camera.word()
+                    ))
+                    .found(lines.to_string());
+                break;
+            }
+        }
+        Some(Wiring {
+            outputs,
+            input: self.input,
+        })
+    }
+}
