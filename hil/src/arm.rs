@@ -269,8 +269,8 @@ fn limits(room: &Room, reach: Reach, max_acceleration_mm_s2: f64) -> (RunLimits,
         on_trip: OnTrip::Retract,
     };
     let own = MotionLimits {
-        min_mm: l.workspace_min_mm,
-        max_mm: l.workspace_max_mm,
+        min_mm: l.workspace.min_mm,
+        max_mm: l.workspace.max_mm,
         max_speed_mm_s: l.max_speed_mm_s,
         max_acceleration_mm_s2,
         max_force_n: l.max_force_n,

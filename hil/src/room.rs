@@ -96,9 +96,8 @@ impl Room {
     /// Whether the robot may be there.
     #[must_use]
     pub fn contains(&self, at: Point3<Skin>) -> bool {
-        let l = &self.limits;
         let place = self.robot_from_skin.apply(at).to_array();
-        (0..3).all(|i| (l.workspace_min_mm[i]..=l.workspace_max_mm[i]).contains(&place[i]))
+        self.limits.workspace.contains(place)
     }
 
     /// The smallest box of the skin's frame that holds the workspace: smallest and largest coordinates, mm.
@@ -106,7 +105,8 @@ impl Room {
     pub fn around(&self) -> ([f64; 3], [f64; 3]) {
         let skin_from_robot = self.robot_from_skin.inverse();
         let (mut least, mut most) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-        for corner in corners(self.limits.workspace_min_mm, self.limits.workspace_max_mm) {
+        let workspace = &self.limits.workspace;
+        for corner in corners(workspace.min_mm, workspace.max_mm) {
             let [x, y, z] = corner;
             let at = skin_from_robot.apply(Point3::new(x, y, z)).to_array();
             for i in 0..3 {

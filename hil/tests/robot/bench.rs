@@ -34,7 +34,7 @@ impl SimBench {
         let rig = RigFile::parse("emulated.yaml", RIG.as_bytes(), &environment).unwrap();
         let mut config = SimConfig::new(1, SimLevel::Kinematic);
         config.robot_from_skin = rig.frame.robot_from_skin;
-        config.workspace_mm = (rig.limits.workspace_min_mm, rig.limits.workspace_max_mm);
+        config.workspace_mm = (rig.limits.workspace.min_mm, rig.limits.workspace.max_mm);
         config.faults = faults;
         Self {
             rig,

@@ -145,7 +145,7 @@ fn nothing_goes_deeper_than_the_rig_file_allows() {
     }
     bench.rig.robot.sample_is_off = true;
     assert!(bench.make(DEPTH).not_here.is_some());
-    bench.rig.limits.workspace_max_mm[2] = -12.0;
+    bench.rig.limits.workspace.max_mm[2] = -12.0;
     let found = bench.make(REPEATABILITY);
     assert_eq!(kinds(&found), [EvidenceKind::Refused], "{found:?}");
 }

@@ -11,7 +11,7 @@ use skinrig_hil::{Bench, Devices, Slot, Trouble};
 use skinrig_model::{CameraId, HostDuration};
 use skinrig_nightly::{Evidence, EvidenceKind};
 use skinrig_protocol::Protocol;
-use skinrig_protocol::rig::{RigFile, RigKind};
+use skinrig_protocol::rig::{CameraKind, RigFile, RigKind};
 use std::path::PathBuf;
 
 /// A bench with drivers behind it.
@@ -113,7 +113,7 @@ impl RealBench {
     pub(super) fn open_camera(&mut self, camera: CameraId, held: usize) -> Slot<dyn EventCamera> {
         let setup = &self.rig.cameras[camera.index()];
         let subject = subject(camera);
-        if setup.model == "evk1" {
+        if setup.model == CameraKind::Evk1 {
             let opened = bench::evk1(setup, camera, self.clock);
             return match opened {
                 Ok(evk1) => {

@@ -16,7 +16,9 @@ use skinrig_omega3::config::{Initialise, RedundantEncoders, SupervisorCommand, W
 use skinrig_omega3::enumerate::SERIAL_UNKNOWN;
 use skinrig_omega3::{Omega, OmegaConfig, OmegaError};
 use skinrig_protocol::Protocol;
-use skinrig_protocol::rig::{BoxSetup, CameraSetup, RigFile, RigKind, SyncRole};
+use skinrig_protocol::rig::{
+    BoxSetup, CameraKind, CameraSetup, DeviceAxis, RigFile, RigKind, SyncRole,
+};
 use skinrig_trigger_box::{SerialTriggerBox, TriggerBoxConfig};
 
 use super::tolerated::Tolerated;
@@ -217,19 +219,19 @@ pub(crate) fn omega_config(rig: &RigFile) -> Result<OmegaConfig, Failure> {
     config.mount.effector_mass_kg = robot.effector_mass_kg;
     let axes = Axes::new(robot.axes.map(axis));
     config.mount.axes = axes.ok_or_else(|| Failure::internal("robot.axes: not right-handed"))?;
-    config.mount.reported_force_sign = if robot.reports_sample_force {
+    config.mount.reported_force_sign = if robot.motor_force.reports_sample_force {
         -1.0
     } else {
         1.0
     };
     let envelope = &mut config.envelope;
-    envelope.min_mm = limits.workspace_min_mm;
-    envelope.max_mm = limits.workspace_max_mm;
+    envelope.min_mm = limits.workspace.min_mm;
+    envelope.max_mm = limits.workspace.max_mm;
     envelope.max_speed_mm_s = limits.max_speed_mm_s;
     envelope.max_force_n = limits.max_force_n;
-    envelope.n_per_ratio = robot.force_per_ratio_n;
-    envelope.gravity_ratio = robot.gravity_ratio;
-    envelope.least_ratio = robot.least_ratio;
+    envelope.n_per_ratio = robot.motor_force.per_ratio_n;
+    envelope.gravity_ratio = robot.motor_force.gravity_ratio;
+    envelope.least_ratio = robot.motor_force.least_ratio;
     config.motion.acceleration_mm_s2 = robot.acceleration_mm_s2;
     config.motion.jerk_mm_s3 = robot.jerk_mm_s3;
     config.motion.max_lead_mm = limits.max_lead_mm;
@@ -257,14 +259,14 @@ pub(crate) fn omega_config(rig: &RigFile) -> Result<OmegaConfig, Failure> {
 /// The hidden command that brakes the arm when this program dies.
 const SUPERVISE: &str = "supervise-arm";
 
-fn axis(word: &str) -> Axis {
-    match word {
-        "+x" => Axis::PlusX,
-        "-x" => Axis::MinusX,
-        "+y" => Axis::PlusY,
-        "-y" => Axis::MinusY,
-        "-z" => Axis::MinusZ,
-        _ => Axis::PlusZ,
+const fn axis(of: DeviceAxis) -> Axis {
+    match of {
+        DeviceAxis::PlusX => Axis::PlusX,
+        DeviceAxis::MinusX => Axis::MinusX,
+        DeviceAxis::PlusY => Axis::PlusY,
+        DeviceAxis::MinusY => Axis::MinusY,
+        DeviceAxis::PlusZ => Axis::PlusZ,
+        DeviceAxis::MinusZ => Axis::MinusZ,
     }
 }
 
@@ -314,7 +316,7 @@ pub(crate) fn open_camera(
     tolerated: &mut Tolerated,
 ) -> Result<Box<dyn EventCamera>, Failure> {
     let device = match setup.model {
-        "evk1" => {
+        CameraKind::Evk1 => {
             let opened = evk1(setup, camera, clock).map_err(|e| {
                 Failure::rig(format!(
                     "{camera}: {e}\n  next: `skinrig devices` shows what is connected"
@@ -323,7 +325,9 @@ pub(crate) fn open_camera(
             tolerated.add(camera, opened.tolerated());
             Box::new(opened)
         }
-        _ => evt3_camera::open(setup, camera, clock)?,
+        CameraKind::Evk4 | CameraKind::Evk3Hd | CameraKind::SilkyVga => {
+            evt3_camera::open(setup, camera, clock)?
+        }
     };
     detached_camera(device, kind, clock).map_err(Failure::rig)
 }

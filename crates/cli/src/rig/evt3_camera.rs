@@ -38,7 +38,7 @@ pub fn open(
 ) -> Result<Box<dyn EventCamera>, Failure> {
     use skinrig_evk4::{Evt3Camera, FoundState, Model, Neuromorphic};
 
-    let Some(model) = Model::of_word(setup.model) else {
+    let Some(model) = Model::of_word(setup.model.name()) else {
         return Err(Failure::input(format!(
             "{camera}: no driver for `model: {}`",
             setup.model

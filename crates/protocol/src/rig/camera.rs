@@ -102,6 +102,12 @@ pub enum CameraKind {
 }
 
 impl CameraKind {
+    /// As typed in a rig file: `evk1`.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        self.word()
+    }
+
     /// Whether the camera's driver offers a trigger input and a shared time base.
     #[must_use]
     pub const fn has_trigger(self) -> bool {
