@@ -61,7 +61,7 @@ fn what_cannot_be_a_night_is_refused_before_it_begins() {
     let toothless = suite(&lab, "10 min", "  idle: {duration: 3 s}\n");
     run(&toothless, &[])
         .code(2)
-        .complains(&["a check that cannot fail"]);
+        .complains(&["at least one of `data_rate`"]);
     run("no/such/suite.yaml", &[]).code(2);
     assert!(!lab.path("nights").exists());
 }
