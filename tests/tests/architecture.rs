@@ -104,8 +104,8 @@ const ALLOWED: &[(&str, &[&str])] = &[
 const RESTRICTED: &[(&str, &[&str])] = &[
     ("sqlx", &["skinrig-recorder", "skinrig-hil"]),
     ("tokio", &["skinrig-recorder", "skinrig-hil", "skinrig"]),
-    ("serde_yaml", &["skinrig-protocol"]),
-    ("serde-saphyr", &["skinrig-protocol"]),
+    ("serde_yaml", &["skinrig-settings"]),
+    ("serde-saphyr", &["skinrig-settings"]),
     ("rust-hdf5", &["skinrig-formats"]),
     ("parquet", &["skinrig-export"]),
     ("zip", &["skinrig-export"]),

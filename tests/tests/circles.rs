@@ -13,8 +13,8 @@ use syn::{Attribute, Item, ItemMod, UseTree, Visibility};
 
 /// Circles of files that stand today, by the first of them; none may be added, and none may have more files than
 /// [`MOST_FILES`].
-const MOST_CIRCLES: usize = 9;
-const MOST_FILES: usize = 17;
+const MOST_CIRCLES: usize = 6;
+const MOST_FILES: usize = 8;
 
 /// A module as its path from the root of its crate.
 type Module = Vec<String>;

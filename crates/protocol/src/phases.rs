@@ -12,22 +12,22 @@ const MOMENT_S: ValueRange = ValueRange::between(-3600.0, 3600.0);
 #[settings(name = "phases", parts = PhaseParts)]
 pub struct PressPhases {
     /// The downward motion begins.
-    #[setting(range = MOMENT_S)]
+    #[setting(range = MOMENT_S, example = "-275 ms")]
     pub approach: HostDuration,
     /// The tip reaches the surface.
-    #[setting(range = MOMENT_S)]
+    #[setting(range = MOMENT_S, example = "-100 ms")]
     pub contact: HostDuration,
     /// The tip settled at its depth.
-    #[setting(range = MOMENT_S)]
+    #[setting(range = MOMENT_S, example = "0 ms")]
     pub at_depth: HostDuration,
     /// The upward motion begins.
-    #[setting(range = MOMENT_S)]
+    #[setting(range = MOMENT_S, example = "150 ms")]
     pub retract: HostDuration,
     /// The tip leaves the surface.
-    #[setting(range = MOMENT_S)]
+    #[setting(range = MOMENT_S, example = "250 ms")]
     pub release: HostDuration,
     /// The tip is back at clearance height.
-    #[setting(range = MOMENT_S)]
+    #[setting(range = MOMENT_S, example = "425 ms")]
     pub clear: HostDuration,
 }
 

@@ -103,8 +103,10 @@ pub(crate) struct LimitKeys {
 #[settings(finish = Self::not_empty)]
 pub(crate) struct Workspace {
     /// Lowest x, y and z.
+    #[setting(example = "[-50 mm, -60 mm, -5 mm]")]
     pub min: Point3<Skin>,
     /// Highest x, y and z.
+    #[setting(example = "[70 mm, 60 mm, 40 mm]")]
     pub max: Point3<Skin>,
 }
 

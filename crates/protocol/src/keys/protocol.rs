@@ -51,7 +51,7 @@ pub(crate) struct ProtocolKeys {
     #[setting(default = "listed")]
     pub order: Order,
     /// Indentation depth of every press, below the touched surface.
-    #[setting(range = DEPTH_MM)]
+    #[setting(range = DEPTH_MM, example = "1 mm")]
     pub depth_mm: Option<f64>,
     /// Several indentation depths: each repetition runs the whole path once per depth, in this order.
     #[setting(range = DEPTH_MM, items = 1..=1000)]

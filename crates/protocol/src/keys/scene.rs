@@ -10,9 +10,10 @@ use crate::protocol::Scene;
 #[settings(name = "scene", no_default, finish = Self::sufficient)]
 pub(crate) struct SceneKeys {
     /// Properties of the session that its user relies on.
-    #[setting(items = 1..=7)]
+    #[setting(items = 1..=7, at_least_one, example = "[event_rates, localisation]")]
     needs: Option<Vec<SceneNeed>>,
     /// The simulation level outright; must be sufficient for `needs`.
+    #[setting(at_least_one)]
     level: Option<SimLevel>,
 }
 
@@ -28,13 +29,6 @@ impl SceneKeys {
     }
 
     fn sufficient(self, field: &Field, out: &mut Collector) -> Option<Self> {
-        if field.entries().is_empty() {
-            out.error(field.span, "scene", "the scene is empty")
-                .expected("`needs`, `level` or both")
-                .found("neither")
-                .help("write `scene: {needs: [event_rates, localisation]}`");
-            return None;
-        }
         let needs = self.needs.as_deref().unwrap_or_default();
         for (i, (need, item)) in needs.iter().zip(field.at("needs").items()).enumerate() {
             if needs.iter().take(i).any(|earlier| earlier == need) {

@@ -123,18 +123,13 @@ fn dotted(pointer: &str) -> String {
     path
 }
 
-/// Keys without an example that fits: the number of repetitions decides what `evaluation` must hold; the others declare none yet.
-const UNMENDED: [&str; 10] = [
-    "skinrig protocol: depth",
+/// Keys without an example that always fits: the number of repetitions decides what `evaluation` must hold.
+const UNMENDED: [&str; 5] = [
     "skinrig protocol: evaluation",
     "skinrig protocol: evaluation.score",
-    "skinrig protocol: limits",
-    "skinrig protocol: limits.workspace",
-    "skinrig protocol: scene",
     "skinrig schedule: evaluation",
     "skinrig schedule: evaluation.repetitions",
     "skinrig schedule: evaluation.repetitions.score",
-    "skinrig schedule: phases",
 ];
 
 /// Keys whose example leaves a finding about them, and keys that no file has.
