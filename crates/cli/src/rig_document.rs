@@ -1,6 +1,7 @@
 //! What a session says of its rig, for whoever analyses it.
 
 use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
 use skinrig_model::{AnalysisSettings, PressId, RigGeometry};
 
 /// What `RunHeader::rig_json` holds.
@@ -12,15 +13,15 @@ pub struct RigDocument {
     /// The analysis settings of the protocol.
     pub analysis: AnalysisSettings,
     /// Everything worth keeping about the rig.
-    pub rig: serde_json::Value,
+    pub rig: Value,
 }
 
 /// [`RigDocument`] as any version wrote it.
 #[derive(Deserialize)]
 struct RecordedRig {
     geometry: RigGeometry,
-    analysis: serde_json::Value,
-    rig: serde_json::Value,
+    analysis: Value,
+    rig: Value,
 }
 
 impl TryFrom<RecordedRig> for RigDocument {
@@ -37,6 +38,12 @@ impl TryFrom<RecordedRig> for RigDocument {
             let name = "exclude_press_numbers".to_owned();
             settings.insert(name, serde_json::to_value(presses)?);
         }
+        if let Some(latency) = analysis.get_mut("latency") {
+            name_thresholds(latency);
+            if let Some(reduced) = latency.get_mut("reduced") {
+                name_thresholds(reduced);
+            }
+        }
         Ok(Self {
             geometry: recorded.geometry,
             analysis: serde_json::from_value(analysis)?,
@@ -45,12 +52,26 @@ impl TryFrom<RecordedRig> for RigDocument {
     }
 }
 
+/// Earlier versions kept a grid of thresholds as its ends and its number: `threshold_range` and `thresholds`.
+fn name_thresholds(study: &mut Value) {
+    let Some(study) = study.as_object_mut() else {
+        return;
+    };
+    let (Some(ends), Some(Value::Number(count))) =
+        (study.remove("threshold_range"), study.get("thresholds"))
+    else {
+        return;
+    };
+    let grid = json!({ "from": ends[0], "to": ends[1], "count": count });
+    study.insert("thresholds".to_owned(), grid);
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn an_older_recording_names_the_presses_that_it_leaves_out_by_index() {
+    fn older_recordings_are_read() {
         let settings = AnalysisSettings {
             exclude_press_numbers: vec![PressId::from_index(4)],
             ..AnalysisSettings::default()
@@ -64,13 +85,27 @@ mod tests {
         let document = RigDocument {
             geometry: rig,
             analysis: settings.clone(),
-            rig: serde_json::Value::Null,
+            rig: Value::Null,
         };
         let text = serde_json::to_string(&document).unwrap();
         let today = "\"exclude_press_numbers\":[5]";
         assert!(text.contains(today), "{text}");
         let old = text.replace(today, "\"exclude_presses\":[4]");
-        for text in [text, old] {
+        let grids = [
+            (
+                r#""thresholds":{"from":1.0,"to":20.0,"count":20}"#,
+                r#""threshold_range":[1.0,20.0],"thresholds":20"#,
+            ),
+            (
+                r#""thresholds":{"from":3.0,"to":8.0,"count":6}"#,
+                r#""threshold_range":[3.0,8.0],"thresholds":6"#,
+            ),
+        ];
+        let older = grids.iter().fold(old.clone(), |text, (today, before)| {
+            assert!(text.contains(today), "{text}");
+            text.replace(today, before)
+        });
+        for text in [text, old, older] {
             let read: RigDocument = serde_json::from_str(&text).unwrap();
             assert_eq!(read.analysis, settings);
         }
