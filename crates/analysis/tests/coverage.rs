@@ -183,10 +183,10 @@ fn contact_maps_without_sense_are_refused() {
         ContactMap::new(&SKIN, &settings).unwrap_err().to_string()
     };
     for (message, name) in [
-        (bad(0.0, 1.0, 5.0), "cmre.cell_mm"),
-        (bad(0.1, 1.0, 5.0), "cmre.cell_mm"),
-        (bad(5.0, f64::NAN, 5.0), "cmre.sigma_mm"),
-        (bad(5.0, 1.0, f64::INFINITY), "cmre.sr_mm"),
+        (bad(0.0, 1.0, 5.0), "cmre.cell"),
+        (bad(0.1, 1.0, 5.0), "cmre.cell"),
+        (bad(5.0, f64::NAN, 5.0), "cmre.sigma"),
+        (bad(5.0, 1.0, f64::INFINITY), "cmre.sr"),
     ] {
         assert!(message.contains(name), "{message}");
     }

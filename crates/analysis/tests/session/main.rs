@@ -409,9 +409,9 @@ fn contradictions_are_refused_with_their_place() {
     let wanted = [
         "expected one outcome slot per planned press (53), found 52",
         "expected the outcome of press 5 in its row of the journal, found that of press 6",
-        "`eps_px`, found NaN",
+        "`eps`, found NaN px",
         "`min_samples`, found 0",
-        "`crop_v`, found 300..=480",
+        "`crop`, found 300 px to 480 px",
         "found (10, 2) mm, skew -1.47°",
         "expected events within 640 x 480 px but for at most 1 %, found ",
     ];
