@@ -56,7 +56,7 @@ pub fn cmre(analysis: &Analysis) -> Option<Cmre> {
         crate::metrics::mean,
     );
     Some(Cmre {
-        settings: settings.cmre.clone(),
+        settings: settings.cmre,
         cells: map.cells,
         percent,
         without_score,

@@ -88,7 +88,7 @@ pub fn study(analysis: &Analysis, kept: &Kept) -> Option<Latency> {
     };
     let covered_us = (covered(|s| -s.trial_us.0), covered(|s| s.trial_us.1));
     Some(Latency {
-        settings: settings.clone(),
+        settings: *settings,
         trials: trials.len() as u32,
         unusable: (presses.len() - trials.len()) as u32,
         shortened: usable.iter().filter(|u| u.spans.shortened).count() as u32,

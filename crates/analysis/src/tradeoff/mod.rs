@@ -113,7 +113,7 @@ pub fn measure(
         reduction: ReductionSettings {
             max_power: 0,
             seeds: 1,
-            ..session.reduction.clone()
+            ..session.reduction
         },
         ..session.clone()
     };

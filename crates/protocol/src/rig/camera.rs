@@ -20,9 +20,9 @@ const AUXILIARY: u8 = 7;
 #[derive(Debug, Clone, PartialEq, Serialize, Settings)]
 #[settings(
     name = "rig_camera",
-    check(Self::has_input, model, sync, trigger_channel),
-    check(Self::has_time_base, model),
-    check(Self::shares_time, model, sync)
+    check(Self::has_input, "model", "sync", "trigger_channel"),
+    check(Self::has_time_base, "model"),
+    check(Self::shares_time, "model", "sync")
 )]
 pub struct CameraSetup {
     /// Which camera.
@@ -297,9 +297,9 @@ impl CameraSetup {
 #[derive(Settings)]
 #[settings(
     name = "rig_cameras",
-    check(Self::are_two, camera1, camera2),
-    check(Self::sync_fits, camera1, camera2),
-    check(Self::share_a_channel, camera1, camera2)
+    check(Self::are_two, "camera1", "camera2"),
+    check(Self::sync_fits, "camera1", "camera2"),
+    check(Self::share_a_channel, "camera1", "camera2")
 )]
 struct CamerasKeys {
     /// Camera 1.

@@ -23,8 +23,8 @@ use crate::surface::Surface;
     name = "rig",
     version = "skinrig_rig",
     check(Self::force_can_be_set),
-    check(Self::skin_is_inside, frame, limits),
-    check(Self::cameras_see_the_box, cameras)
+    check(Self::skin_is_inside, "frame", "limits"),
+    check(Self::cameras_see_the_box, "cameras")
 )]
 pub struct RigFile {
     /// The file's name as given to [`RigFile::parse`].

@@ -29,7 +29,10 @@ pub struct BenchLimits {
 
 /// A box in the robot's frame.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Settings)]
-#[settings(name = "robot_workspace", check(Self::is_not_empty, min_mm, max_mm))]
+#[settings(
+    name = "robot_workspace",
+    check(Self::is_not_empty, "min_mm", "max_mm")
+)]
 pub struct Workspace {
     /// Lowest x, y and z.
     #[serde(rename = "workspace_min_mm")]

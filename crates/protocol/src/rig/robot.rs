@@ -14,8 +14,8 @@ use super::variables;
 #[derive(Debug, Clone, PartialEq, Serialize, Settings)]
 #[settings(
     name = "robot",
-    check(Self::may_initialise, auto_init, sample_is_off),
-    check(Self::is_right_handed, axes)
+    check(Self::may_initialise, "auto_init", "sample_is_off"),
+    check(Self::is_right_handed, "axes")
 )]
 pub struct RobotSetup {
     /// Which robot.

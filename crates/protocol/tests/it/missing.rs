@@ -168,7 +168,6 @@ fn unmended(language: &Language) -> BTreeSet<String> {
             let left = left.err().unwrap_or_default();
             if left.list().iter().any(|d| d.path.starts_with(&key)) {
                 unmended.insert(format!("{title}: {key}"));
-                println!("{case}: `{entry}`\n{left}");
             }
             covered.extend(group.into_iter().map(|key| (table.clone(), key)));
         }

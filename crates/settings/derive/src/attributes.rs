@@ -57,14 +57,14 @@ fn strings(input: syn::parse::ParseStream<'_>) -> Result<Vec<String>> {
     Ok(list.iter().map(LitStr::value).collect())
 }
 
-/// `(path, field, ...)`
+/// `(path, "field", ...)`
 fn check(input: syn::parse::ParseStream<'_>) -> Result<(Path, Vec<Ident>)> {
     let content;
     parenthesized!(content in input);
     let path = content.parse()?;
     let mut fields = Vec::new();
     while content.parse::<Option<Token![,]>>()?.is_some() && !content.is_empty() {
-        fields.push(content.parse()?);
+        fields.push(content.parse::<LitStr>()?.parse()?);
     }
     Ok((path, fields))
 }

@@ -7,7 +7,7 @@
 //! - `parts = NAME`: a struct of that name with each field as an `Option`, and `Self::read_parts(&Field, &mut Collector)`: what
 //!   could be read of a mapping with mistakes, so that its keys can still be held against each other.
 //! - `version = "skinrig_rig"`: a first key with the version of the file's language, 1.
-//! - `check(path, a, b)`: a function `(&A, &B, &Field, &mut Collector)` that holds these fields against each other. It runs
+//! - `check(path, "a", "b")`: a function `(&A, &B, &Field, &mut Collector)` that holds these fields against each other. It runs
 //!   whenever they could be read, even when other keys could not; without fields always. May be repeated.
 //! - `builds(Type, path)`: the mapping is the file form of `Type`, which gets an `impl Setting`; the function
 //!   `(Self, &Field, &mut Collector) -> Option<Type>` converts. `Type` has no rows.
