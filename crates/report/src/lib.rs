@@ -51,7 +51,7 @@ pub fn html(input: &ReportInput<'_>) -> Result<String, ReportError> {
 
 /// The results as JSON for programs: `format` ([`JSON_FORMAT`]), `format_version` ([`JSON_VERSION`]),
 /// `valid` (false when the alignment certificate is beyond its limits: the numbers are not to be used),
-/// `provenance` ([`Provenance`]), `summary` ([`Summary`]), `analysis` (the fields of [`Analysis`] without the bulk series `rates`, `pictures`,
+/// `provenance` ([`Provenance`]), `summary` ([`Summary`]), `analysis` (the fields of [`Analysis`](skinrig_analysis::Analysis) without the bulk series `rates`, `pictures`,
 /// `zooms`, `activity` and `motion`, and without `alignment.residuals`) and `comparison` ([`comparison::Row`]s: the session beside the published numbers).
 ///
 /// A field that has no value is `null`. Fields are added without a new version; a field that changes its
