@@ -57,7 +57,7 @@ type Work<'w> = &'w mut dyn FnMut(&mut Arm<'_>, &mut Findings) -> Result<(), Tro
 
 /// Arms the robot, takes it to clearance height where it lies below, lets `work` have it, and retracts and brakes it, whatever
 /// came of that. What `work` did not measure of `metrics` is unmeasured.
-pub fn with_arm(
+pub(crate) fn with_arm(
     bench: &mut dyn Bench,
     reach: Reach,
     found: &mut Findings,

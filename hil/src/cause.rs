@@ -117,7 +117,7 @@ const fn next(error: &ControllerError) -> Option<&'static str> {
 
 /// The evidence that a fault of a press is.
 #[must_use]
-pub fn of_press(fault: &PressFault) -> Evidence {
+pub(crate) fn of_press(fault: &PressFault) -> Evidence {
     use EvidenceKind as K;
     let camera = |c: &CameraId| trouble::of_camera(*c);
     let (kind, subject) = match fault {

@@ -7,7 +7,7 @@ use skinrig_protocol::rig::{BenchLimits, RigFile, RigKind};
 use crate::bench::Trouble;
 
 /// Above this height the tip may move sideways, mm.
-pub const CLEARANCE_MM: f64 = 5.0;
+pub(crate) const CLEARANCE_MM: f64 = 5.0;
 /// What is done in free air is done at this height and above, mm.
 const AIR_MM: f64 = 10.0;
 /// The points in free air lie within this height, mm.
@@ -15,7 +15,7 @@ const SPREAD_MM: f64 = 8.0;
 /// And so far from the middle, mm, along x and y.
 const ASIDE_MM: f64 = 8.0;
 /// Room that is kept around them, mm: for the ways to them, and for the rise at the end.
-pub const AROUND_MM: f64 = 5.0;
+pub(crate) const AROUND_MM: f64 = 5.0;
 /// From the origin of a frame that was given to the places that are pressed around it, mm.
 const NEAR_ORIGIN_MM: f64 = 5.0;
 

@@ -7,7 +7,7 @@ use skinrig_nightly::{Evidence, EvidenceKind};
 use crate::bench::Trouble;
 
 /// What this computer is called in results.
-pub const COMPUTER: &str = "computer";
+pub(crate) const COMPUTER: &str = "computer";
 /// What the skin is called in results.
 pub const SKIN: &str = "skin";
 

@@ -24,7 +24,7 @@ use crate::segment::Window;
 use crate::width::width_u;
 
 /// How far an event may lie before the newest one seen and still find its window open, µs.
-pub const SLACK_US: u64 = 10_000;
+pub(crate) const SLACK_US: u64 = 10_000;
 
 /// Most events of the open windows of a camera that are kept for an estimator: 512 MiB.
 const MOST_KEPT: usize = 1 << 26;
@@ -34,7 +34,7 @@ const SLICE: usize = 1024;
 
 /// A close-up of the rate around one press.
 #[derive(Debug, Clone)]
-pub struct ZoomPlan {
+pub(crate) struct ZoomPlan {
     pub press: PressId,
     pub start_us: u64,
     pub bins: usize,
@@ -69,7 +69,7 @@ pub struct Wanted<'a> {
 }
 
 /// What one camera gives.
-pub struct Accumulator<'a> {
+pub(crate) struct Accumulator<'a> {
     camera: CameraId,
     settings: &'a AnalysisSettings,
     crop: (u16, u16),
@@ -128,7 +128,7 @@ pub struct Tally {
 }
 
 /// What one camera saw of a press.
-pub fn press_view(window: &Window, tally: Tally, sighting: &Sighting) -> PressView {
+pub(crate) fn press_view(window: &Window, tally: Tally, sighting: &Sighting) -> PressView {
     let per_s = |n: f64, s: f64| if s > 0.0 { n / s } else { 0.0 };
     PressView {
         events: tally.events,
@@ -273,7 +273,7 @@ impl<'a> Accumulator<'a> {
     }
 
     /// Takes all the events that another pass has held.
-    pub fn take_held(&mut self, held: &Held) {
+    pub(crate) fn take_held(&mut self, held: &Held) {
         if held.in_order() {
             // They were looked at by the pass that held them.
             held.for_each_slice(|events| self.take_inside(events));
@@ -529,7 +529,7 @@ fn first_from(events: &[CdEvent], time_us: u64) -> usize {
 }
 
 /// Width of a rate bin in whole µs, at least 1.
-pub fn rate_bin_us(settings: &AnalysisSettings) -> u64 {
+pub(crate) fn rate_bin_us(settings: &AnalysisSettings) -> u64 {
     (settings.rate_bin_ms * 1e3).round().max(1.0) as u64
 }
 /// Everything that a camera's events say, in one pass over them.

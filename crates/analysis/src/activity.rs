@@ -11,7 +11,7 @@ const WIDTH: u16 = SENSOR_WIDTH / CELL_PX;
 const HEIGHT: u16 = SENSOR_HEIGHT / CELL_PX;
 
 /// The counters.
-pub struct ActivityGrid(Counters);
+pub(crate) struct ActivityGrid(Counters);
 
 impl ActivityGrid {
     pub fn new() -> Self {

@@ -9,7 +9,7 @@ use crate::result::{Analysis, Estimate, PressResult, Reduction, ReductionRow};
 const COMPARABLE: f64 = 0.95;
 
 /// The caveats of a finished analysis.
-pub fn caveats(analysis: &Analysis) -> Vec<String> {
+pub(crate) fn caveats(analysis: &Analysis) -> Vec<String> {
     let dense = CameraId::ALL
         .into_iter()
         .filter_map(|camera| dense_background(&analysis.settings, &analysis.presses, camera));

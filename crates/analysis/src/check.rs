@@ -79,7 +79,7 @@ fn presses(all: &[PlannedPress]) -> Result<(), AnalysisError> {
 }
 
 /// True for a point with finite coordinates within 1000 km of the origin.
-pub fn is_place(p: &Point2) -> bool {
+pub(crate) fn is_place(p: &Point2) -> bool {
     p.x_mm.abs() <= MAX_COORDINATE_MM && p.y_mm.abs() <= MAX_COORDINATE_MM
 }
 

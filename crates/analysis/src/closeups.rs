@@ -29,7 +29,7 @@ const BACKGROUND_AFTER_S: f64 = 2.4;
 const CHOICE: u64 = 0x6b65_7074;
 
 /// Which presses get pictures and close-ups of the rate.
-pub struct Closeups {
+pub(crate) struct Closeups {
     pub pictures: Vec<(usize, PressId)>,
     pub zooms: Vec<(usize, PressId)>,
     /// Rows whose events are kept, ascending.
@@ -103,7 +103,7 @@ fn kept_rows(input: &SessionInput, keep: Keep) -> Vec<usize> {
 }
 
 /// The views to keep of one camera, sorted by start. `windows` are those of all presses.
-pub fn keep_plans(
+pub(crate) fn keep_plans(
     input: &SessionInput,
     plan: &Closeups,
     windows: &[Window],
@@ -143,7 +143,7 @@ pub fn keep_plans(
 }
 
 /// The close-ups of one camera, sorted by start.
-pub fn zoom_plans(input: &SessionInput, plan: &Closeups, clock: &ClockFit) -> Vec<ZoomPlan> {
+pub(crate) fn zoom_plans(input: &SessionInput, plan: &Closeups, clock: &ClockFit) -> Vec<ZoomPlan> {
     let bin_us = rate_bin_us(&input.settings);
     let mut plans: Vec<ZoomPlan> = plan
         .zooms

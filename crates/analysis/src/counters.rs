@@ -125,7 +125,7 @@ impl Counters {
 /// Eight bytes in a word, the first one lowest.
 mod bytes {
     /// A one in each.
-    pub const ONES: u64 = 0x0101_0101_0101_0101;
+    pub(crate) const ONES: u64 = 0x0101_0101_0101_0101;
     const LOW_SEVEN: u64 = 0x7f7f_7f7f_7f7f_7f7f;
     const EVEN: u64 = 0x00ff_00ff_00ff_00ff;
 
@@ -137,7 +137,7 @@ mod bytes {
 
     /// A bit for each that is not 0: its uppermost bit, set by a carry from those below, is moved to its place in the
     /// uppermost byte of the product.
-    pub const fn nonzero(word: u64) -> u64 {
+    pub(crate) const fn nonzero(word: u64) -> u64 {
         let uppermost = (((word & LOW_SEVEN) + LOW_SEVEN) | word) & !LOW_SEVEN;
         (uppermost >> 7).wrapping_mul(0x0102_0408_1020_4080) >> 56
     }

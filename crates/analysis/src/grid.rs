@@ -79,7 +79,7 @@ impl PixelGrid {
     }
 
     /// Counts all of these events, or as many of the first as lie in the crop and fit: false when that is not all.
-    pub fn add_all(&mut self, events: &[CdEvent]) -> bool {
+    pub(crate) fn add_all(&mut self, events: &[CdEvent]) -> bool {
         let first = usize::from(self.rows.0) * Self::WIDTH;
         let free = u32::MAX - self.events;
         let fitting = events.len().min(free as usize);

@@ -9,7 +9,7 @@ const MAX_EVENTS: usize = 1 << 24;
 
 /// A press whose events are wanted, and what has come of it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct KeepPlan {
+pub(crate) struct KeepPlan {
     /// Row of the press in the plan.
     pub row: usize,
     /// Its view, at first without events.
@@ -17,7 +17,7 @@ pub struct KeepPlan {
 }
 
 /// Collects views that may overlap.
-pub struct Keeper {
+pub(crate) struct Keeper {
     plans: Vec<KeepPlan>,
     /// Views before this one are whole.
     next: usize,
@@ -59,7 +59,7 @@ impl Keeper {
     }
 
     /// No event before `time_us` will come any more.
-    pub fn move_on(&mut self, time_us: u64) {
+    pub(crate) fn move_on(&mut self, time_us: u64) {
         while let Some(KeepPlan { view, .. }) = self.plans.get_mut(self.next) {
             if view.start_us + u64::from(view.length_us) > time_us {
                 break;

@@ -17,7 +17,7 @@ const CLEARLY: f64 = 6.0;
 
 /// When the events of a press began in one camera, if that was before the contact.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Onset {
+pub(crate) struct Onset {
     /// Row of the press.
     pub row: usize,
     /// So long before the measured contact, ms; 0 when not before.

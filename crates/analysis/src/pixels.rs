@@ -38,7 +38,7 @@ impl PixelSet {
     }
 
     /// Appends the indices in the set, ascending, to `out`.
-    pub fn append_to(&self, out: &mut Vec<u32>) {
+    pub(crate) fn append_to(&self, out: &mut Vec<u32>) {
         for (i, &word) in self.words.iter().enumerate() {
             let mut left = word;
             while left != 0 {

@@ -41,7 +41,7 @@ impl RateHistogram {
     }
 
     /// Counts events that are in order of time among themselves.
-    pub fn add_in_order(&mut self, events: &[CdEvent]) {
+    pub(crate) fn add_in_order(&mut self, events: &[CdEvent]) {
         let mut rest = events;
         while let Some(first) = rest.first() {
             let end_us = (first.t_us - first.t_us % self.bin_us).saturating_add(self.bin_us);
@@ -88,7 +88,7 @@ impl RateHistogram {
 
     /// Width of a bin, µs.
     #[must_use]
-    pub const fn bin_us(&self) -> u64 {
+    pub(crate) const fn bin_us(&self) -> u64 {
         self.bin_us
     }
 

@@ -107,7 +107,7 @@ fn calibrated_on_all(
 /// Share of the presses that pass as the public code counts: an error strictly below the threshold, a press without an
 /// error having the largest error there is (1 mm where there is none). 0 without presses.
 #[must_use]
-pub fn published_pass_rate(errors_mm: &[Option<f64>], threshold_mm: f64) -> f64 {
+pub(crate) fn published_pass_rate(errors_mm: &[Option<f64>], threshold_mm: f64) -> f64 {
     let filled = filled(errors_mm);
     share(
         filled.iter().filter(|e| **e < threshold_mm).count(),

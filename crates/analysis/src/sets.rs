@@ -87,7 +87,7 @@ pub struct ScoreSet(Vec<Scored>);
 impl ScoreSet {
     /// Whether a press has an estimate that does not count.
     #[must_use]
-    pub fn excludes_estimates(&self) -> bool {
+    pub(crate) fn excludes_estimates(&self) -> bool {
         self.0.iter().any(|p| !p.valid && p.found.is_some())
     }
 

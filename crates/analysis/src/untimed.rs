@@ -12,7 +12,7 @@ use crate::timebase::{Tie, TimeBase, distance_us};
 
 /// A press that a clock does not reach.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Untimed {
+pub(crate) struct Untimed {
     /// What is too far away.
     pub tie: Tie,
     /// How far the nearest is from the contact or the release, µs.

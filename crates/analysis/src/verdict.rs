@@ -48,7 +48,7 @@ impl Judgement {
 
     /// Excluded by hand, unless the press is missed or invalid anyway.
     #[must_use]
-    pub fn or_by_hand(self) -> Self {
+    pub(crate) fn or_by_hand(self) -> Self {
         match self.verdict {
             PressVerdict::Missed(_) | PressVerdict::Invalid(_) => self,
             _ => Self::excluded("by hand".to_owned(), "left out by hand".to_owned()),
@@ -202,7 +202,7 @@ fn idle_events(view: &PressView) -> Option<IdleEvents> {
 
 /// The rule that leaves a valid press out because of where its rays meet, if any.
 #[must_use]
-pub fn location_rule(outcome: &LocationOutcome, settings: &AnalysisSettings) -> Option<Judgement> {
+pub(crate) fn location_rule(outcome: &LocationOutcome, settings: &AnalysisSettings) -> Option<Judgement> {
     let plain = |rule: &str| Some(Judgement::excluded(rule.to_owned(), rule.to_owned()));
     match *outcome {
         LocationOutcome::Missing => plain("no view"),
@@ -230,7 +230,7 @@ pub fn location_rule(outcome: &LocationOutcome, settings: &AnalysisSettings) -> 
 /// True for a press that was done as planned, whether or not the cameras saw it: valid, or excluded by a rule on the
 /// data. What the journal or a hand leaves out is no question to the skin.
 #[must_use]
-pub fn is_done_as_planned(press: &PressResult) -> bool {
+pub(crate) fn is_done_as_planned(press: &PressResult) -> bool {
     press.verdict == PressVerdict::Valid.name()
         || press.rule.as_deref().is_some_and(is_rule_on_data)
 }
@@ -266,7 +266,7 @@ pub fn put(row: &mut PressResult, judgement: Judgement) {
 /// interval of the RMSE of those that count (without an interval: when the two differ at all), or when nothing
 /// counts. `rmse`: with and without exclusions.
 #[must_use]
-pub fn weight_of_exclusions(presses: &[PressResult], rmse: [&Estimate; 2]) -> Option<String> {
+pub(crate) fn weight_of_exclusions(presses: &[PressResult], rmse: [&Estimate; 2]) -> Option<String> {
     let [with, without] = rmse;
     let all = without.value?;
     let left_out = without.n.saturating_sub(with.n);

@@ -21,17 +21,17 @@ const MOST_CHARS: usize = 60;
 const TAIL_BYTES: u64 = 1 << 16;
 
 /// The results of a session's analysis with this name; `None`: the official one.
-pub fn results_path(session: &Path, name: Option<&str>) -> PathBuf {
+pub(crate) fn results_path(session: &Path, name: Option<&str>) -> PathBuf {
     path(session, name, RESULTS)
 }
 
 /// Its report.
-pub fn report_path(session: &Path, name: Option<&str>) -> PathBuf {
+pub(crate) fn report_path(session: &Path, name: Option<&str>) -> PathBuf {
     path(session, name, ".report.html")
 }
 
 /// The page of what speed costs; its results have the same name with another ending.
-pub fn tradeoff_path(session: &Path, name: Option<&str>) -> PathBuf {
+pub(crate) fn tradeoff_path(session: &Path, name: Option<&str>) -> PathBuf {
     path(session, name, ".tradeoff.html")
 }
 

@@ -44,7 +44,7 @@ impl Exit {
     }
 
     /// All codes with their meaning, for `--help`.
-    pub const HELP: &'static str = "Exit codes:\n  \
+    pub(crate) const HELP: &'static str = "Exit codes:\n  \
         0  done\n  \
         1  fault of skinrig or of this machine\n  \
         2  bad input: command line, protocol, schedule, data or session file\n  \

@@ -256,7 +256,7 @@ pub fn derived(
 /// The tables of a bundle.
 const BUNDLED: [TableName; 3] = [TableName::Presses, TableName::Results, TableName::Pose];
 /// What people said of the session later.
-pub const TAGS: &str = ".tags.jsonl";
+pub(crate) const TAGS: &str = ".tags.jsonl";
 
 /// The session, what was found in it, its camera streams and its tables, in a folder that `verify` proves.
 fn bundle(

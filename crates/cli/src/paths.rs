@@ -14,7 +14,7 @@ pub const SESSION_SUFFIX: &str = ".session.sqlite";
 ///
 /// # Errors
 /// [`Failure::internal`] when the folder cannot be made.
-pub fn new_session(
+pub(crate) fn new_session(
     folder: &Path,
     started: DateTime<Utc>,
     protocol: &str,

@@ -11,7 +11,7 @@ use skinrig_model::{CameraId, HostDuration, PlannedPress, PressHistory, PressRol
 const REDRAW_EVERY: Duration = Duration::from_millis(100);
 
 /// Shows a run from its records.
-pub struct ProgressView {
+pub(crate) struct ProgressView {
     tracker: ProgressTracker,
     display: Display,
     drawn: Option<Instant>,
@@ -139,7 +139,7 @@ fn where_and_when(tracker: &ProgressTracker, waited: Duration) -> String {
 
 /// How long the user still waits, and the rig time that passes meanwhile where that is another one.
 #[must_use]
-pub fn eta_text(elapsed: HostDuration, rig: Option<HostDuration>, waited: Duration) -> String {
+pub(crate) fn eta_text(elapsed: HostDuration, rig: Option<HostDuration>, waited: Duration) -> String {
     let Some(rig) = rig.filter(|_| elapsed.0 > 0) else {
         return "-".into();
     };
@@ -184,7 +184,7 @@ fn streams(tracker: &ProgressTracker) -> String {
 
 /// `h:mm:ss`.
 #[must_use]
-pub fn clock_text(d: HostDuration) -> String {
+pub(crate) fn clock_text(d: HostDuration) -> String {
     let s = d.as_secs_f64().round().max(0.0) as u64;
     format!("{}:{:02}:{:02}", s / 3600, s / 60 % 60, s % 60)
 }

@@ -17,7 +17,7 @@ const POSE_WINDOW: HostDuration = HostDuration::from_millis(2_000);
 const UNENDED: HostDuration = HostDuration::from_millis(60_000);
 
 /// A session file, streamed.
-pub struct SessionRecording {
+pub(crate) struct SessionRecording {
     reader: SessionReader,
     devices: Vec<DeviceRow>,
     commands: VecDeque<(HostTime, MotionCommand)>,

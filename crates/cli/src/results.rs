@@ -35,7 +35,7 @@ pub struct Results {
 impl Results {
     /// As the report crate takes it.
     #[must_use]
-    pub fn report_input(&self) -> ReportInput<'_> {
+    pub(crate) fn report_input(&self) -> ReportInput<'_> {
         ReportInput {
             analysis: &self.analysis,
             provenance: self.provenance.clone(),
@@ -249,7 +249,7 @@ fn earlier_attempt(attempt: &AttemptRow) -> Option<EarlierAttempt> {
 ///
 /// # Errors
 /// [`Failure::internal`] when a file cannot be written.
-pub fn write_results(
+pub(crate) fn write_results(
     results: &Results,
     json_path: Option<&Path>,
     html_path: Option<&Path>,
@@ -269,7 +269,7 @@ pub fn write_results(
 ///
 /// # Errors
 /// [`Failure::internal`] when one cannot be put together.
-pub fn documents(results: &Results) -> Result<(String, String), Failure> {
+pub(crate) fn documents(results: &Results) -> Result<(String, String), Failure> {
     let input = results.report_input();
     let json =
         serde_json::to_string_pretty(&skinrig_report::json(&input)).map_err(Failure::internal)?;
@@ -294,7 +294,7 @@ pub(crate) fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
 }
 
 /// Prints the results table and the paths of what was written.
-pub fn print_results(results: &Results, json: bool, paths: &(PathBuf, PathBuf)) {
+pub(crate) fn print_results(results: &Results, json: bool, paths: &(PathBuf, PathBuf)) {
     if json {
         let mut document = skinrig_report::json(&results.report_input());
         if let Some(object) = document.as_object_mut() {
@@ -371,7 +371,7 @@ pub fn analyze(args: &AnalyzeArgs, json: bool) -> Outcome {
 }
 
 /// A variant in the place of the `official` file would be taken for it.
-pub fn not_official(official: &Path, out: &Path, variant: &Variant) -> Result<(), Failure> {
+pub(crate) fn not_official(official: &Path, out: &Path, variant: &Variant) -> Result<(), Failure> {
     let place = |path: &Path| {
         let folder = crate::paths::folder_of(path).canonicalize().ok();
         (folder, path.file_name().map(std::ffi::OsStr::to_owned))

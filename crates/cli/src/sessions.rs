@@ -73,7 +73,7 @@ pub fn find(place: &Path) -> Result<PathBuf, Failure> {
 ///
 /// # Errors
 /// [`Failure::input`] that says what the session is instead.
-pub fn find_running(place: &Path) -> Result<PathBuf, Failure> {
+pub(crate) fn find_running(place: &Path) -> Result<PathBuf, Failure> {
     let session = find(place)?;
     if writer_of(&session).is_some() {
         return Ok(session);
@@ -100,7 +100,7 @@ pub fn find_running(place: &Path) -> Result<PathBuf, Failure> {
 ///
 /// # Errors
 /// [`Failure::input`] when the folder cannot be read, or has none of them: then which prototypes there are.
-pub fn of_prototype(folder: &Path, prototype: &str) -> Result<Vec<PathBuf>, Failure> {
+pub(crate) fn of_prototype(folder: &Path, prototype: &str) -> Result<Vec<PathBuf>, Failure> {
     let all = list(folder).map_err(Failure::session)?;
     let of = |s: &&SessionSummary| s.prototype() == Some(prototype);
     let found: Vec<PathBuf> = all.iter().filter(of).map(|s| s.path.clone()).collect();
@@ -142,7 +142,7 @@ fn by_id(all: &[SessionSummary]) -> BTreeMap<&str, Vec<&SessionSummary>> {
 
 /// The sessions of a list in its order, each once: copies of a session (`skinrig salvage` makes one) are no sessions of their own.
 #[must_use]
-pub fn originals(all: &[SessionSummary]) -> Vec<&SessionSummary> {
+pub(crate) fn originals(all: &[SessionSummary]) -> Vec<&SessionSummary> {
     let kept: BTreeSet<&Path> = by_id(all)
         .values()
         .filter_map(|copies| stands_for(copies).map(|s| s.path.as_path()))

@@ -49,7 +49,7 @@ impl Operator {
     ///
     /// # Errors
     /// As [`on_ctrl_c`].
-    pub fn of_suite() -> Result<Self, String> {
+    pub(crate) fn of_suite() -> Result<Self, String> {
         Self::answering(OF_SUITE, true)
     }
 
@@ -96,7 +96,7 @@ impl Operator {
     }
 
     /// The run is over and its session closed: from now on ctrl-C leaves the program. Within a suite it does not.
-    pub fn run_is_over(&self) {
+    pub(crate) fn run_is_over(&self) {
         self.over.store(!self.of_suite, Ordering::SeqCst);
     }
 }
@@ -105,7 +105,7 @@ impl Operator {
 ///
 /// # Errors
 /// A message when the system refuses the thread or the handler.
-pub fn on_ctrl_c(react: impl Fn(u8) + Send + 'static) -> Result<(), String> {
+pub(crate) fn on_ctrl_c(react: impl Fn(u8) + Send + 'static) -> Result<(), String> {
     let refused = |e: std::io::Error| format!("cannot listen for ctrl-C: {e}");
     let runtime = tokio::runtime::Builder::new_current_thread()
         .enable_io()
@@ -185,7 +185,7 @@ impl Signals {
 
 /// Makes a file that grows beyond the limit of the process (`ulimit -f`) an error of the write, as a full disk is one. Without
 /// this the system ends the program by SIGXFSZ, with the robot wherever it is.
-pub fn take_file_limits_as_errors() {
+pub(crate) fn take_file_limits_as_errors() {
     #[cfg(unix)]
     {
         use tokio::signal::unix::{SignalKind, signal};

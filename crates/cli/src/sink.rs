@@ -47,7 +47,7 @@ impl Foreknowledge {
 pub(crate) const HELD_OPEN: &str = "note: another program has the session open; waiting for it, to seal the session (60 s at most)";
 
 /// Writes every record to the session file and shows it.
-pub struct SessionSink {
+pub(crate) struct SessionSink {
     writer: SessionWriter,
     view: ProgressView,
     known: Foreknowledge,
@@ -80,21 +80,21 @@ impl SessionSink {
 
     /// Tells the free space of `folder` when it is asked for.
     #[must_use]
-    pub fn on_disk_of(mut self, folder: &Path) -> Self {
+    pub(crate) fn on_disk_of(mut self, folder: &Path) -> Self {
         self.folder = Some(folder.to_owned());
         self
     }
 
     /// Writes these remarks right after the first record.
     #[must_use]
-    pub fn with_notes(mut self, notes: Vec<String>) -> Self {
+    pub(crate) fn with_notes(mut self, notes: Vec<String>) -> Self {
         self.notes = notes;
         self
     }
 
     /// Listens to other terminals for the session at `session`. A run that cannot goes on, and says so.
     #[must_use]
-    pub fn controlled(mut self, session: &Path, control: &ControlHandle) -> Self {
+    pub(crate) fn controlled(mut self, session: &Path, control: &ControlHandle) -> Self {
         match Remote::open(session, control) {
             Ok(remote) => self.remote = Some(remote),
             Err(why) => self.view.say(&format!(
@@ -106,7 +106,7 @@ impl SessionSink {
 
     /// With faults on purpose.
     #[must_use]
-    pub fn with_faults(mut self, saboteur: Saboteur) -> Self {
+    pub(crate) fn with_faults(mut self, saboteur: Saboteur) -> Self {
         self.saboteur = saboteur;
         self
     }

@@ -60,7 +60,7 @@ pub fn words(all: &Sayings) -> String {
 
 /// The command line with every `-TAG` of `skinrig tag` as `--remove=TAG`: a parser of options takes it for letters.
 #[must_use]
-pub fn spelled_out(arguments: Vec<OsString>) -> Vec<OsString> {
+pub(crate) fn spelled_out(arguments: Vec<OsString>) -> Vec<OsString> {
     let command = |a: &OsString| !a.to_string_lossy().starts_with('-');
     let at = arguments.iter().skip(1).position(command);
     let Some(at) = at.filter(|at| arguments[at + 1] == "tag") else {

@@ -55,7 +55,7 @@ pub fn err(text: Arguments<'_>) {
 }
 
 /// Whether something that was to go to standard output did not, for another reason than a reader that went away.
-pub fn output_failed() -> bool {
+pub(crate) fn output_failed() -> bool {
     OUTPUT_FAILED.load(Ordering::Relaxed)
 }
 
@@ -74,7 +74,7 @@ macro_rules! errln {
 }
 
 /// Prints a JSON value for programs, and its end of line.
-pub fn print_json(value: &serde_json::Value) {
+pub(crate) fn print_json(value: &serde_json::Value) {
     // Pretty printing of a `Value` cannot fail.
     let text = serde_json::to_string_pretty(value).unwrap_or_default();
     out(format_args!("{text}\n"));

@@ -4,7 +4,7 @@
 pub const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), " (", env!("SKINRIG_BUILD"), ")");
 
 /// The same with the program's name.
-pub const SOFTWARE: &str = concat!(
+pub(crate) const SOFTWARE: &str = concat!(
     "skinrig ",
     env!("CARGO_PKG_VERSION"),
     " (",

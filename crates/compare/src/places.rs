@@ -91,7 +91,7 @@ impl Places {
     }
 
     /// Depths that all skins were pressed to.
-    pub fn shared_depths(&self) -> usize {
+    pub(crate) fn shared_depths(&self) -> usize {
         self.depths.len()
     }
 

@@ -173,7 +173,7 @@ impl ControlHandle {
 
     /// True once [`halt`](Self::halt) was asked for.
     #[must_use]
-    pub fn is_halted(&self) -> bool {
+    pub(crate) fn is_halted(&self) -> bool {
         self.shared.bits.load(Ordering::Acquire) & HALT != 0
     }
 

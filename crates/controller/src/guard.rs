@@ -139,7 +139,7 @@ impl<'a> GuardedIndenter<'a> {
 
     /// True when the tip was last seen at clearance height or above, within the tolerance.
     #[must_use]
-    pub fn is_clear(&self) -> bool {
+    pub(crate) fn is_clear(&self) -> bool {
         self.position()
             .is_some_and(|p| p.measured.z_mm >= self.clear_height_mm())
     }
@@ -157,7 +157,7 @@ impl<'a> GuardedIndenter<'a> {
     /// The point at clearance height straight above the tip: above the present target (which does not
     /// depend on when one looks) unless the tip is away from it sideways, then above the tip as measured.
     #[must_use]
-    pub fn point_above(&self) -> Option<Point3<Skin>> {
+    pub(crate) fn point_above(&self) -> Option<Point3<Skin>> {
         let last = self.position()?;
         let held = self.target.unwrap_or(last.commanded);
         let near =
@@ -188,7 +188,7 @@ impl<'a> GuardedIndenter<'a> {
     ///
     /// # Errors
     /// [`GuardError::StalePose`].
-    pub fn check_fresh(&self, now: HostTime) -> Result<(), GuardError> {
+    pub(crate) fn check_fresh(&self, now: HostTime) -> Result<(), GuardError> {
         match self.watchdog.age(now) {
             Some(age) if (HostDuration::ZERO..=self.stale_after).contains(&age) => Ok(()),
             age => Err(GuardError::StalePose {

@@ -11,11 +11,11 @@ const MOVED_MM: f64 = 1e-3;
 /// Share of the declared tolerance within which a motion counts as settled when another one is to follow that the guard holds
 /// against the whole tolerance. The band between them is one reading of the encoders: 0.01 mm (omega.3, a reseller's figure
 /// for its resolution, < 0.01 mm) of the default tolerance of 0.05 mm.
-pub const SETTLED_SHARE: f64 = 0.8;
+pub(crate) const SETTLED_SHARE: f64 = 0.8;
 
 /// Waits for a tip that stays close to a target.
 #[derive(Debug, Clone)]
-pub struct Settling {
+pub(crate) struct Settling {
     target: Point3<Skin>,
     tolerance_mm: f64,
     time: HostDuration,
@@ -43,7 +43,7 @@ impl Settling {
 
     /// Settled a band closer than the guard demands of the motion that follows ([`SETTLED_SHARE`]).
     #[must_use]
-    pub fn before_a_motion(target: Point3<Skin>, limits: &RunLimits, after: HostTime) -> Self {
+    pub(crate) fn before_a_motion(target: Point3<Skin>, limits: &RunLimits, after: HostTime) -> Self {
         Self {
             tolerance_mm: SETTLED_SHARE * limits.position_tolerance_mm,
             ..Self::new(target, limits, after)
@@ -74,7 +74,7 @@ impl Settling {
 
     /// True when the newest sample is within the tolerance.
     #[must_use]
-    pub const fn is_near(&self) -> bool {
+    pub(crate) const fn is_near(&self) -> bool {
         self.near
     }
 
@@ -87,7 +87,7 @@ impl Settling {
 
 /// Follows one press through the pose stream.
 #[derive(Debug, Clone)]
-pub struct PressTracker {
+pub(crate) struct PressTracker {
     at: Point2,
     depth_mm: f64,
     limits: RunLimits,
@@ -154,7 +154,7 @@ impl PressTracker {
     }
 
     /// The surface is where it is [`touched`](Self::touched), not at z = 0.
-    pub const fn search_surface(&mut self) {
+    pub(crate) const fn search_surface(&mut self) {
         self.searching = true;
     }
 
@@ -245,20 +245,20 @@ impl PressTracker {
     }
 
     /// The motion from the surface to depth was commanded at `t`.
-    pub fn indent_from(&mut self, t: HostTime) {
+    pub(crate) fn indent_from(&mut self, t: HostTime) {
         let target = self.bottom();
         self.depth = Some(Settling::new(target, &self.limits, t));
     }
 
     /// The upward motion to `target` was commanded at `t`.
-    pub fn rise_to(&mut self, target: Point3<Skin>, t: HostTime) {
+    pub(crate) fn rise_to(&mut self, target: Point3<Skin>, t: HostTime) {
         self.up_from = Some(t);
         self.up = Some(Settling::new(target, &self.limits, t));
     }
 
     /// True when the tip is at the surface, or was.
     #[must_use]
-    pub fn at_surface(&self) -> bool {
+    pub(crate) fn at_surface(&self) -> bool {
         self.down.is_near() || self.contact.is_some()
     }
 
@@ -347,7 +347,7 @@ impl PressTracker {
     ///
     /// # Errors
     /// What is off.
-    pub fn check_hold(&self) -> Result<(), MomentFault> {
+    pub(crate) fn check_hold(&self) -> Result<(), MomentFault> {
         match self.worst {
             None => Err(MomentFault::NoHold),
             Some((off, found)) if off > self.limits.position_tolerance_mm => {

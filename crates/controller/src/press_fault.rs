@@ -175,7 +175,7 @@ impl PressFault {
 
     /// True for a press that was broken off on purpose: it says nothing of the rig.
     #[must_use]
-    pub const fn is_pause(&self) -> bool {
+    pub(crate) const fn is_pause(&self) -> bool {
         matches!(self, Self::Paused | Self::Suspended(_))
     }
 }

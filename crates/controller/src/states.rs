@@ -64,7 +64,7 @@ pub enum Event {
 
 /// What the controller does on a transition.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Action {
+pub(crate) enum Action {
     /// Nothing more.
     None,
     /// Execute the next step.
@@ -148,7 +148,7 @@ impl Event {
 
 /// The table. Total: the compiler checks that every pair is there.
 #[must_use]
-pub const fn transition(state: State, event: Event) -> (State, Action) {
+pub(crate) const fn transition(state: State, event: Event) -> (State, Action) {
     use Action as A;
     use Event as E;
     use State as S;

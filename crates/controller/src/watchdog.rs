@@ -114,7 +114,7 @@ pub enum Trip {
 impl Trip {
     /// True when the measured position is no longer to be believed: no motion can be led by it.
     #[must_use]
-    pub const fn is_blind(&self) -> bool {
+    pub(crate) const fn is_blind(&self) -> bool {
         matches!(self, Self::Feedback { .. } | Self::Stale { .. })
     }
 }

@@ -12,7 +12,7 @@ use crate::regular;
 use crate::stream::{Discontinuity, EventSink, Geometry, StreamStats};
 
 /// Gaps and discontinuities beyond this number are counted but not listed.
-pub const LIST_LIMIT: usize = 100;
+pub(crate) const LIST_LIMIT: usize = 100;
 
 /// Kind of a file, by its first bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

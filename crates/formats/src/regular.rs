@@ -5,7 +5,7 @@ use std::io::{self, Read};
 use std::path::Path;
 
 /// Largest text that is read whole, bytes: protocols, schedules, rig files, suites, limits and tables are far smaller.
-pub const MAX_TEXT_BYTES: u64 = 64 << 20;
+pub(crate) const MAX_TEXT_BYTES: u64 = 64 << 20;
 
 /// Says what is at `path` when it is no regular file, without opening it.
 ///

@@ -33,21 +33,21 @@ use crate::id::PressId;
 use crate::time::HostTime;
 
 /// Width of the start pulse, µs.
-pub const START_WIDTH_US: u64 = 300;
+pub(crate) const START_WIDTH_US: u64 = 300;
 /// Width of a pulse that means 1, µs.
-pub const ONE_WIDTH_US: u64 = 200;
+pub(crate) const ONE_WIDTH_US: u64 = 200;
 /// Width of a pulse that means 0, µs.
-pub const ZERO_WIDTH_US: u64 = 100;
+pub(crate) const ZERO_WIDTH_US: u64 = 100;
 /// Distance of two rising edges of a train, µs.
-pub const PULSE_PERIOD_US: u64 = 400;
+pub(crate) const PULSE_PERIOD_US: u64 = 400;
 /// Data bits of a train: 3 for the kind, 17 for the press or the sync count.
-pub const DATA_BITS: u32 = 20;
+pub(crate) const DATA_BITS: u32 = 20;
 /// Check bits of a train.
-pub const CHECK_BITS: u32 = 11;
+pub(crate) const CHECK_BITS: u32 = 11;
 /// Pulses of a train: start, data, check.
 pub const PULSES_PER_TRAIN: u64 = 1 + (DATA_BITS + CHECK_BITS) as u64;
 /// XORed into the check bits; chosen by trying all 2^11 masks for the largest distance of shifted trains from the code.
-pub const CHECK_MASK: u32 = 0x7FD;
+pub(crate) const CHECK_MASK: u32 = 0x7FD;
 /// Generator of the code, x^11 + x^8 + x^7 + x^5 + x^4 + x^3 + x + 1.
 const GENERATOR: u32 = 0x9BB;
 /// The kind code of a *sync* train, which names no press: its 17 bits are the box's running number of sync trains,
@@ -58,7 +58,7 @@ pub const MAX_MARKED_PRESS: u32 = (1 << 17) - 1;
 /// The last press that a mark can name.
 pub const LAST_MARKED_PRESS: PressId = PressId::from_index(MAX_MARKED_PRESS);
 /// How far a measured width or period may be off and still be read, µs.
-pub const TOLERANCE_US: u64 = 40;
+pub(crate) const TOLERANCE_US: u64 = 40;
 
 /// A moment of a press that can be marked on the trigger line.
 #[derive(
@@ -202,7 +202,7 @@ impl Label {
 /// The 11 check bits of 20 data bits: the remainder of `data * x^11` by the generator over GF(2), XORed with
 /// [`CHECK_MASK`].
 #[must_use]
-pub const fn check_bits(data: u32) -> u32 {
+pub(crate) const fn check_bits(data: u32) -> u32 {
     let mut rest = data << CHECK_BITS;
     let mut bit = DATA_BITS + CHECK_BITS;
     while bit > CHECK_BITS {

@@ -158,7 +158,7 @@ pub struct Measurement {
 impl Part {
     /// Whether something was measured beyond its limit, other than not measured at all.
     #[must_use]
-    pub fn is_broken(&self) -> bool {
+    pub(crate) fn is_broken(&self) -> bool {
         let measured = |m: &Measurement| m.verdict == Verdict::Fail && m.value.is_some();
         self.measurements.iter().any(measured)
     }

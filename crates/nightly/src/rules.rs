@@ -108,7 +108,7 @@ pub const GOLDEN_ON_A_BAD_RIG: Rule = Rule {
 };
 
 /// The rule for presses of an arm that moves badly. Its evidence is other checks, as above.
-pub const TOUCH_ON_A_BAD_ARM: Rule = Rule {
+pub(crate) const TOUCH_ON_A_BAD_ARM: Rule = Rule {
     name: "touch-on-a-bad-arm",
     seen: &[],
     cause: Some(Cause::Rig),

@@ -101,7 +101,7 @@ pub enum OnTrip {
 impl OnTrip {
     /// True for the default.
     #[must_use]
-    pub const fn is_retract(&self) -> bool {
+    pub(crate) const fn is_retract(&self) -> bool {
         matches!(self, Self::Retract)
     }
 }

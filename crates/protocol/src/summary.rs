@@ -10,14 +10,14 @@ use crate::plan::{Plan, Step};
 use crate::timing;
 
 /// Events per second of both cameras together while the skin is pressed (published recording: 75 kB/s at 21 bit).
-pub const PRESS_EVENTS_PER_S: f64 = 28_570.0;
+pub(crate) const PRESS_EVENTS_PER_S: f64 = 28_570.0;
 /// Events per second of both cameras together otherwise (published recording: 24 kB/s at 21 bit).
-pub const IDLE_EVENTS_PER_S: f64 = 9_140.0;
+pub(crate) const IDLE_EVENTS_PER_S: f64 = 9_140.0;
 /// Bytes of an event in EVT2.
 pub const BYTES_PER_EVENT: f64 = 4.0;
 /// Distance of two TIME_HIGH words of an EVT2 stream, µs, as the vendor's encoder writes them. The cadence of the
 /// camera itself is not documented.
-pub const TIME_HIGH_PERIOD_US: f64 = 16.0;
+pub(crate) const TIME_HIGH_PERIOD_US: f64 = 16.0;
 
 /// What a plan amounts to. Durations and data volumes are estimates.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -9,20 +9,20 @@ use crate::plan::{Plan, PressStep, RunLimits, Step};
 use crate::surface::Surface;
 
 /// Acceleration assumed for estimates, mm/s². A choice of this project, far below what a haptic robot reaches.
-pub const ASSUMED_ACCELERATION_MM_S2: f64 = 1000.0;
+pub(crate) const ASSUMED_ACCELERATION_MM_S2: f64 = 1000.0;
 /// A period must be this many times the estimated time of what happens in it.
-pub const FIT_RESERVE: f64 = 1.1;
+pub(crate) const FIT_RESERVE: f64 = 1.1;
 /// A deadline is this many times the estimate ...
-pub const DEADLINE_FACTOR: f64 = 3.0;
+pub(crate) const DEADLINE_FACTOR: f64 = 3.0;
 /// ... plus this, s.
-pub const DEADLINE_SLACK_S: f64 = 1.0;
+pub(crate) const DEADLINE_SLACK_S: f64 = 1.0;
 
 /// Speed of motions that are no step of the plan, mm/s: the controller's default; never more than the plan's own limit.
-pub const OWN_SPEED_MM_S: f64 = 20.0;
+pub(crate) const OWN_SPEED_MM_S: f64 = 20.0;
 
 /// Time of a straight motion from rest to rest, s.
 #[must_use]
-pub fn motion_s(distance_mm: f64, speed_mm_s: f64) -> f64 {
+pub(crate) fn motion_s(distance_mm: f64, speed_mm_s: f64) -> f64 {
     let ramp = speed_mm_s * speed_mm_s / ASSUMED_ACCELERATION_MM_S2;
     if distance_mm > ramp {
         distance_mm / speed_mm_s + speed_mm_s / ASSUMED_ACCELERATION_MM_S2

@@ -19,7 +19,7 @@ pub fn beside(path: &Path, ending: &str) -> PathBuf {
 
 /// A session and the files beside it are regular files: a pipe or a device may never end, or never begin. What is written beside a
 /// session is written there: a link in its place, in a folder from a stranger, would lead the writing to any other file.
-pub fn refuse_special_files(path: &Path) -> Result<(), RecorderError> {
+pub(crate) fn refuse_special_files(path: &Path) -> Result<(), RecorderError> {
     let not = |found: String| {
         Err(RecorderError::NotASession {
             path: path.to_owned(),
@@ -50,11 +50,11 @@ pub fn refuse_special_files(path: &Path) -> Result<(), RecorderError> {
 
 /// The last bytes of a journal that names a super-journal, the one file of a transaction over several databases
 /// (sqlite.org/fileformat.html section 3).
-pub const SUPER_JOURNAL_END: [u8; 8] = [0xd9, 0xd5, 0x05, 0xf9, 0x20, 0xa1, 0x63, 0xd7];
+pub(crate) const SUPER_JOURNAL_END: [u8; 8] = [0xd9, 0xd5, 0x05, 0xf9, 0x20, 0xa1, 0x63, 0xd7];
 
 /// Once SQLite has played a journal it deletes the super-journal that is named in it, which from a stranger may be any file of the
 /// user. A session is one database and no transaction of its own has a super-journal.
-pub fn refuse_super_journal(path: &Path) -> Result<(), RecorderError> {
+pub(crate) fn refuse_super_journal(path: &Path) -> Result<(), RecorderError> {
     // SQLite follows a link and looks beside the file itself.
     let file = std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
     let journal = beside(&file, "-journal");

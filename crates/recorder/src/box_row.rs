@@ -7,7 +7,7 @@ use crate::query::{Fault, int, named, num, text};
 
 /// The columns, null where a report has no such value.
 #[derive(Debug, Default)]
-pub struct BoxRow {
+pub(crate) struct BoxRow {
     pub taken_ns: i64,
     pub what: &'static str,
     pub box_us: Option<i64>,
@@ -68,7 +68,7 @@ impl BoxRow {
 }
 
 /// When a report was taken, and the report.
-pub fn report_from(row: &SqliteRow) -> Result<(HostTime, BoxReport), Fault> {
+pub(crate) fn report_from(row: &SqliteRow) -> Result<(HostTime, BoxReport), Fault> {
     let at = || {
         Ok::<_, Fault>(BoxTime {
             us: num(row, "box_us")?,

@@ -18,7 +18,7 @@
 use std::fmt;
 
 /// Longest chunk, bytes as they came: 256 MiB. Bounds the memory that a damaged file can ask for.
-pub const MAX_CHUNK_BYTES: usize = 1 << 28;
+pub(crate) const MAX_CHUNK_BYTES: usize = 1 << 28;
 
 const TIME_HIGH: u32 = 0x8;
 const TOKEN: u32 = 0xB;

@@ -147,7 +147,7 @@ const TABLES: [Table; 21] = [
 
 /// The digest of one table.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct TableDigest {
+pub(crate) struct TableDigest {
     pub name: String,
     pub rows: i64,
     pub sha256: [u8; 32],
@@ -171,7 +171,7 @@ struct Extent(i64, i64, [i64; 2]);
 
 /// The digests of all tables that the file's schema has. A value is hashed as one type byte (0 null, 1 integer, 2 real, 3 text, 4 blob)
 /// and its eight little-endian bytes, or its length in eight such bytes and its content.
-pub async fn digest_tables(conn: &mut SqliteConnection) -> Result<Vec<TableDigest>, Fault> {
+pub(crate) async fn digest_tables(conn: &mut SqliteConnection) -> Result<Vec<TableDigest>, Fault> {
     let mut digests = Vec::with_capacity(TABLES.len());
     for table in &TABLES {
         // A table that is missing from a sealed file is missed in the tree hash.
@@ -184,7 +184,7 @@ pub async fn digest_tables(conn: &mut SqliteConnection) -> Result<Vec<TableDiges
 }
 
 /// As [`digest_tables`], of an earlier state: from the rows that belonged to it.
-pub async fn digest_earlier(
+pub(crate) async fn digest_earlier(
     conn: &mut SqliteConnection,
     earlier: &Earlier<'_>,
 ) -> Result<Vec<TableDigest>, Fault> {
@@ -258,7 +258,7 @@ fn encode_row(row: &SqliteRow, bytes: &mut Vec<u8>) -> Result<(), Fault> {
 }
 
 /// SHA-256 over, for each table, its name, a zero byte, its row count in eight little-endian bytes, its digest.
-pub fn tree_of(digests: &[TableDigest]) -> [u8; 32] {
+pub(crate) fn tree_of(digests: &[TableDigest]) -> [u8; 32] {
     let mut hash = Sha256::new();
     for table in digests {
         hash.update(table.name.as_bytes());

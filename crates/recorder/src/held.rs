@@ -107,7 +107,7 @@ impl Held {
     /// Locks the log that SQLite has made since, and remembers its index.
     ///
     /// `Ok(false)` when another writer has it.
-    pub fn take_log(&mut self) -> std::io::Result<bool> {
+    pub(crate) fn take_log(&mut self) -> std::io::Result<bool> {
         let log = beside(&self.path, "-wal");
         if self.log.as_ref().map(|l| l.id) != FileId::at(&log) || self.log.is_none() {
             self.log = Locked::open(&log)?;
@@ -117,7 +117,7 @@ impl Held {
     }
 
     /// SQLite is about to remove the log.
-    pub fn without_log(&mut self) {
+    pub(crate) fn without_log(&mut self) {
         (self.log, self.index) = (None, None);
     }
 
@@ -156,7 +156,7 @@ impl Held {
 
     /// Where the session file lies now, and where a copy of it could be put: beside its old place, in the nearest folder above that is
     /// still there, or in the system's folder for temporary files.
-    pub fn refuge(&self) -> Refuge {
+    pub(crate) fn refuge(&self) -> Refuge {
         let name = self.path.file_name().unwrap_or_default().to_string_lossy();
         let stem = name
             .strip_suffix(SESSION_SUFFIX)
@@ -217,7 +217,7 @@ impl Drop for Held {
 
 /// Where a session that was moved or removed while it was written can be kept.
 #[derive(Debug, Clone)]
-pub struct Refuge {
+pub(crate) struct Refuge {
     /// Where the file lies now; nowhere when it was removed.
     pub place: Option<PathBuf>,
     /// Where a copy may be put, the best place first. No file is there.
@@ -316,7 +316,7 @@ mod byte {
     }
 
     /// Whether another handle has the lock.
-    pub fn is_locked(file: &File) -> bool {
+    pub(crate) fn is_locked(file: &File) -> bool {
         let mut found = of_kind(libc::F_WRLCK);
         fcntl(file, FcntlArg::F_OFD_GETLK(&mut found)).is_ok()
             && libc::c_int::from(found.l_type) != libc::F_UNLCK

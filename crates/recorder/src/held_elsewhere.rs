@@ -16,12 +16,12 @@ impl Held {
     }
 
     /// Holds nothing.
-    pub fn take_log(&mut self) -> std::io::Result<bool> {
+    pub(crate) fn take_log(&mut self) -> std::io::Result<bool> {
         Ok(true)
     }
 
     /// Nothing to let go.
-    pub fn without_log(&mut self) {}
+    pub(crate) fn without_log(&mut self) {}
 
     /// Never finds anything.
     ///
@@ -32,7 +32,7 @@ impl Held {
     }
 
     /// No place is known.
-    pub fn refuge(&self) -> Refuge {
+    pub(crate) fn refuge(&self) -> Refuge {
         Refuge {
             place: None,
             copies: Vec::new(),
@@ -50,7 +50,7 @@ impl Held {
 
 /// Where a session that was moved or removed while it was written can be kept.
 #[derive(Debug, Clone)]
-pub struct Refuge {
+pub(crate) struct Refuge {
     /// Where the file lies now; nowhere when it was removed.
     pub place: Option<PathBuf>,
     /// Where a copy may be put, the best place first.

@@ -55,7 +55,7 @@ impl Journal {
     }
 
     /// True when so much was written since the last commit that one is due.
-    pub const fn commit_due(&self) -> bool {
+    pub(crate) const fn commit_due(&self) -> bool {
         self.pending_bytes >= COMMIT_BYTES || self.pending_records >= COMMIT_RECORDS
     }
 
@@ -497,7 +497,7 @@ impl Journal {
     }
 
     /// Final counts, when the session is complete enough to be sealed: (what is needed, what there is) otherwise.
-    pub async fn sealable(&mut self) -> Result<Result<SessionTotals, (String, String)>, Fault> {
+    pub(crate) async fn sealable(&mut self) -> Result<Result<SessionTotals, (String, String)>, Fault> {
         let ends: i64 = sqlx::query_scalar("SELECT count(*) FROM run_end")
             .fetch_one(&mut self.conn)
             .await?;

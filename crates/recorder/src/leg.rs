@@ -6,7 +6,7 @@ use crate::error::RecorderError;
 
 /// Where a leg's clocks and chunk numbers go on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Joint {
+pub(crate) struct Joint {
     /// Added to every host time, ns.
     pub origin_ns: i64,
     /// Added to every time on a camera's clock, µs.
@@ -17,7 +17,7 @@ pub struct Joint {
 
 /// The whole second that is one to two seconds after `last`, in units of which `per_second` are one; 0 without any. `None` beyond
 /// half of the range: no leg would fit behind it.
-pub fn next_second(last: Option<i64>, per_second: i64) -> Option<i64> {
+pub(crate) fn next_second(last: Option<i64>, per_second: i64) -> Option<i64> {
     let Some(last) = last else { return Some(0) };
     let next = (last.max(0) / per_second).checked_add(2)?;
     next.checked_mul(per_second).filter(|t| *t <= i64::MAX / 2)

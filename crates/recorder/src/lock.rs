@@ -23,7 +23,7 @@ const OTHER: &str = "another process";
 
 /// Held by whoever writes a session, for as long as it does. The file goes away with it.
 #[derive(Debug)]
-pub struct WriterLock {
+pub(crate) struct WriterLock {
     path: PathBuf,
     file: File,
     session: PathBuf,
@@ -90,7 +90,7 @@ impl WriterLock {
     ///
     /// # Errors
     /// As [`take`](Self::take).
-    pub fn take_file(&mut self) -> Result<(), RecorderError> {
+    pub(crate) fn take_file(&mut self) -> Result<(), RecorderError> {
         self.hold(Instant::now())
     }
 
@@ -114,7 +114,7 @@ impl WriterLock {
     ///
     /// # Errors
     /// As [`take`](Self::take).
-    pub fn take_log(&mut self) -> Result<(), RecorderError> {
+    pub(crate) fn take_log(&mut self) -> Result<(), RecorderError> {
         let Some(held) = &mut self.held else {
             return Ok(());
         };
@@ -149,7 +149,7 @@ impl WriterLock {
     }
 
     /// Where a session that is not can be kept.
-    pub fn refuge(&self) -> Refuge {
+    pub(crate) fn refuge(&self) -> Refuge {
         let nowhere = Refuge {
             place: None,
             copies: Vec::new(),
@@ -173,7 +173,7 @@ impl WriterLock {
     }
 
     /// SQLite is about to remove the log.
-    pub fn without_log(&mut self) {
+    pub(crate) fn without_log(&mut self) {
         if let Some(held) = &mut self.held {
             held.without_log();
         }
@@ -182,13 +182,13 @@ impl WriterLock {
 
 impl WriterLock {
     /// Announces that the session is being sealed, for which it must be open nowhere else: whoever wants to read it waits.
-    pub fn announce_sealing(&mut self) {
+    pub(crate) fn announce_sealing(&mut self) {
         // At the end of what the holder wrote about itself. Unannounced, sealing takes its chance among the readers.
         let _ = write!(self.file, "{SEALING}");
     }
 
     /// Readers need not wait any longer.
-    pub fn withdraw_sealing(&mut self) {
+    pub(crate) fn withdraw_sealing(&mut self) {
         let _ = self.file.set_len(0);
         let _ = self.file.seek(SeekFrom::Start(0));
         let _ = write!(self.file, "process {}", std::process::id());
@@ -196,7 +196,7 @@ impl WriterLock {
 }
 
 /// Whether the session at `session` is being sealed now.
-pub fn is_being_sealed(session: &Path) -> bool {
+pub(crate) fn is_being_sealed(session: &Path) -> bool {
     writer_of(session).is_some_and(|by| by.ends_with(SEALING))
 }
 

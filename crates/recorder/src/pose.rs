@@ -3,7 +3,7 @@
 use skinrig_model::{HostTime, Point3, PoseSample, Skin};
 
 /// Bytes of one sample.
-pub const SAMPLE_BYTES: usize = 64;
+pub(crate) const SAMPLE_BYTES: usize = 64;
 
 /// Appends `sample` to `data`.
 pub fn encode(sample: &PoseSample, data: &mut Vec<u8>) {

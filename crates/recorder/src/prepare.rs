@@ -69,7 +69,7 @@ pub fn run(shared: &Arc<Shared>, mut preparer: Preparer) {
 
 /// What is remembered from record to record.
 #[derive(Debug, Default)]
-pub struct Preparer {
+pub(crate) struct Preparer {
     /// How the cameras' bytes encode events; known from the run's header on.
     pub formats: Option<[StreamFormat; 2]>,
     /// The next chunk of each camera.
@@ -80,7 +80,7 @@ pub struct Preparer {
 
 impl Preparer {
     /// One that goes on with a session: how its cameras' bytes encode events, and the next chunk of each.
-    pub fn resuming(formats: [StreamFormat; 2], next_seq: [u64; 2]) -> Self {
+    pub(crate) fn resuming(formats: [StreamFormat; 2], next_seq: [u64; 2]) -> Self {
         Self {
             formats: Some(formats),
             next_seq,

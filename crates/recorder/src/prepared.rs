@@ -19,14 +19,14 @@ pub enum Ready {
 
 impl Ready {
     /// Whether it must be on the disk before the caller goes on.
-    pub fn is_durable(&self) -> bool {
+    pub(crate) fn is_durable(&self) -> bool {
         matches!(self, Self::Record(record) if is_durable(record))
     }
 }
 
 /// A row of `chunk`, and the rows of `trigger_edge` that belong to it.
 #[derive(Debug)]
-pub struct PreparedChunk {
+pub(crate) struct PreparedChunk {
     pub camera: CameraId,
     pub seq: i64,
     pub host_time: HostTime,
@@ -51,13 +51,13 @@ pub struct PreparedChunk {
 
 /// A row of `gap`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct PreparedGap {
+pub(crate) struct PreparedGap {
     pub from_us: Option<i64>,
     pub to_us: Option<i64>,
 }
 
 /// Whether a record must be on the disk before the caller goes on.
-pub fn is_durable(record: &Record) -> bool {
+pub(crate) fn is_durable(record: &Record) -> bool {
     matches!(
         record,
         Record::Started(_) | Record::Intent { .. } | Record::Outcome(_) | Record::Ended { .. }

@@ -61,7 +61,7 @@ impl Fault {
 }
 
 /// Calls `each` for every row, one at a time.
-pub async fn each_row(
+pub(crate) async fn each_row(
     query: sqlx::query::Query<'_, Sqlite, SqliteArguments>,
     conn: &mut SqliteConnection,
     mut each: impl FnMut(&SqliteRow) -> Result<(), Fault>,
@@ -79,7 +79,7 @@ pub fn int(row: &SqliteRow, column: &str) -> Result<i64, Fault> {
 }
 
 /// An integer column that may be null.
-pub fn opt_int(row: &SqliteRow, column: &str) -> Result<Option<i64>, Fault> {
+pub(crate) fn opt_int(row: &SqliteRow, column: &str) -> Result<Option<i64>, Fault> {
     Ok(row.try_get(column)?)
 }
 
@@ -91,7 +91,7 @@ pub fn num<T: TryFrom<i64>>(row: &SqliteRow, column: &str) -> Result<T, Fault> {
 }
 
 /// An integer column that must fit `T` or be null.
-pub fn opt_num<T: TryFrom<i64>>(row: &SqliteRow, column: &str) -> Result<Option<T>, Fault> {
+pub(crate) fn opt_num<T: TryFrom<i64>>(row: &SqliteRow, column: &str) -> Result<Option<T>, Fault> {
     opt_int(row, column)?.map(|_| num(row, column)).transpose()
 }
 
@@ -101,12 +101,12 @@ pub fn real(row: &SqliteRow, column: &str) -> Result<f64, Fault> {
 }
 
 /// A real column that may be null.
-pub fn opt_real(row: &SqliteRow, column: &str) -> Result<Option<f64>, Fault> {
+pub(crate) fn opt_real(row: &SqliteRow, column: &str) -> Result<Option<f64>, Fault> {
     Ok(row.try_get(column)?)
 }
 
 /// Whether the file has this table: sessions of an older schema lack the later ones.
-pub async fn has_table(conn: &mut SqliteConnection, name: &str) -> Result<bool, Fault> {
+pub(crate) async fn has_table(conn: &mut SqliteConnection, name: &str) -> Result<bool, Fault> {
     let row =
         sqlx::query("SELECT count(*) AS n FROM sqlite_schema WHERE type = 'table' AND name = ?")
             .bind(name)
@@ -116,7 +116,7 @@ pub async fn has_table(conn: &mut SqliteConnection, name: &str) -> Result<bool, 
 }
 
 /// A real column that may be null, and that sessions of an older schema do not have.
-pub fn later_real(row: &SqliteRow, column: &str) -> Result<Option<f64>, Fault> {
+pub(crate) fn later_real(row: &SqliteRow, column: &str) -> Result<Option<f64>, Fault> {
     match row.try_get(column) {
         Err(sqlx::Error::ColumnNotFound(_)) => Ok(None),
         other => Ok(other?),
@@ -124,7 +124,7 @@ pub fn later_real(row: &SqliteRow, column: &str) -> Result<Option<f64>, Fault> {
 }
 
 /// A text column that older schemas do not have.
-pub fn later_text(row: &SqliteRow, column: &str) -> Result<Option<String>, Fault> {
+pub(crate) fn later_text(row: &SqliteRow, column: &str) -> Result<Option<String>, Fault> {
     match row.try_get(column) {
         Err(sqlx::Error::ColumnNotFound(_)) => Ok(None),
         other => Ok(other?),
@@ -137,7 +137,7 @@ pub fn text(row: &SqliteRow, column: &str) -> Result<String, Fault> {
 }
 
 /// A text column that may be null.
-pub fn opt_text(row: &SqliteRow, column: &str) -> Result<Option<String>, Fault> {
+pub(crate) fn opt_text(row: &SqliteRow, column: &str) -> Result<Option<String>, Fault> {
     Ok(row.try_get(column)?)
 }
 
@@ -175,7 +175,7 @@ pub fn named<T: Copy>(
 }
 
 /// The schema that the file was made with.
-pub async fn schema_version(conn: &mut SqliteConnection) -> Result<u32, Fault> {
+pub(crate) async fn schema_version(conn: &mut SqliteConnection) -> Result<u32, Fault> {
     let version = sqlx::query("PRAGMA user_version").fetch_one(conn).await?;
     num(&version, "user_version")
 }

@@ -166,7 +166,7 @@ impl Shared {
     }
 
     /// The next record to prepare, with its bytes; `None` when there will be no more.
-    pub fn next_to_prepare(&self) -> Option<(Record, usize)> {
+    pub(crate) fn next_to_prepare(&self) -> Option<(Record, usize)> {
         let mut queue = self.lock();
         loop {
             if let Some(next) = queue.accepted.pop_front() {
@@ -250,22 +250,22 @@ impl Shared {
     }
 
     /// How long sealing waits for other programs.
-    pub fn seal_patience(&self) -> Duration {
+    pub(crate) fn seal_patience(&self) -> Duration {
         self.lock().seal_patience.unwrap_or(SEAL_PATIENCE)
     }
 
     /// Sets that time.
-    pub fn set_seal_patience(&self, patience: Duration) {
+    pub(crate) fn set_seal_patience(&self, patience: Duration) {
         self.lock().seal_patience = Some(patience);
     }
 
     /// Another program keeps the session from being sealed; that is waited for.
-    pub fn held_open(&self) {
+    pub(crate) fn held_open(&self) {
         self.lock().held_open = true;
     }
 
     /// Whether one does.
-    pub fn is_held_open(&self) -> bool {
+    pub(crate) fn is_held_open(&self) -> bool {
         self.lock().held_open
     }
 

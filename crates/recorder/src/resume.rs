@@ -15,7 +15,7 @@ use crate::verify::{ChunkScanner, VerifyReport, verify};
 use crate::{chain, schema};
 
 /// What the writer of a leg needs to know.
-pub struct Begun {
+pub(crate) struct Begun {
     /// Which leg it is.
     pub number: u32,
     pub joint: Joint,
@@ -23,7 +23,7 @@ pub struct Begun {
 }
 
 /// Locks a session that can go on, and checks all of it: what is not what was recorded is never sealed anew. Nothing changes.
-pub fn lock_unfinished(
+pub(crate) fn lock_unfinished(
     path: &Path,
     scanner: &mut dyn ChunkScanner,
 ) -> Result<WriterLock, RecorderError> {
@@ -52,7 +52,7 @@ fn is_completed(reader: &SessionReader) -> Result<bool, RecorderError> {
 }
 
 /// Locks a session that has its end and no seal, or half a one, and checks all of it; nothing changes.
-pub fn lock_unsealed(
+pub(crate) fn lock_unsealed(
     path: &Path,
     scanner: &mut dyn ChunkScanner,
 ) -> Result<WriterLock, RecorderError> {
@@ -85,7 +85,7 @@ fn check(path: &Path, scanner: &mut dyn ChunkScanner) -> Result<VerifyReport, Re
 }
 
 /// Opens an unsealed session for writing.
-pub async fn open_again(path: &Path) -> Result<SqliteConnection, RecorderError> {
+pub(crate) async fn open_again(path: &Path) -> Result<SqliteConnection, RecorderError> {
     let mut conn = schema::open_again(path).await?;
     let fault = |fault: Fault| fault.at(path, "opening it again");
     clear_seal(&mut conn).await.map_err(fault)?;

@@ -18,7 +18,7 @@ use crate::query::{Fault, each_row};
 pub const SCHEMA_VERSION: u32 = 10;
 
 /// `skrg` in ASCII (`PRAGMA application_id`).
-pub const APPLICATION_ID: u32 = u32::from_be_bytes(*b"skrg");
+pub(crate) const APPLICATION_ID: u32 = u32::from_be_bytes(*b"skrg");
 
 /// Every migration, oldest first: version, description and SQL. Written out: the macro that reads the folder would build SQLite a
 /// second time, for the compiler.
@@ -104,7 +104,7 @@ pub async fn create(path: &Path) -> Result<SqliteConnection, RecorderError> {
 }
 
 /// Makes a new, empty file.
-pub fn create_file(path: &Path) -> Result<(), RecorderError> {
+pub(crate) fn create_file(path: &Path) -> Result<(), RecorderError> {
     refuse_special_files(path)?;
     match File::create_new(path) {
         Ok(_) => Ok(()),
@@ -139,7 +139,7 @@ async fn new_file(path: &Path) -> sqlx::Result<SqliteConnection> {
 
 /// A new file with the schema of an older version of skinrig.
 #[cfg(test)]
-pub async fn create_version(path: &Path, version: u32) -> sqlx::Result<SqliteConnection> {
+pub(crate) async fn create_version(path: &Path, version: u32) -> sqlx::Result<SqliteConnection> {
     File::create_new(path)?;
     let mut conn = new_file(path).await?;
     let first = MIGRATOR.iter().take(version as usize).cloned().collect();
@@ -157,7 +157,7 @@ fn writable(path: &Path) -> SqliteConnectOptions {
 }
 
 /// Opens an existing session for writing, in the journal mode that it is in: a sealed one is in rollback mode.
-pub async fn open_again(path: &Path) -> Result<SqliteConnection, RecorderError> {
+pub(crate) async fn open_again(path: &Path) -> Result<SqliteConnection, RecorderError> {
     refuse_super_journal(path)?;
     allow_writing(path).map_err(|source| RecorderError::Io {
         path: path.to_owned(),
@@ -179,7 +179,7 @@ pub async fn migrate(all: &mut Transaction<'_, Sqlite>) -> Result<(), Fault> {
 }
 
 /// From here on a write-ahead log, as in a new session.
-pub async fn log_ahead(conn: &mut SqliteConnection) -> Result<(), Fault> {
+pub(crate) async fn log_ahead(conn: &mut SqliteConnection) -> Result<(), Fault> {
     let mode: String = sqlx::query_scalar("PRAGMA journal_mode = WAL")
         .fetch_one(&mut *conn)
         .await?;
@@ -278,7 +278,7 @@ async fn check_schema(conn: &mut SqliteConnection) -> Result<bool, Fault> {
 }
 
 /// Whether no row was ever written: nothing but the schema is there.
-pub async fn is_blank(conn: &mut SqliteConnection) -> Result<bool, Fault> {
+pub(crate) async fn is_blank(conn: &mut SqliteConnection) -> Result<bool, Fault> {
     let sql =
         "SELECT NOT EXISTS (SELECT 1 FROM session) AND NOT EXISTS (SELECT 1 FROM robot_from_skin)
            AND NOT EXISTS (SELECT 1 FROM press) AND NOT EXISTS (SELECT 1 FROM attempt)

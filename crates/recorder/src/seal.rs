@@ -17,7 +17,7 @@ use crate::rows::SessionTotals;
 
 /// Writes the rows of the seal, with a placeholder for the file hash, in one transaction.
 /// Returns (tree hash, placeholder).
-pub async fn write_rows(
+pub(crate) async fn write_rows(
     conn: &mut SqliteConnection,
     totals: &SessionTotals,
 ) -> Result<([u8; 32], [u8; 32]), Fault> {
@@ -65,7 +65,7 @@ pub async fn write_rows(
 }
 
 /// What stands in the seal until the file hash is known.
-pub fn placeholder_of(tree: &[u8; 32]) -> [u8; 32] {
+pub(crate) fn placeholder_of(tree: &[u8; 32]) -> [u8; 32] {
     let mut hash = Sha256::new();
     hash.update(b"skinrig: the file hash goes here");
     hash.update(tree);
@@ -73,7 +73,7 @@ pub fn placeholder_of(tree: &[u8; 32]) -> [u8; 32] {
 }
 
 /// The page of table `seal`, from 1.
-pub async fn seal_page(conn: &mut SqliteConnection) -> Result<u32, Fault> {
+pub(crate) async fn seal_page(conn: &mut SqliteConnection) -> Result<u32, Fault> {
     let row =
         sqlx::query("SELECT rootpage FROM sqlite_schema WHERE type = 'table' AND name = 'seal'")
             .fetch_one(conn)
@@ -96,7 +96,7 @@ pub fn stamp(path: &Path, page: u32, placeholder: &[u8; 32]) -> std::io::Result<
 
 /// How far the file hash was written that covers every byte of the file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Stamp {
+pub(crate) enum Stamp {
     /// All of it, and the file is what it covers.
     Whole,
     /// Sealing was cut off before or while it was written: the placeholder, or the first bytes of the hash and then those of the
@@ -109,7 +109,7 @@ pub enum Stamp {
 }
 
 /// Holds the file hash `recorded` on page `page` against the file, whose tree hash is recorded as `tree`.
-pub fn check_stamp(
+pub(crate) fn check_stamp(
     path: &Path,
     page: u32,
     recorded: &[u8; 32],

@@ -63,7 +63,7 @@ pub async fn totals(conn: &mut SqliteConnection) -> Result<SessionTotals, Fault>
 }
 
 /// As [`totals`], of an earlier state that had so many pose blocks.
-pub async fn totals_before(
+pub(crate) async fn totals_before(
     conn: &mut SqliteConnection,
     earlier: &Earlier<'_>,
     pose_blocks: i64,

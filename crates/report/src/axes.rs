@@ -28,7 +28,7 @@ pub fn ticks(low: f64, high: f64, wanted: u32) -> Vec<f64> {
 
 /// Writes a tick with as many decimals as the distance `step` between ticks needs.
 #[must_use]
-pub fn tick_label(value: f64, step: f64) -> String {
+pub(crate) fn tick_label(value: f64, step: f64) -> String {
     let digits = if step > 0.0 {
         (-step.log10().floor()).max(0.0) as usize
     } else {
@@ -72,7 +72,7 @@ impl Scale {
 
     /// Pixels per data unit, positive.
     #[must_use]
-    pub fn per_unit(&self) -> f64 {
+    pub(crate) fn per_unit(&self) -> f64 {
         ((self.px.1 - self.px.0) / (self.data.1 - self.data.0)).abs()
     }
 }
@@ -109,7 +109,7 @@ impl Axes {
     }
 
     /// Draws grid, the given ticks (value and text) and labels.
-    pub fn draw_with(&self, svg: &mut Svg, xs: &[(f64, String)], ys: &[(f64, String)]) {
+    pub(crate) fn draw_with(&self, svg: &mut Svg, xs: &[(f64, String)], ys: &[(f64, String)]) {
         let (left, right) = (self.x.px.0.min(self.x.px.1), self.x.px.0.max(self.x.px.1));
         let (top, bottom) = (self.y.px.0.min(self.y.px.1), self.y.px.0.max(self.y.px.1));
         svg.open("g", &[("class", &"axes")]);

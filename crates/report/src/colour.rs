@@ -16,14 +16,14 @@ const VIRIDIS: [[u8; 3]; 9] = [
 
 /// The colour at `share` of the scale (0..=1, clamped: the scale's ends are labelled as such), `#rrggbb`.
 #[must_use]
-pub fn viridis(share: f64) -> String {
+pub(crate) fn viridis(share: f64) -> String {
     let [r, g, b] = viridis_rgb(share);
     format!("#{r:02x}{g:02x}{b:02x}")
 }
 
 /// [`viridis`] as red, green and blue.
 #[must_use]
-pub fn viridis_rgb(share: f64) -> [u8; 3] {
+pub(crate) fn viridis_rgb(share: f64) -> [u8; 3] {
     let share = if share.is_finite() {
         share.clamp(0.0, 1.0)
     } else {

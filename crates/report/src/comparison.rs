@@ -6,7 +6,7 @@ use skinrig_analysis::result::{Analysis, Estimate, ReductionRow, Thinning};
 use crate::published::{MSOWS, Metric};
 
 /// The factor of the published comparison.
-pub const FACTOR: u32 = 1024;
+pub(crate) const FACTOR: u32 = 1024;
 
 /// What a session says about one quantity.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]

@@ -16,7 +16,7 @@ pub fn counts(press: &PressResult) -> bool {
 
 /// Euclidean length of the error vector, mm; `None` without truth or estimate, or when it is not finite.
 #[must_use]
-pub fn error_norm_mm(press: &PressResult) -> Option<f64> {
+pub(crate) fn error_norm_mm(press: &PressResult) -> Option<f64> {
     press
         .error_mm()
         .map(|(x, y)| x.hypot(y))
@@ -25,7 +25,7 @@ pub fn error_norm_mm(press: &PressResult) -> Option<f64> {
 
 /// The 95 % interval of a value with this standard error: 1.96 of them to either side (normal).
 #[must_use]
-pub fn interval_95(value: f64, standard_error: f64) -> (f64, f64) {
+pub(crate) fn interval_95(value: f64, standard_error: f64) -> (f64, f64) {
     let half = 1.96 * standard_error;
     (value - half, value + half)
 }
@@ -93,7 +93,7 @@ fn spread_mm(presses: &[&PressResult]) -> Option<f64> {
 
 /// The errors of all presses that [`counts`], ascending, mm.
 #[must_use]
-pub fn sorted_errors_mm(analysis: &Analysis) -> Vec<f64> {
+pub(crate) fn sorted_errors_mm(analysis: &Analysis) -> Vec<f64> {
     let mut errors: Vec<f64> = analysis
         .presses
         .iter()
@@ -173,7 +173,7 @@ pub fn disagreement(analysis: &Analysis) -> Option<String> {
 /// Says so when the presses were located with another camera geometry than the settings ask for: the nominal one, or that of
 /// a smaller model. `None` without presses.
 #[must_use]
-pub fn geometry_note(analysis: &Analysis) -> Option<String> {
+pub(crate) fn geometry_note(analysis: &Analysis) -> Option<String> {
     use skinrig_model::CalibrationModel::{Auto, None as Nominal};
     let asked = analysis.settings.calibration;
     if analysis.presses.is_empty() {
@@ -216,7 +216,7 @@ pub fn onsets_ms(latency: &Latency) -> Vec<f64> {
 
 /// 5th, 50th and 95th percentile of [`onsets_ms`], ms; `None` without any.
 #[must_use]
-pub fn onset_percentiles(latency: &Latency) -> Option<(f64, f64, f64)> {
+pub(crate) fn onset_percentiles(latency: &Latency) -> Option<(f64, f64, f64)> {
     let onsets = onsets_ms(latency);
     Some((
         quantile(&onsets, 0.05)?,

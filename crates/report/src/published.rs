@@ -7,31 +7,31 @@
 use serde::Serialize;
 
 /// Localisation RMSE without reduction, mm (section 3.1).
-pub const RMSE_MM: f64 = 4.66;
+pub(crate) const RMSE_MM: f64 = 4.66;
 /// The same along x, mm (section 3.1).
-pub const RMSE_X_MM: f64 = 4.17;
+pub(crate) const RMSE_X_MM: f64 = 4.17;
 /// The same along y, mm (section 3.1).
-pub const RMSE_Y_MM: f64 = 3.28;
+pub(crate) const RMSE_Y_MM: f64 = 3.28;
 /// Mean standard deviation between repetitions, mm (section 3.1).
-pub const REPEAT_STD_MM: f64 = 2.85;
+pub(crate) const REPEAT_STD_MM: f64 = 2.85;
 /// RMSE at 1024-fold reduction, mm (abstract).
-pub const RMSE_1024_MM: f64 = 9.33;
+pub(crate) const RMSE_1024_MM: f64 = 9.33;
 /// Pass rate without reduction (section 3.1), and at 1024-fold reduction (abstract).
 pub const PASS_RATE: (f64, f64) = (0.95, 0.85);
 /// Area of the skin, area seen by both cameras, probed area, mm² (section 3.1).
-pub const AREAS_MM2: [f64; 3] = [9328.0, 8763.0, 4620.0];
+pub(crate) const AREAS_MM2: [f64; 3] = [9328.0, 8763.0, 4620.0];
 /// Effective taxels over the sensor and over the probed area, without reduction (table "MSOWS").
-pub const TAXELS: (f64, f64) = (105.0, 46.0);
+pub(crate) const TAXELS: (f64, f64) = (105.0, 46.0);
 /// Width of the 5-95 % interval of the onsets, ms: without reduction, and at 1024-fold reduction (section 3.2).
 pub const LATENCY_WIDTH_MS: (f64, f64) = (31.0, 113.0);
 /// False alarms per second at that (section 3.2).
-pub const FALSE_ALARMS_PER_S: (f64, f64) = (0.13, 1.86);
+pub(crate) const FALSE_ALARMS_PER_S: (f64, f64) = (0.13, 1.86);
 /// Share of trials detected at that: the target without reduction, what was reached at 1024 (section 3.2).
-pub const DETECTED_RATE: (f64, f64) = (0.95, 0.88);
+pub(crate) const DETECTED_RATE: (f64, f64) = (0.95, 0.88);
 
 /// A remark below a comparison.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Footnote {
+pub(crate) struct Footnote {
     /// Its mark.
     pub mark: &'static str,
     /// The remark.
@@ -39,7 +39,7 @@ pub struct Footnote {
 }
 
 /// What the published numbers do not agree on, and what is known of the reason.
-pub const FOOTNOTES: [Footnote; 7] = [
+pub(crate) const FOOTNOTES: [Footnote; 7] = [
     Footnote {
         mark: "a",
         text: "The published RMSE along x and y (4.17, 3.28 mm) add up to 5.31 mm in quadrature, not to 4.66 mm.",
@@ -76,7 +76,7 @@ pub const FOOTNOTES: [Footnote; 7] = [
 
 /// One row of the published comparison with the multitouch soft optical waveguide skin (table "MSOWS").
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct MsowsRow {
+pub(crate) struct MsowsRow {
     /// Which quantity.
     pub metric: Metric,
     /// Lo Preti et al. 2022, as given in the paper.
@@ -169,7 +169,7 @@ const fn row(
 }
 
 /// Table "MSOWS" of the paper; `–` where it has no value. The pass rates are those of its abstract and section 3.
-pub const MSOWS: [MsowsRow; 16] = [
+pub(crate) const MSOWS: [MsowsRow; 16] = [
     row(
         Metric::Sensor,
         "24 emitters, 24 receivers",
@@ -224,7 +224,7 @@ pub struct Skin {
 }
 
 /// The paper's table of tactile localisation technologies.
-pub const SKINS: [Skin; 7] = [
+pub(crate) const SKINS: [Skin; 7] = [
     Skin {
         name: "impedance tomography sheet",
         source: "Chen et al. 2025",
@@ -319,7 +319,7 @@ const fn sensor(
 }
 
 /// The paper's overview table of optical tactile sensors.
-pub const SENSORS: [Sensor; 10] = [
+pub(crate) const SENSORS: [Sensor; 10] = [
     sensor(
         "Force-EvT",
         "Guo et al. 2024",

@@ -11,11 +11,11 @@ use std::fmt::{self, Display, Write};
 use skinrig_model::text::visible;
 
 /// Style of the figures: classes and theme variables, light by default.
-pub const FIGURE_CSS: &str = include_str!("../assets/frame/figure.css");
+pub(crate) const FIGURE_CSS: &str = include_str!("../assets/frame/figure.css");
 
 /// [`FIGURE_CSS`] with every `var(--name)` replaced by its light value, for programs that know no variables.
 #[must_use]
-pub fn plain_css() -> String {
+pub(crate) fn plain_css() -> String {
     let mut css = FIGURE_CSS.to_owned();
     let block = FIGURE_CSS.split(['{', '}']).nth(1).unwrap_or("");
     for (name, value) in block.split(';').filter_map(|d| d.split_once(':')) {
@@ -51,7 +51,7 @@ impl Write for Escaping<'_> {
 
 /// A coordinate with two decimals and no trailing zeros; non-finite values become 0 so that no file breaks.
 #[derive(Debug, Clone, Copy)]
-pub struct Px(pub f64);
+pub(crate) struct Px(pub f64);
 
 impl Display for Px {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

@@ -185,7 +185,7 @@ impl Finding<'_> {
     }
 
     /// What to do next, when there is something to say.
-    pub fn maybe_help(self, text: Option<String>) -> Self {
+    pub(crate) fn maybe_help(self, text: Option<String>) -> Self {
         match text {
             Some(text) => self.help(text),
             None => self,
@@ -227,7 +227,7 @@ impl Collector {
     }
 
     /// Moves the findings in source `from` to the same bytes of source `to`.
-    pub fn move_findings(&mut self, from: usize, to: usize) {
+    pub(crate) fn move_findings(&mut self, from: usize, to: usize) {
         for (span, diagnostic) in &mut self.found {
             if span.source == from {
                 span.source = to;

@@ -116,7 +116,7 @@ impl Field {
 
     /// The flag.
     #[must_use]
-    pub fn as_flag(&self) -> Option<bool> {
+    pub(crate) fn as_flag(&self) -> Option<bool> {
         match self.value {
             Value::Flag(flag) => Some(flag),
             _ => None,

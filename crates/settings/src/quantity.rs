@@ -287,7 +287,7 @@ fn expectation(wanted: &[Dimension]) -> String {
 }
 
 /// The number at the start of `text` and what follows it, without spaces between.
-pub fn split_number(text: &str) -> (Option<f64>, &str) {
+pub(crate) fn split_number(text: &str) -> (Option<f64>, &str) {
     let bytes = text.as_bytes();
     let digits = |from: usize| {
         let mut at = from;

@@ -36,16 +36,16 @@ const BIASES: [(&str, i64, i64, i64); 6] = [
 const CHANNELS: [u8; 3] = [0, 6, 7];
 
 /// Temperature of a simulated camera that no fault heats, °C.
-pub const TEMPERATURE_C: f64 = 35.0;
+pub(crate) const TEMPERATURE_C: f64 = 35.0;
 
 /// Rates of the pattern that a simulated camera makes, events per second.
 const PATTERN_RATES_EV_S: std::ops::RangeInclusive<f64> = 1.0..=50e6;
 
 /// Makes the pixel model for the n-th start of a camera; `None` when there are no pixels at this level.
-pub type PixelFactory = Box<dyn Fn(u64) -> Option<Box<dyn PixelModel>> + Send>;
+pub(crate) type PixelFactory = Box<dyn Fn(u64) -> Option<Box<dyn PixelModel>> + Send>;
 
 /// A simulated event camera.
-pub struct SimCamera {
+pub(crate) struct SimCamera {
     shared: Shared,
     id: CameraId,
     serial: String,

@@ -62,7 +62,7 @@ impl<C: Clock> Clock for Paced<C> {
 }
 
 /// A boxed clock is a clock, so that the clock of a finished rig can be paced too.
-pub struct Boxed(pub Box<dyn Clock>);
+pub(crate) struct Boxed(pub Box<dyn Clock>);
 
 impl Clock for Boxed {
     fn now(&self) -> HostTime {

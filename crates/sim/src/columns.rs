@@ -9,7 +9,7 @@ const BORDERS: usize = SENSOR_WIDTH as usize + 1;
 
 /// The lens as a table: the viewing angle at each column border, degrees, skew included.
 #[derive(Debug, Clone)]
-pub struct ColumnTable {
+pub(crate) struct ColumnTable {
     camera: CameraModel,
     angles: Vec<f64>,
 }
@@ -40,7 +40,7 @@ impl ColumnTable {
     /// The columns of the points of a square of `side_mm` about `centre`. Points outside the field of view are
     /// NaN.
     #[must_use]
-    pub fn footprint(&self, centre: Point2, side_mm: f64) -> Vec<f64> {
+    pub(crate) fn footprint(&self, centre: Point2, side_mm: f64) -> Vec<f64> {
         let at = |k: usize| ((k as f64 + 0.5) / SIDE as f64 - 0.5) * side_mm;
         let mut columns = Vec::with_capacity(SIDE * SIDE);
         for i in 0..SIDE {
@@ -54,7 +54,7 @@ impl ColumnTable {
 
     /// Columns per mm across the line of sight at `p`; 0 outside the field of view.
     #[must_use]
-    pub fn columns_per_mm(&self, p: Point2) -> f64 {
+    pub(crate) fn columns_per_mm(&self, p: Point2) -> f64 {
         let Some(u) = self.column(p) else { return 0.0 };
         let k = (u as usize).min(BORDERS - 2);
         let per_radian = 1.0 / (self.angles[k + 1] - self.angles[k]).to_radians();

@@ -27,7 +27,7 @@ impl DriftingClock {
 
     /// The device's time at world time `t_ns`, µs.
     #[must_use]
-    pub const fn own_us(&self, t_ns: i64) -> u64 {
+    pub(crate) const fn own_us(&self, t_ns: i64) -> u64 {
         let passed = t_ns - self.epoch_ns;
         let ns = self.origin_ns + passed + self.gained_ns(passed);
         if ns < 0 { 0 } else { ns as u64 / 1_000 }
@@ -50,7 +50,7 @@ impl DriftingClock {
     /// How much world time a span of the device's time takes, ns; for spans short enough that the drift's square does
     /// not count.
     #[must_use]
-    pub const fn world_ns(&self, own_ns: i64) -> i64 {
+    pub(crate) const fn world_ns(&self, own_ns: i64) -> i64 {
         own_ns - self.gained_ns(own_ns)
     }
 

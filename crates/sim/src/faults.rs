@@ -171,22 +171,22 @@ pub enum MarkFate {
 }
 
 /// How late a delayed mark arrives, ns.
-pub const DELAY_NS: i64 = 20_000_000;
+pub(crate) const DELAY_NS: i64 = 20_000_000;
 /// How long a force spike lasts, ns.
-pub const SPIKE_NS: i64 = 50_000_000;
+pub(crate) const SPIKE_NS: i64 = 50_000_000;
 /// How high it is, N: more than the robot can push.
-pub const SPIKE_N: f64 = 20.0;
+pub(crate) const SPIKE_N: f64 = 20.0;
 /// How fast the true height leaves the reported one, mm/s: slow enough for the skin's viscous force to stay small.
-pub const HEIGHT_OFF_MM_S: f64 = 10.0;
+pub(crate) const HEIGHT_OFF_MM_S: f64 = 10.0;
 /// How many pixels take part in a storm.
 pub const STORM_PIXELS: u16 = 40;
 /// Events of each of them per millisecond.
 pub const STORM_PER_MS: i64 = 20;
 /// How long a storm lasts, ns.
-pub const STORM_NS: i64 = 300_000_000;
+pub(crate) const STORM_NS: i64 = 300_000_000;
 /// How much hotter a camera grows, °C.
-pub const HOT_C: f64 = 40.0;
+pub(crate) const HOT_C: f64 = 40.0;
 /// How long it takes to grow so hot, and to cool down again, ns.
-pub const HOT_RISE_NS: i64 = 1_000_000_000;
+pub(crate) const HOT_RISE_NS: i64 = 1_000_000_000;
 /// How long it stays so hot, ns.
-pub const HOT_NS: i64 = 6_000_000_000;
+pub(crate) const HOT_NS: i64 = 6_000_000_000;

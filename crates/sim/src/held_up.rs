@@ -7,7 +7,7 @@ use crate::faults::{Fault, When};
 use crate::world::Shared;
 
 /// The clock of a rig whose host is slow at times.
-pub struct HeldUp {
+pub(crate) struct HeldUp {
     shared: Shared,
     faults: Vec<(When, u32)>,
 }

@@ -9,7 +9,7 @@ use crate::world::{Shared, World};
 use skinrig_device::limits;
 
 /// The simulated robot: like an omega.3, with force sensing that a real one only estimates.
-pub struct SimIndenter {
+pub(crate) struct SimIndenter {
     shared: Shared,
     serial: String,
     workspace_mm: ([f64; 3], [f64; 3]),

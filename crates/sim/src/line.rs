@@ -11,7 +11,7 @@ use crate::faults::{DELAY_NS, Fault, MarkFate};
 use crate::random::{Purpose, Stream};
 
 /// The channel that the trigger box is wired to.
-pub const TRIGGER_CHANNEL: u8 = 0;
+pub(crate) const TRIGGER_CHANNEL: u8 = 0;
 
 /// An edge on a camera's trigger input, on world time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -123,7 +123,7 @@ impl Line {
     }
 
     /// From now on edges of both cameras are lost, doubled and invented.
-    pub const fn get_noisy(&mut self) {
+    pub(crate) const fn get_noisy(&mut self) {
         let noise = Noise {
             lost: 20.0,
             doubled: 20.0,
@@ -133,7 +133,7 @@ impl Line {
     }
 
     /// Fault `n` meets the next mark.
-    pub fn doom(&mut self, n: usize, fate: MarkFate) {
+    pub(crate) fn doom(&mut self, n: usize, fate: MarkFate) {
         if !self.done.contains(&n) {
             self.done.push(n);
             self.doomed.push_back(fate);
@@ -164,7 +164,7 @@ impl Line {
 
     /// Until when the line is taken, when it is at world time `now_ns`.
     #[must_use]
-    pub fn busy_until(&self, now_ns: i64) -> Option<i64> {
+    pub(crate) fn busy_until(&self, now_ns: i64) -> Option<i64> {
         (now_ns < self.busy_until_ns).then_some(self.busy_until_ns)
     }
 

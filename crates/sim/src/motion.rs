@@ -105,7 +105,7 @@ impl Motion {
 
     /// True between [`power_on`](Self::power_on) and [`power_off`](Self::power_off).
     #[must_use]
-    pub const fn is_powered(&self) -> bool {
+    pub(crate) const fn is_powered(&self) -> bool {
         self.powered
     }
 
@@ -121,7 +121,7 @@ impl Motion {
 
     /// True when the set point does not move.
     #[must_use]
-    pub fn is_at_rest(&self) -> bool {
+    pub(crate) fn is_at_rest(&self) -> bool {
         self.set_velocity == [0.0; 3]
     }
 

@@ -24,7 +24,7 @@ pub enum Purpose {
 
 /// The seed of a stream: `seed` and purpose mixed (SplitMix64's finaliser), `index` tells instances apart.
 #[must_use]
-pub const fn derive_seed(seed: u64, purpose: Purpose, index: u64) -> u64 {
+pub(crate) const fn derive_seed(seed: u64, purpose: Purpose, index: u64) -> u64 {
     let mut z = seed
         .wrapping_add((purpose as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15))
         .wrapping_add(index.wrapping_mul(0xd1b5_4a32_d192_ed03));
@@ -63,7 +63,7 @@ impl Stream {
 
     /// Mean 0, standard deviation 1: the sum of four uniform numbers. Close to normal, never beyond 3.47, and
     /// made without transcendental functions.
-    pub fn gauss(&mut self) -> f64 {
+    pub(crate) fn gauss(&mut self) -> f64 {
         let b = self.bits();
         let sum = (b & 0xffff) + ((b >> 16) & 0xffff) + ((b >> 32) & 0xffff) + (b >> 48);
         // Sum of four uniform integers 0..=65535: mean 2 * 65535, variance 4 (65536^2 - 1) / 12.

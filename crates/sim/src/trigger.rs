@@ -16,7 +16,7 @@ use crate::world::Shared;
 const NOISE_EVERY_NS: i64 = 1_000_000_000;
 
 /// A simulated trigger box.
-pub struct SimTriggerBox {
+pub(crate) struct SimTriggerBox {
     shared: Shared,
     config: TriggerBoxConfig,
     serial: String,

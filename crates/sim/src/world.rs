@@ -178,14 +178,14 @@ impl World {
 
     /// True once `when` has come.
     #[must_use]
-    pub fn has_struck(&self, when: When) -> bool {
+    pub(crate) fn has_struck(&self, when: When) -> bool {
         self.struck_at(when)
             .is_some_and(|t| t <= self.grid * GRID_NS)
     }
 
     /// The instant of `when` on world time, ns, when it is known already.
     #[must_use]
-    pub fn struck_at(&self, when: When) -> Option<i64> {
+    pub(crate) fn struck_at(&self, when: When) -> Option<i64> {
         match when {
             When::At(t) => Some(t.0),
             When::Contact(n) => self.contact_times.get(n as usize).copied(),
@@ -206,7 +206,7 @@ impl World {
     }
 
     /// Sets the force at which the robot stops by itself, N.
-    pub const fn set_force_limit(&mut self, limit_n: f64) {
+    pub(crate) const fn set_force_limit(&mut self, limit_n: f64) {
         self.force_limit_n = limit_n;
     }
 
@@ -240,7 +240,7 @@ impl World {
     }
 
     /// Takes all samples that nobody has taken yet.
-    pub fn take_samples(&mut self, out: &mut Vec<RobotSample>) {
+    pub(crate) fn take_samples(&mut self, out: &mut Vec<RobotSample>) {
         out.extend(self.samples.drain(..));
     }
 
@@ -260,14 +260,14 @@ impl World {
     }
 
     /// Camera `index` needs no more tips.
-    pub fn unwatch(&mut self, index: usize) {
+    pub(crate) fn unwatch(&mut self, index: usize) {
         self.wanted[index] = None;
         self.forget();
     }
 
     /// The tips from grid index `from` to the present, both included; marks them as seen by camera
     /// `index`, which next time begins with the last of them.
-    pub fn tips_since(&mut self, index: usize, from: i64, out: &mut Vec<TipSample>) {
+    pub(crate) fn tips_since(&mut self, index: usize, from: i64, out: &mut Vec<TipSample>) {
         out.clear();
         let skip = usize::try_from(from - self.tips_from).unwrap_or(0);
         out.extend(self.tips.iter().skip(skip));

@@ -40,7 +40,7 @@ pub(super) struct Scan {
 
 impl Reader {
     /// Of a sensor whose pixels are counted one by one.
-    pub fn of_pixels(can: &CameraCapabilities) -> Self {
+    pub(crate) fn of_pixels(can: &CameraCapabilities) -> Self {
         let geometry = Geometry {
             width: can.width,
             height: can.height,
@@ -50,7 +50,7 @@ impl Reader {
     }
 
     /// Of events that come in the order of a scan over `columns` and `rows`, which need not be the sensor's.
-    pub fn of_scan(can: &CameraCapabilities, columns: u16, rows: u16) -> Self {
+    pub(crate) fn of_scan(can: &CameraCapabilities, columns: u16, rows: u16) -> Self {
         let scan = Scan {
             columns: columns.into(),
             rows: rows.into(),
@@ -62,7 +62,7 @@ impl Reader {
     }
 
     /// Of the stream alone.
-    pub fn of_time(can: &CameraCapabilities) -> Self {
+    pub(crate) fn of_time(can: &CameraCapabilities) -> Self {
         Self::new(can, Geometry::ANY, Vec::new(), None)
     }
 

@@ -91,7 +91,7 @@ pub const fn repeats(suite: &Suite, measure: &Measure) -> RepeatRule {
 /// Checks that must be good, when they are part of the night, before this one may move the arm: one that does not take its
 /// orders does not move in free air, and one that does not bound its force does not press.
 #[must_use]
-pub const fn relies_on(measure: &Measure) -> &'static [&'static str] {
+pub(crate) const fn relies_on(measure: &Measure) -> &'static [&'static str] {
     match measure {
         Measure::Repeatability { .. }
         | Measure::StepResponse { .. }

@@ -120,7 +120,7 @@ impl<'a> Streams<'a> {
 
     /// Whether this camera still streams.
     #[must_use]
-    pub fn is_live(&self, camera: CameraId) -> bool {
+    pub(crate) fn is_live(&self, camera: CameraId) -> bool {
         self.cameras[camera.index()].trouble.is_none()
     }
 
@@ -132,7 +132,7 @@ impl<'a> Streams<'a> {
 
     /// Whether everything that came from the box could be read, and the box says that it told everything.
     #[must_use]
-    pub fn box_was_heard_well(&self) -> bool {
+    pub(crate) fn box_was_heard_well(&self) -> bool {
         self.box_trouble.is_none() && self.box_noise.is_none()
     }
 

@@ -10,7 +10,7 @@ use crate::result::{Analysis, Fault, Finding, Law, RateSeries};
 /// Largest plausible rate difference between two clocks, ppm: the tolerance that Ethernet allows a crystal
 /// (IEEE 802.3, 100BASE-X: 125 MHz within 100 ppm). Crystals on boards are sold within 10 to 50 ppm, so that even
 /// two of them at opposite ends stay below.
-pub const MOST_DRIFT_PPM: f64 = 100.0;
+pub(crate) const MOST_DRIFT_PPM: f64 = 100.0;
 /// A drift counts as above the bound when this many standard errors are left.
 const SIGMAS: f64 = 3.0;
 /// An alignment needs this many presses with times (`clock::fit_rates`).
@@ -53,7 +53,7 @@ pub fn findings(input: &SessionInput, analysis: &Analysis) -> Vec<Finding> {
 }
 
 /// True when the busiest hundredth of the session stands out of the median by Poisson noise.
-pub fn has_bursts(series: &RateSeries) -> bool {
+pub(crate) fn has_bursts(series: &RateSeries) -> bool {
     let counts = series
         .mean_per_s
         .iter()

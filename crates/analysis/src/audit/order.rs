@@ -3,7 +3,7 @@
 use crate::result::{Fault, Finding};
 
 /// The findings that do not follow from a more certain one, the most certain first.
-pub fn leading_first(mut found: Vec<Finding>) -> Vec<Finding> {
+pub(crate) fn leading_first(mut found: Vec<Finding>) -> Vec<Finding> {
     found.sort_by_key(|f| (place(f.fault), !f.invalidates));
     let mut kept: Vec<Finding> = Vec::new();
     for finding in found {

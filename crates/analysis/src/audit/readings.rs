@@ -17,7 +17,7 @@ use crate::result::Fault;
 /// Most presses that readings are compared on; of more, every n-th.
 const MOST_PRESSES: usize = 600;
 /// Largest shift of the press list that is looked for.
-pub const MOST_SHIFT: i32 = 5;
+pub(crate) const MOST_SHIFT: i32 = 5;
 /// What a displacement that is itself fitted costs, nats: two parameters that may be anywhere on the skin.
 const FREE_DISPLACEMENT: f64 = 4.0;
 /// Most that the sync presses say against a reading, nats per camera: they are one place, and may be badly seen.
@@ -116,7 +116,7 @@ impl<'a> Path<'a> {
     }
 
     /// The session as it is.
-    pub fn as_it_is(&self) -> Reading {
+    pub(crate) fn as_it_is(&self) -> Reading {
         Reading {
             fault: None,
             words: "as it is".to_owned(),
@@ -177,7 +177,7 @@ impl<'a> Path<'a> {
     }
 
     /// The positions of a table that is in `frame`.
-    pub fn in_frame(&self, frame: &Frame) -> Reading {
+    pub(crate) fn in_frame(&self, frame: &Frame) -> Reading {
         let base = self.as_it_is();
         Reading {
             fault: Some(frame.fault),
@@ -201,7 +201,7 @@ impl<'a> Path<'a> {
     }
 
     /// The planned positions, where the measured ones are others.
-    pub fn as_planned(&self) -> Reading {
+    pub(crate) fn as_planned(&self) -> Reading {
         Reading {
             fault: Some(Fault::RobotOff),
             words: "the planned positions in place of the measured ones".to_owned(),

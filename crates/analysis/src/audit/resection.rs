@@ -32,7 +32,7 @@ type Vector = SVector<f64, PARAMETERS>;
 
 /// A camera fitted to what it saw.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Resection {
+pub(crate) struct Resection {
     /// The fitted camera.
     pub camera: CameraModel,
     /// How far it is from the drawn one: x and y (mm), skew (degrees), W, share of the field of view.
@@ -45,7 +45,7 @@ pub struct Resection {
 }
 
 /// Fits `drawn` to the pairs, which count as many times as there are `places`. `None` with fewer than 3 pairs.
-pub fn resect(drawn: &CameraModel, pairs: &[(f64, Point2)], places: usize) -> Option<Resection> {
+pub(crate) fn resect(drawn: &CameraModel, pairs: &[(f64, Point2)], places: usize) -> Option<Resection> {
     if pairs.len() < 3 {
         return None;
     }
@@ -90,13 +90,13 @@ pub fn residuals(camera: &CameraModel, pairs: &[(f64, Point2)]) -> Vec<f64> {
 }
 
 /// Viewing angle of `column` minus that of `at`, degrees within ±180.
-pub fn residual_deg(camera: &CameraModel, column: f64, at: Point2) -> f64 {
+pub(crate) fn residual_deg(camera: &CameraModel, column: f64, at: Point2) -> f64 {
     let off = camera.angle_of_column_deg(column) - camera.angle_of_point_deg(at);
     off - 360.0 * (off / 360.0).round()
 }
 
 /// Robust standard deviation about 0, degrees.
-pub fn spread_deg(residuals: &[f64]) -> Option<f64> {
+pub(crate) fn spread_deg(residuals: &[f64]) -> Option<f64> {
     let usual = median(residuals.iter().map(|r| r.abs()).collect())?;
     let spread = MEDIAN_TO_SIGMA * usual;
     spread.is_finite().then(|| spread.max(LEAST_SPREAD_DEG))

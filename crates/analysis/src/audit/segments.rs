@@ -17,7 +17,7 @@ const LEAST_GAIN_PER_PRESS: f64 = 0.3;
 
 /// The rest of a session, from a press on, that is shifted.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ShiftedRest {
+pub(crate) struct ShiftedRest {
     /// The first press of the path that is, counted from 0.
     pub from: usize,
     /// How many rows on the position of each of its presses stands.
@@ -28,7 +28,7 @@ pub struct ShiftedRest {
 
 /// Looks for a shift that begins within the session and stays to its end, in the streams of `cameras`, with the cameras of
 /// `as_is`.
-pub fn shifted_rest(path: &Path<'_>, as_is: &Judged<'_>, cameras: &[usize]) -> Option<ShiftedRest> {
+pub(crate) fn shifted_rest(path: &Path<'_>, as_is: &Judged<'_>, cameras: &[usize]) -> Option<ShiftedRest> {
     let n = path.touches.len();
     let shifts: Vec<i32> = (-MOST_SHIFT..=MOST_SHIFT).collect();
     let loss = |i: usize, by: i32| -> f64 {

@@ -25,7 +25,7 @@ pub struct Folds {
 
 impl Folds {
     /// Deals the locations to folds of equal size, in an order drawn from `seed`.
-    pub fn deal(sights: &[Sight], seed: u64) -> Self {
+    pub(crate) fn deal(sights: &[Sight], seed: u64) -> Self {
         let mut locations: Vec<u32> = sights.iter().map(|s| s.location).collect();
         locations.sort_unstable();
         locations.dedup();
@@ -49,7 +49,7 @@ impl Folds {
     }
 
     /// How many locations every fit has at least.
-    pub fn least_kept(&self) -> usize {
+    pub(crate) fn least_kept(&self) -> usize {
         self.least_kept
     }
 
@@ -58,7 +58,7 @@ impl Folds {
     /// Every fold starts from `start` and from `full`, the solution for all presses. `full` has seen the held-out ones,
     /// but only the fold's own presses decide which end is better, and bound the last fit. On a planted noisy set the
     /// folds end where searches with all starts, without `full`, end (tested below).
-    pub fn held_out_errors(
+    pub(crate) fn held_out_errors(
         &self,
         sights: &[Sight],
         start: &StereoGeometry,
@@ -103,7 +103,7 @@ fn fitted(
 
 /// Mean of `a - b` over presses, and its standard error when whole locations are the independent units (ratio
 /// estimator: locations may have different numbers of presses); `None` with fewer than two locations.
-pub fn mean_difference(locations: &[u32], a: &[f64], b: &[f64]) -> (f64, Option<f64>) {
+pub(crate) fn mean_difference(locations: &[u32], a: &[f64], b: &[f64]) -> (f64, Option<f64>) {
     let mut rows: Vec<(u32, f64)> = locations
         .iter()
         .zip(a.iter().zip(b))

@@ -42,7 +42,7 @@ impl Difference {
     }
 
     /// The other model is better by more than noise explains.
-    pub fn is_significant(&self) -> bool {
+    pub(crate) fn is_significant(&self) -> bool {
         self.ratio() > self.needed
     }
 }
@@ -91,7 +91,7 @@ impl<'a> Losses<'a> {
     }
 
     /// How much `a` errs more than `b`, by more than noise explains or not. `None` with fewer than two locations.
-    pub fn clearly_worse(&self, a: &[f64], b: &[f64]) -> Option<Difference> {
+    pub(crate) fn clearly_worse(&self, a: &[f64], b: &[f64]) -> Option<Difference> {
         self.difference(a, b, CLEARLY_WORSE)
     }
 
@@ -126,7 +126,7 @@ pub struct Step {
 /// The choice among nested models, smallest first: the smallest is taken in hand; each larger one in turn replaces it if it
 /// errs less by more than noise explains, at a level that all comparisons share (Bonferroni). `errors_mm[i]`: those of model i at locations left out of its fit; `None` where
 /// it could not be validated. Returns the model in hand at the end and, of each model that was compared, with what.
-pub fn climb(
+pub(crate) fn climb(
     losses: &Losses<'_>,
     errors_mm: &[Option<&[f64]>],
 ) -> Option<(usize, Vec<Option<Step>>)> {

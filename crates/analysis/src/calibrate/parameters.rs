@@ -4,7 +4,7 @@ use nalgebra::SVector;
 use skinrig_model::{CalibrationModel, StereoGeometry};
 
 /// Two positions, two skews, two distortions, two scales of the field of view.
-pub const PARAMETERS: usize = 10;
+pub(crate) const PARAMETERS: usize = 10;
 
 /// All parameters; a nested model moves only the first 4, 6, 8 or 10.
 pub type Parameters = SVector<f64, PARAMETERS>;
@@ -25,7 +25,7 @@ pub const NAMES: [&str; PARAMETERS] = [
 
 /// Largest perturbation of a start: mm for positions, degrees for skews, 1 for distortions and scales. About the half
 /// widths of the public code's search box (positions 5 to 10 mm, skews 5 degrees, W 1).
-pub const SPREAD: [f64; PARAMETERS] = [8.0, 8.0, 8.0, 8.0, 4.0, 4.0, 0.4, 0.4, 0.1, 0.1];
+pub(crate) const SPREAD: [f64; PARAMETERS] = [8.0, 8.0, 8.0, 8.0, 4.0, 4.0, 0.4, 0.4, 0.1, 0.1];
 
 /// A solution further than this from the start is not a calibration of this rig, mm.
 const FARTHEST_MM: f64 = 60.0;
@@ -66,7 +66,7 @@ pub const fn model_name(model: CalibrationModel) -> &'static str {
 }
 
 /// (x1, y1, x2, y2, skew 1, skew 2, W 1, W 2, scale 1, scale 2); the scales of a geometry are relative to itself: 1.
-pub fn parameters_of(geometry: &StereoGeometry) -> Parameters {
+pub(crate) fn parameters_of(geometry: &StereoGeometry) -> Parameters {
     let [a, b] = &geometry.cameras;
     Parameters::from([
         a.position.x_mm,
@@ -83,7 +83,7 @@ pub fn parameters_of(geometry: &StereoGeometry) -> Parameters {
 }
 
 /// `base` with these parameters.
-pub fn with_parameters(base: &StereoGeometry, p: &Parameters) -> StereoGeometry {
+pub(crate) fn with_parameters(base: &StereoGeometry, p: &Parameters) -> StereoGeometry {
     let mut geometry = *base;
     for (k, camera) in geometry.cameras.iter_mut().enumerate() {
         camera.position.x_mm = p[2 * k];
@@ -97,7 +97,7 @@ pub fn with_parameters(base: &StereoGeometry, p: &Parameters) -> StereoGeometry 
 
 /// True when `p` can be a calibration of the rig that was drawn as `base`: positions within 60 mm of it, skews below
 /// 45 degrees, lenses in the range in which they are monotone.
-pub fn is_plausible(base: &StereoGeometry, p: &Parameters) -> bool {
+pub(crate) fn is_plausible(base: &StereoGeometry, p: &Parameters) -> bool {
     let start = parameters_of(base);
     let geometry = with_parameters(base, p);
     p.iter().all(|v| v.is_finite())

@@ -51,7 +51,7 @@ impl Eye {
 }
 
 /// Both cameras at given parameters.
-pub struct Eyes([Eye; 2]);
+pub(crate) struct Eyes([Eye; 2]);
 
 impl Eyes {
     /// `base` at its own parameters.
@@ -65,7 +65,7 @@ impl Eyes {
     }
 
     /// Estimate minus truth, mm; `None` where the rays do not meet in front of both cameras.
-    pub fn error_vector(&self, sight: &Sight) -> Option<[f64; 2]> {
+    pub(crate) fn error_vector(&self, sight: &Sight) -> Option<[f64; 2]> {
         let d = [0, 1].map(|k| self.0[k].ray(sight.columns[k]).1);
         self.error_of(sight, &self.meet(d))
     }

@@ -30,7 +30,7 @@ pub struct Descent {
 }
 
 /// Goes downhill from `from`.
-pub fn minimise(problem: &Problem<'_>, from: Parameters) -> Descent {
+pub(crate) fn minimise(problem: &Problem<'_>, from: Parameters) -> Descent {
     let mut at = from;
     let mut here = problem.normal(&at);
     let mut scale = Parameters::repeat(0.0);

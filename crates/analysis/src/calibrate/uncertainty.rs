@@ -17,7 +17,7 @@ const LEAST_LEFT: f64 = 1e-9;
 
 /// What the data say about the parameters.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Uncertainty {
+pub(crate) struct Uncertainty {
     /// Directions that are determined.
     pub rank: usize,
     /// Condition number of the Jacobian with columns scaled to unit length, when all are.

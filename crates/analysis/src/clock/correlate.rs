@@ -46,7 +46,7 @@ fn product(a: Complex, b: Complex) -> Complex {
 }
 
 /// One series, transformed once, to be correlated with several templates.
-pub struct Correlator {
+pub(crate) struct Correlator {
     transformed: Vec<Complex>,
     roots: Vec<Complex>,
     length: usize,
@@ -74,7 +74,7 @@ impl Correlator {
     /// For each of two templates the lag (in `1 - template.len()..series.len()`) at which
     /// `sum series[i + lag] * template[i]` is largest, and that sum. Values outside the series count 0. Templates beyond
     /// the longest are cut.
-    pub fn best_lags(&self, templates: [&[f64]; 2]) -> [(i64, f64); 2] {
+    pub(crate) fn best_lags(&self, templates: [&[f64]; 2]) -> [(i64, f64); 2] {
         let templates = templates.map(|t| &t[..t.len().min(self.longest_template)]);
         // One transform does for both, as the parts of complex numbers: the series is real.
         let mut work = vec![(0.0, 0.0); self.transformed.len()];

@@ -4,7 +4,7 @@ use skinrig_model::Point2;
 
 /// The part of a convex polygon on the side of the line through `on` that `normal` points to, the line included. The
 /// result has fewer than three points where nothing is left.
-pub fn half_plane(polygon: &[Point2], on: Point2, normal: [f64; 2]) -> Vec<Point2> {
+pub(crate) fn half_plane(polygon: &[Point2], on: Point2, normal: [f64; 2]) -> Vec<Point2> {
     let side = |p: Point2| (p.x_mm - on.x_mm) * normal[0] + (p.y_mm - on.y_mm) * normal[1];
     let mut out = Vec::with_capacity(polygon.len() + 1);
     let next = polygon.iter().cycle().skip(1);

@@ -47,7 +47,7 @@ impl Clusters {
 impl Sighting {
     /// What the last run says, on bins of side `side_px`.
     #[must_use]
-    pub fn of_clusters(dbscan: &Dbscan, rule: CentroidRule, side_px: u16) -> Self {
+    pub(crate) fn of_clusters(dbscan: &Dbscan, rule: CentroidRule, side_px: u16) -> Self {
         let chosen = match rule {
             CentroidRule::LargestCluster => dbscan.largest().map(|(_, c)| c),
             CentroidRule::AllClusters => dbscan.clusters().iter().copied().reduce(Cluster::merged),

@@ -50,7 +50,7 @@ impl Sighting {
 
 /// An estimator with its buffers, to be used for press after press.
 #[derive(Debug, Clone)]
-pub struct PressEstimator(Kind);
+pub(crate) struct PressEstimator(Kind);
 
 #[derive(Debug, Clone)]
 enum Kind {

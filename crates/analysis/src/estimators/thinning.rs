@@ -23,7 +23,7 @@ impl Thinning {
 
     /// True when every event stays.
     #[must_use]
-    pub fn keeps_all(&self) -> bool {
+    pub(crate) fn keeps_all(&self) -> bool {
         self.limit == u64::MAX
     }
 
@@ -35,7 +35,7 @@ impl Thinning {
 
     /// The same for an event of a view.
     #[must_use]
-    pub fn keeps_at(&self, t_us: u64, x: u16, y: u16, on: bool) -> bool {
+    pub(crate) fn keeps_at(&self, t_us: u64, x: u16, y: u16, on: bool) -> bool {
         let pixel = u64::from(on) << 32 | u64::from(y) << 16 | u64::from(x);
         self.keeps_all() || mixed(mixed(self.key ^ t_us) ^ pixel) <= self.limit
     }

@@ -35,7 +35,7 @@ impl Grid {
 
     /// The middle of the bin at `index`, ms after the contact.
     #[must_use]
-    pub fn centre_ms(&self, index: usize, bin_ms: f64) -> f64 {
+    pub(crate) fn centre_ms(&self, index: usize, bin_ms: f64) -> f64 {
         ((self.first + index as i64) as f64 + 0.5) * bin_ms
     }
 

@@ -16,7 +16,7 @@ pub fn background_rate_per_s(events: u64, length_s: f64) -> f64 {
 /// A CUSUM: each bin with x counts adds the log-likelihood ratio of `alpha` times the background rate to the background
 /// rate, x ln(alpha) - (alpha - 1) lambda0 dt; the sum never falls below 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Cusum {
+pub(crate) struct Cusum {
     gain: f64,
     loss: f64,
     consecutive: usize,

@@ -87,7 +87,7 @@ impl Detector {
 
     /// Looks at the events of both cameras: all of them, or one in `factor`, chosen by `rng`.
     #[must_use]
-    pub fn look_at(
+    pub(crate) fn look_at(
         &self,
         label: Label,
         sights: &[Sight<'_>; 2],

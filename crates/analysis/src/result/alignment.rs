@@ -83,7 +83,7 @@ impl Alignment {
 impl Alignment {
     /// How far the piecewise map of camera `k` is from one line at a host time, µs; 0 without a map.
     #[must_use]
-    pub fn off_line_us(&self, k: usize, line: &ClockFit, host_us: f64) -> f64 {
+    pub(crate) fn off_line_us(&self, k: usize, line: &ClockFit, host_us: f64) -> f64 {
         let knots = &self.camera_from_host[k];
         if knots.len() < 2 {
             return 0.0;
@@ -180,7 +180,7 @@ pub struct ClockMap {
 impl ClockMap {
     /// What one line through two clocks says.
     #[must_use]
-    pub const fn of_line(map: MapName, fit: &ClockFit) -> Self {
+    pub(crate) const fn of_line(map: MapName, fit: &ClockFit) -> Self {
         Self {
             map,
             pieces: 1,

@@ -117,7 +117,7 @@ impl Fault {
 
     /// True when positions, cameras or rows are taken for others than they are.
     #[must_use]
-    pub const fn is_mistaken_identity(self) -> bool {
+    pub(crate) const fn is_mistaken_identity(self) -> bool {
         matches!(
             self,
             Self::CamerasSwapped

@@ -116,9 +116,9 @@ pub struct OffSensor {
 
 impl OffSensor {
     /// A larger share is a warning.
-    pub const WARNING_SHARE: f64 = 1e-4;
+    pub(crate) const WARNING_SHARE: f64 = 1e-4;
     /// With a larger share there is no analysis: the stream is another sensor's, or broken.
-    pub const MAX_SHARE: f64 = 0.01;
+    pub(crate) const MAX_SHARE: f64 = 0.01;
 
     /// The share of the events outside the sensor, 0 to 1.
     #[must_use]

@@ -21,7 +21,7 @@ const MOST_ERASED: u32 = 12;
 const LEAST_CONTRADICTED: u32 = 3;
 /// Edges are looked for within this of where anchors, and then trains, put them, µs. Edges of the same direction are at least
 /// 300 µs apart.
-pub const NEAR_US: [f64; 2] = [60.0, 25.0];
+pub(crate) const NEAR_US: [f64; 2] = [60.0, 25.0];
 /// An edge this soon after another of the same direction is its double, µs.
 const DOUBLE_US: u64 = 20;
 /// A train with fewer rising edges than this gives no instant.
@@ -31,7 +31,7 @@ const ANCHOR_FLOOR_US: f64 = 3.0;
 
 /// A camera's clock over the box's.
 #[derive(Debug, Clone, PartialEq)]
-pub struct CameraFromBox {
+pub(crate) struct CameraFromBox {
     /// The map, from box time to camera time, both relative to their references.
     pub map: Smooth,
     /// Camera time to which the map is relative, µs.
@@ -59,7 +59,7 @@ pub struct CameraFromBox {
 
 /// Trains that came, and not where any map that a clock may have puts them.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct OffLine {
+pub(crate) struct OffLine {
     /// How many.
     pub trains: u32,
     /// How far off at most, µs.
@@ -113,7 +113,7 @@ impl CameraFromBox {
 }
 
 /// From `at` to the nearest of `ties`, which ascend.
-pub fn distance_us(ties: &[f64], at: f64) -> f64 {
+pub(crate) fn distance_us(ties: &[f64], at: f64) -> f64 {
     let k = ties.partition_point(|t| *t < at);
     let near = &ties[k.saturating_sub(1)..(k + 1).min(ties.len())];
     near.iter()
@@ -121,7 +121,7 @@ pub fn distance_us(ties: &[f64], at: f64) -> f64 {
 }
 
 /// How far `at` is before the first or after the last of `ties`, which ascend; 0 between them.
-pub fn beyond_us(ties: &[f64], at: f64) -> f64 {
+pub(crate) fn beyond_us(ties: &[f64], at: f64) -> f64 {
     match (ties.first(), ties.last()) {
         (Some(first), Some(last)) => (first - at).max(at - last).max(0.0),
         _ => f64::INFINITY,

@@ -28,7 +28,7 @@ pub struct Sent {
 
 /// Reports between two resets.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Epoch {
+pub(crate) struct Epoch {
     /// The leg that it belongs to, 0 for the first.
     pub leg: usize,
     /// Box time to which all others are relative, µs.
@@ -41,7 +41,7 @@ pub struct Epoch {
 
 /// The epochs of a session in order; those without any train or exchange are left out. Every further leg begins with a reset at its
 /// origin.
-pub fn epochs(reports: &[BoxReport], legs: &[LegStart]) -> Vec<Epoch> {
+pub(crate) fn epochs(reports: &[BoxReport], legs: &[LegStart]) -> Vec<Epoch> {
     let mut leg = 0;
     let mut parts = Vec::new();
     for part in reports.split_inclusive(|r| matches!(r, BoxReport::Reset { .. })) {

@@ -10,7 +10,7 @@ const SIDES_PX: [u16; 5] = [1, 2, 4, 8, 16];
 /// Ends of the window after the contact, ms.
 const WINDOWS_MS: [f64; 5] = [10.0, 20.0, 50.0, 100.0, 200.0];
 /// Longer than any press: the window that only the release ends.
-pub const WHOLE_PRESS_MS: f64 = 60_000.0;
+pub(crate) const WHOLE_PRESS_MS: f64 = 60_000.0;
 
 /// How much of the kept rows is read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

@@ -17,7 +17,7 @@ use crate::sets::ScoreSet;
 use crate::untimed::{self, Untimed};
 
 /// A session whose presses can be located in many ways.
-pub struct Replay<'a> {
+pub(crate) struct Replay<'a> {
     input: &'a SessionInput,
     kept: &'a Kept,
     clocks: [ClockFit; 2],
@@ -94,7 +94,7 @@ impl<'a> Replay<'a> {
     }
 
     /// The windows of the rows that have one.
-    pub fn windows_by_row(
+    pub(crate) fn windows_by_row(
         &self,
         camera: CameraId,
         settings: &AnalysisSettings,
@@ -231,7 +231,7 @@ impl<'a> Replay<'a> {
 
     /// The rows of a region, per camera: those next to each other that hold most of what the calibrating presses
     /// add to the idle rate; of equal ones the first. The whole crop without calibrating presses.
-    pub fn region_rows(&self, settings: &AnalysisSettings, region: Region) -> [(u16, u16); 2] {
+    pub(crate) fn region_rows(&self, settings: &AnalysisSettings, region: Region) -> [(u16, u16); 2] {
         let parts = match region {
             Region::Full => return settings.crop_v,
             Region::Half => 2,

@@ -14,7 +14,7 @@ use skinrig_model::{AnalysisSettings, SkinOutline};
 const MOST_PRESSES: usize = 24;
 
 /// One way of locating, ready to be timed.
-pub struct Candidate {
+pub(crate) struct Candidate {
     pub settings: AnalysisSettings,
     pub geometry: StereoGeometry,
 }

@@ -136,7 +136,7 @@ pub enum ExportKind {
 impl ExportKind {
     /// Whether it holds tables.
     #[must_use]
-    pub const fn is_tabular(self) -> bool {
+    pub(crate) const fn is_tabular(self) -> bool {
         matches!(self, Self::Parquet | Self::Npz | Self::Csv)
     }
 }

@@ -72,7 +72,7 @@ impl Node {
     }
 
     /// Whether `user` may read and write.
-    pub fn is_open_to(&self, user: &User) -> bool {
+    pub(crate) fn is_open_to(&self, user: &User) -> bool {
         if user.uid == 0 {
             return true;
         }
@@ -103,7 +103,7 @@ impl Node {
     }
 
     /// Whether the file's own group may read and write.
-    pub const fn is_open_to_group(&self) -> bool {
+    pub(crate) const fn is_open_to_group(&self) -> bool {
         (self.mode >> 3) & READ_WRITE == READ_WRITE
     }
 }

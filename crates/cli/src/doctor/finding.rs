@@ -95,12 +95,12 @@ impl Check {
     }
 
     /// `why` takes the place of what was found.
-    pub fn not_checked(self, why: impl Into<String>) -> Finding {
+    pub(crate) fn not_checked(self, why: impl Into<String>) -> Finding {
         self.end(Verdict::NotChecked, why, None)
     }
 
     /// Not checked, and what would let it be.
-    pub fn not_checked_yet(self, why: impl Into<String>, next: impl Into<String>) -> Finding {
+    pub(crate) fn not_checked_yet(self, why: impl Into<String>, next: impl Into<String>) -> Finding {
         self.end(Verdict::NotChecked, why, Some(next.into()))
     }
 }

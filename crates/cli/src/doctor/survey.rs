@@ -44,7 +44,7 @@ impl Survey {
     }
 
     /// Looks for the library alone.
-    pub fn of_a_held_bench(rig: Option<&RigFile>) -> Self {
+    pub(crate) fn of_a_held_bench(rig: Option<&RigFile>) -> Self {
         let library = match load::load(rig.and_then(|r| r.robot.library.as_deref())) {
             Ok(loaded) => Library::Loaded {
                 version: loaded.version.to_string(),

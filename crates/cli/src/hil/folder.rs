@@ -14,9 +14,9 @@ pub const JSON: &str = "night.json";
 /// The page for people.
 pub const PAGE: &str = "night.html";
 /// The page of the nights up to this one.
-pub const TRENDS: &str = "trends.html";
+pub(crate) const TRENDS: &str = "trends.html";
 /// The results for programs that collect those of tests.
-pub const JUNIT: &str = "junit.xml";
+pub(crate) const JUNIT: &str = "junit.xml";
 /// Nights of one second, at most.
 const MOST: usize = 100;
 
@@ -76,7 +76,7 @@ pub fn write(folder: &Path, name: &str, text: &str) -> io::Result<()> {
 ///
 /// # Errors
 /// What the system answers.
-pub fn write_json(folder: &Path, night: &Night) -> io::Result<()> {
+pub(crate) fn write_json(folder: &Path, night: &Night) -> io::Result<()> {
     let text = serde_json::to_string_pretty(night).map_err(io::Error::other)?;
     write(folder, JSON, &(text + "\n"))
 }

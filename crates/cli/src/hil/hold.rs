@@ -13,7 +13,7 @@ use crate::exit::{Exit, Failure, Outcome};
 use crate::rig::bench;
 
 /// What it says once it holds the arm, before the place in the robot's frame, mm.
-pub const HOLDING: &str = "holding ";
+pub(crate) const HOLDING: &str = "holding ";
 /// Longer than this no drill waits for it.
 const AT_MOST: Duration = Duration::from_secs(120);
 /// Told to end, it retracts and brakes within this time, or ends as it is: the supervisor then brakes the arm.

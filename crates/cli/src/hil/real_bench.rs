@@ -15,7 +15,7 @@ use skinrig_protocol::rig::{CameraKind, RigFile, RigKind};
 use std::path::PathBuf;
 
 /// A bench with drivers behind it.
-pub struct RealBench {
+pub(crate) struct RealBench {
     pub(super) rig: RigFile,
     pub(super) folder: PathBuf,
     pub(super) operator: Operator,
@@ -67,7 +67,7 @@ impl RealBench {
     }
 
     /// Prints the lines of the rig file that accept what was let pass.
-    pub fn propose(&self) {
+    pub(crate) fn propose(&self) {
         self.tolerated.propose(&self.rig);
     }
 
@@ -76,7 +76,7 @@ impl RealBench {
     ///
     /// # Errors
     /// Why the first of them could not be opened.
-    pub fn take_rig(&mut self, protocol: &Protocol) -> Result<Rig, Trouble> {
+    pub(crate) fn take_rig(&mut self, protocol: &Protocol) -> Result<Rig, Trouble> {
         self.close();
         self.clock = RealClock::start();
         let mut settings = Vec::new();

@@ -30,7 +30,7 @@ const TIME_HIGH_EVERY_US: u64 = 64;
 type Item = Result<(Vec<u8>, ChunkFacts, Vec<TriggerEdge>), String>;
 
 /// Where the reading thread puts what it reads.
-pub struct ChunkFeed {
+pub(crate) struct ChunkFeed {
     queue: SyncSender<Item>,
     scanner: Scanner,
     encoder: Option<evt2::Encoder>,
@@ -122,7 +122,7 @@ impl ChunkFeed {
 }
 
 /// The camera.
-pub struct FileCamera {
+pub(crate) struct FileCamera {
     camera: CameraId,
     identity: DeviceIdentity,
     format: StreamFormat,

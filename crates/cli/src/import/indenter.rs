@@ -15,7 +15,7 @@ const POSE_RATE_HZ: i64 = 100;
 const POSE_PERIOD: HostDuration = HostDuration(1_000_000_000 / POSE_RATE_HZ);
 
 /// The scheduled indenter. Moves at exactly the commanded speed, without acceleration phases.
-pub struct ScheduledIndenter {
+pub(crate) struct ScheduledIndenter {
     clock: SimClock,
     from: Point3<Robot>,
     to: Point3<Robot>,

@@ -54,7 +54,7 @@ impl Log {
     }
 
     /// Writes where the tip was.
-    pub fn path_of_tip(&mut self, trace: &[PoseSample]) {
+    pub(crate) fn path_of_tip(&mut self, trace: &[PoseSample]) {
         for p in trace {
             let [x, y, z] = p.measured.to_array();
             let text = format!("{x:.3} {y:.3} {z:.3} mm {:.3} N", p.force_n);

@@ -26,7 +26,7 @@ pub enum Order {
 }
 
 /// What can be typed.
-pub const HELP: &str = "\
+pub(crate) const HELP: &str = "\
 x +1mm | y -0.5mm | z +10mm   move along one axis
 to 0 0 5 mm                   move straight to a point
 speed 5mm/s                   speed of the moves to come

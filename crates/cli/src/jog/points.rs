@@ -4,7 +4,7 @@ use skinrig_model::{Point3, Robot};
 
 /// A touched point.
 #[derive(Debug, Clone, PartialEq)]
-pub struct NamedPoint {
+pub(crate) struct NamedPoint {
     /// As the operator called it.
     pub name: String,
     /// Where it lies on the skin, mm, when the operator said so.

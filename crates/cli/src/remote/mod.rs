@@ -24,7 +24,7 @@ mod server {
     use super::{Reply, Request};
 
     /// Nothing listens.
-    pub struct Server;
+    pub(crate) struct Server;
 
     impl Server {
         /// # Errors

@@ -24,7 +24,7 @@ pub fn places(session: &Path) -> io::Result<[PathBuf; 2]> {
 }
 
 /// The folder of the user's own for sockets that cannot lie beside their session.
-pub fn own_folder() -> PathBuf {
+pub(crate) fn own_folder() -> PathBuf {
     PathBuf::from(format!("/tmp/skinrig-{}", me()))
 }
 
@@ -32,7 +32,7 @@ pub fn own_folder() -> PathBuf {
 ///
 /// # Errors
 /// When it cannot be made, or somebody else made it.
-pub fn make_own_folder() -> io::Result<()> {
+pub(crate) fn make_own_folder() -> io::Result<()> {
     let folder = own_folder();
     match fs::DirBuilder::new().mode(0o700).create(&folder) {
         Err(e) if e.kind() == io::ErrorKind::AlreadyExists => {}
@@ -57,7 +57,7 @@ fn me() -> u32 {
 ///
 /// # Errors
 /// A message for the stranger.
-pub fn check_peer(stream: &UnixStream, may: fn(u32, u32) -> bool) -> Result<(), String> {
+pub(crate) fn check_peer(stream: &UnixStream, may: fn(u32, u32) -> bool) -> Result<(), String> {
     #[cfg(target_os = "linux")]
     {
         let peer = rustix::net::sockopt::socket_peercred(stream)
@@ -77,12 +77,12 @@ pub fn check_peer(stream: &UnixStream, may: fn(u32, u32) -> bool) -> Result<(), 
 }
 
 /// Who may ask a run of `me`: its own user and root.
-pub const fn may_ask(peer: u32, me: u32) -> bool {
+pub(crate) const fn may_ask(peer: u32, me: u32) -> bool {
     peer == me || peer == 0
 }
 
 /// Whose run `me` may ask: its own, and root any.
-pub const fn may_answer(peer: u32, me: u32) -> bool {
+pub(crate) const fn may_answer(peer: u32, me: u32) -> bool {
     peer == me || me == 0
 }
 

@@ -22,7 +22,7 @@ const TRY_AGAIN: Duration = Duration::from_millis(100);
 
 /// Listens until it is dropped; the socket goes away with it.
 #[derive(Debug)]
-pub struct Server {
+pub(crate) struct Server {
     path: PathBuf,
     /// Device and inode of the socket, so that nobody else's is removed.
     id: (u64, u64),

@@ -6,9 +6,9 @@ use skinrig_controller::{Progress, State};
 use skinrig_model::CameraId;
 
 /// Longest request, bytes.
-pub const MOST_REQUEST_BYTES: usize = 16 * 1024;
+pub(crate) const MOST_REQUEST_BYTES: usize = 16 * 1024;
 /// Longest answer, bytes.
-pub const MOST_REPLY_BYTES: usize = 64 * 1024;
+pub(crate) const MOST_REPLY_BYTES: usize = 64 * 1024;
 /// Longest remark, characters.
 pub const MOST_NOTE_CHARS: usize = 2_000;
 /// Longest name of an operator, characters.

@@ -46,7 +46,7 @@ pub fn tolerate(rig: &mut RigFile) {
 
 /// Holds the plan of `protocol` within what the bench bears: the tighter limit holds, and a protocol that does not say
 /// how the surface is found takes the bench's way.
-pub fn tighten(protocol: &mut Protocol, rig: &RigFile) {
+pub(crate) fn tighten(protocol: &mut Protocol, rig: &RigFile) {
     let (limits, bench) = (&mut protocol.limits, &rig.limits);
     limits.max_speed_mm_s = limits.max_speed_mm_s.min(bench.max_speed_mm_s);
     limits.max_force_n = limits.max_force_n.min(bench.max_force_n);
@@ -131,7 +131,7 @@ pub(crate) fn refuse_without_sample(rig: &RigFile) -> Result<(), Failure> {
 }
 
 /// A pose this old still tells where a robot is that is moved by hand, or that shares a processor with everything else.
-pub const SLOW_STALE: HostDuration = HostDuration::from_millis(1_000);
+pub(crate) const SLOW_STALE: HostDuration = HostDuration::from_millis(1_000);
 
 /// So long may a run on stand-ins not look while the tip is low.
 pub(crate) const SLOW_LATE: HostDuration = HostDuration::from_millis(5_000);
@@ -193,7 +193,7 @@ fn geometry(rig: &RigFile, outline: SkinOutline) -> RigGeometry {
 ///
 /// # Errors
 /// [`Failure::rig`].
-pub fn open_robot(rig: &RigFile, clock: RealClock) -> Result<Box<dyn Indenter>, Failure> {
+pub(crate) fn open_robot(rig: &RigFile, clock: RealClock) -> Result<Box<dyn Indenter>, Failure> {
     Ok(Box::new(
         omega(omega_config(rig)?, clock).map_err(Failure::rig)?,
     ))

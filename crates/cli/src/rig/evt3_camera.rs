@@ -71,7 +71,7 @@ pub fn open(
 /// Where EVK1 are plugged in that can be opened: others leave them alone.
 #[cfg(feature = "evk4")]
 #[must_use]
-pub fn evk1_places() -> Vec<(u8, u8)> {
+pub(crate) fn evk1_places() -> Vec<(u8, u8)> {
     let found = skinrig_evk1::enumerate().unwrap_or_default();
     let ready = |f: &&skinrig_evk1::Found| matches!(f.state, skinrig_evk1::FoundState::Ready(_));
     found.iter().filter(ready).map(|f| f.address).collect()

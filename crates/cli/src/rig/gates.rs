@@ -17,7 +17,7 @@ const SIMULATED_WITHIN: HostDuration = HostDuration::from_millis(2_000);
 
 /// The preflight of a bench.
 #[must_use]
-pub fn of_bench(file: &RigFile, rig: &Rig, folder: &Path, expected_s: f64) -> Preflight {
+pub(crate) fn of_bench(file: &RigFile, rig: &Rig, folder: &Path, expected_s: f64) -> Preflight {
     let limits = &file.preflight;
     let mut made = vec![disk(
         folder,

@@ -35,7 +35,7 @@ pub fn simulated(
 
 /// The same rig for a further leg: its skin was pressed at these places before.
 #[must_use]
-pub fn simulated_after(
+pub(crate) fn simulated_after(
     protocol: &Protocol,
     level: SimLevel,
     seed: u64,
@@ -75,7 +75,7 @@ pub fn replayed(path: &Path, header: &RunHeader, document: &RigDocument) -> Resu
 }
 
 /// The operator of a recorded run, repeated: a clock that asks for the recorded stop or abort when its time comes.
-pub struct RepeatedOperator {
+pub(crate) struct RepeatedOperator {
     /// The replayed clock.
     pub clock: Box<dyn Clock>,
     /// When the recorded run was interrupted.

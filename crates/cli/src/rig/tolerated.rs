@@ -17,7 +17,7 @@ impl Tolerated {
     }
 
     /// Prints the lines of `rig` that accept what was let pass, when anything was.
-    pub fn propose(&self, rig: &RigFile) {
+    pub(crate) fn propose(&self, rig: &RigFile) {
         if let Some(lines) = self.lines(rig) {
             errln!(
                 "warning: mismatches of cameras were let pass. What is right for your cameras goes into {}; then run without --tolerant:\n{lines}",

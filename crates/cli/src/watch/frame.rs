@@ -72,7 +72,7 @@ pub struct Place {
 
 /// An attempt that ended.
 #[derive(Debug, Serialize)]
-pub struct Latest {
+pub(crate) struct Latest {
     /// Number of the press in the plan, from 1.
     pub press: u32,
     /// Number of the attempt, from 1.

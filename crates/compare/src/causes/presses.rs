@@ -83,7 +83,7 @@ impl Pressed {
     }
 
     /// What a calibration costs by the scatter of its presses alone, as a share of that scatter.
-    pub const fn calibration_cost(&self) -> f64 {
+    pub(crate) const fn calibration_cost(&self) -> f64 {
         self.calibration_cost
     }
 

@@ -119,7 +119,7 @@ impl Inference {
     }
 
     /// p value of the truth being at most `border`: small when it is above.
-    pub fn p_above(&self, border: f64) -> f64 {
+    pub(crate) fn p_above(&self, border: f64) -> f64 {
         match &self.how {
             How::Student { error, df } => 1.0 - student_cdf((self.value - border) / error, *df),
             How::Drawn { error, df, draws } => {
@@ -133,7 +133,7 @@ impl Inference {
     }
 
     /// p value of the truth being at least `border`: small when it is below.
-    pub fn p_below(&self, border: f64) -> f64 {
+    pub(crate) fn p_below(&self, border: f64) -> f64 {
         match &self.how {
             How::Student { error, df } => student_cdf((self.value - border) / error, *df),
             How::Drawn { error, df, draws } => {

@@ -27,7 +27,7 @@ impl<'a> Registers<'a> {
 
     /// The same, letting pass what `tolerance` accepts; what is only tolerated goes to `seen`.
     #[must_use]
-    pub fn tolerating(self, tolerance: &Tolerance, seen: &Mismatches) -> Self {
+    pub(crate) fn tolerating(self, tolerance: &Tolerance, seen: &Mismatches) -> Self {
         Self {
             tolerance: tolerance.clone(),
             seen: seen.clone(),
@@ -42,7 +42,7 @@ impl<'a> Registers<'a> {
 
     /// True for a register that is known to read differently.
     #[must_use]
-    pub fn excuses(&self, register: Register) -> bool {
+    pub(crate) fn excuses(&self, register: Register) -> bool {
         self.exceptions.contains(&register.address) || self.tolerance.everything
     }
 
@@ -91,7 +91,7 @@ impl<'a> Registers<'a> {
     ///
     /// # Errors
     /// [`Evk1Error::Usb`].
-    pub fn read_unpowered(&mut self, register: Register) -> Result<Option<u32>, Evk1Error> {
+    pub(crate) fn read_unpowered(&mut self, register: Register) -> Result<Option<u32>, Evk1Error> {
         let tolerance = std::mem::take(&mut self.tolerance);
         let read = self.read(register);
         self.tolerance = tolerance;
@@ -150,7 +150,7 @@ impl<'a> Registers<'a> {
     ///
     /// # Errors
     /// [`Evk1Error::Usb`].
-    pub fn set_blind(&mut self, field: Field, value: u32) -> Result<(), Evk1Error> {
+    pub(crate) fn set_blind(&mut self, field: Field, value: u32) -> Result<(), Evk1Error> {
         let word = self.read_unpowered(field.register)?;
         let word = word.unwrap_or(field.register.default);
         self.write_blind(field.register, field.put(word, value))
@@ -160,7 +160,7 @@ impl<'a> Registers<'a> {
     ///
     /// # Errors
     /// [`Evk1Error::Usb`].
-    pub fn write_blind(&mut self, register: Register, word: u32) -> Result<(), Evk1Error> {
+    pub(crate) fn write_blind(&mut self, register: Register, word: u32) -> Result<(), Evk1Error> {
         let (value, index) = halves(register.address);
         self.transport
             .control_out(requests::WRITE_REGISTER, value, index, &word.to_be_bytes())

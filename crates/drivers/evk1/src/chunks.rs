@@ -10,7 +10,7 @@ use crate::time_base::{Gate, Watch};
 /// Turns blocks into chunks; lives as long as the camera, so that chunk numbers and unwrapped time go on through stop
 /// and start.
 #[derive(Debug)]
-pub struct Chunker {
+pub(crate) struct Chunker {
     camera: CameraId,
     seq: u64,
     scanner: Scanner,
@@ -67,7 +67,7 @@ impl Chunker {
 
     /// The camera told at `at` that it lost words since its time was `good_us`, or since the stream began: how many, and where among
     /// those that came since, nobody knows.
-    pub fn overflowed(
+    pub(crate) fn overflowed(
         &mut self,
         at: HostTime,
         good_us: Option<u64>,

@@ -7,7 +7,7 @@ use crate::error::Evk1Error;
 use crate::registers::{NFL_EN, NFL_EVT_THRESH, NFL_PERIOD_CNT_THRESH, NFL_THRESH};
 
 /// Rates that the filter accepts, events per second (OpenEB 3.1.2, `gen31_event_rate_noise_filter_module`).
-pub const RATES_EV_S: std::ops::RangeInclusive<u32> = 10_000..=10_000_000;
+pub(crate) const RATES_EV_S: std::ops::RangeInclusive<u32> = 10_000..=10_000_000;
 /// The period over which events are counted, µs.
 const PERIOD_US: u32 = 1023;
 

@@ -102,11 +102,11 @@ pub const EN_VDDC: Field = bit(ATIS_CONTROL, "EN_VDDC", 1);
 /// Digital supply of the sensor.
 pub const EN_VDDD: Field = bit(ATIS_CONTROL, "EN_VDDD", 2);
 /// Soft reset of the sensor.
-pub const SENSOR_SOFT_RESET: Field = bit(ATIS_CONTROL, "SENSOR_SOFT_RESET", 3);
+pub(crate) const SENSOR_SOFT_RESET: Field = bit(ATIS_CONTROL, "SENSOR_SOFT_RESET", 3);
 /// The sensor interface does not block.
-pub const IN_EVT_NO_BLOCKING_MODE: Field = bit(ATIS_CONTROL, "IN_EVT_NO_BLOCKING_MODE", 4);
+pub(crate) const IN_EVT_NO_BLOCKING_MODE: Field = bit(ATIS_CONTROL, "IN_EVT_NO_BLOCKING_MODE", 4);
 /// 1 for 640 x 480, 0 for the 480 x 360 variant.
-pub const SISLEY_HVGA_REMAP_BYPASS: Field = bit(ATIS_CONTROL, "SISLEY_HVGA_REMAP_BYPASS", 8);
+pub(crate) const SISLEY_HVGA_REMAP_BYPASS: Field = bit(ATIS_CONTROL, "SISLEY_HVGA_REMAP_BYPASS", 8);
 /// The time base is the camera's own.
 pub const MASTER_MODE: Field = bit(ATIS_CONTROL, "MASTER_MODE", 12);
 /// The time base uses the sync line.
@@ -121,47 +121,47 @@ pub const CCAM2_CONTROL: Register = register("CCAM2_CONTROL", 0x0008, 0x0000_002
 /// 64-bit events; stays 0, the words are EVT2.
 pub const ENABLE_64BITS_EVENT: Field = bit(CCAM2_CONTROL, "ENABLE_64BITS_EVENT", 3);
 /// The interface to the host.
-pub const HOST_IF_ENABLE: Field = bit(CCAM2_CONTROL, "HOST_IF_ENABLE", 8);
+pub(crate) const HOST_IF_ENABLE: Field = bit(CCAM2_CONTROL, "HOST_IF_ENABLE", 8);
 /// The time base runs.
 pub const STEREO_MERGE_ENABLE: Field = bit(CCAM2_CONTROL, "STEREO_MERGE_ENABLE", 9);
 /// Drop events outside the window of `OUT_OF_FOV_FILTER_X` and `_Y`.
-pub const ENABLE_OUT_OF_FOV: Field = bit(CCAM2_CONTROL, "ENABLE_OUT_OF_FOV", 11);
+pub(crate) const ENABLE_OUT_OF_FOV: Field = bit(CCAM2_CONTROL, "ENABLE_OUT_OF_FOV", 11);
 
 /// Write strobes; what they read back is not public.
-pub const TRIGGERS: Register = volatile("TRIGGERS", 0x000a, 0, 0);
+pub(crate) const TRIGGERS: Register = volatile("TRIGGERS", 0x000a, 0, 0);
 /// Resets the FPGA's registers and time base: 0, then 1.
-pub const SOFT_RESET: Field = bit(TRIGGERS, "SOFT_RESET", 0);
+pub(crate) const SOFT_RESET: Field = bit(TRIGGERS, "SOFT_RESET", 0);
 
 /// By its name, how often a FIFO overflowed. No public code reads it.
 pub const OVERFLOW_HITCOUNT: Register = volatile("OVERFLOW_HITCOUNT", 0x0018, 0, 0);
 /// The low half of the serial number.
-pub const SERIAL_LSB: Register = volatile("SERIAL_LSB", 0x001c, 0, 0);
+pub(crate) const SERIAL_LSB: Register = volatile("SERIAL_LSB", 0x001c, 0, 0);
 /// What is printed as the serial number.
 pub const SERIAL_MSB: Register = volatile("SERIAL_MSB", 0x0020, 0, 0);
 
 /// Columns that pass the field-of-view filter.
-pub const OUT_OF_FOV_FILTER_X: Register = register("OUT_OF_FOV_FILTER_X", 0x0034, 640);
+pub(crate) const OUT_OF_FOV_FILTER_X: Register = register("OUT_OF_FOV_FILTER_X", 0x0034, 640);
 /// Width in pixels.
-pub const FOV_WIDTH: Field = field(OUT_OF_FOV_FILTER_X, "WIDTH", 0, 11);
+pub(crate) const FOV_WIDTH: Field = field(OUT_OF_FOV_FILTER_X, "WIDTH", 0, 11);
 /// First column.
-pub const FOV_ORIGIN_X: Field = field(OUT_OF_FOV_FILTER_X, "ORIGIN", 16, 11);
+pub(crate) const FOV_ORIGIN_X: Field = field(OUT_OF_FOV_FILTER_X, "ORIGIN", 16, 11);
 /// Rows that pass the field-of-view filter.
-pub const OUT_OF_FOV_FILTER_Y: Register = register("OUT_OF_FOV_FILTER_Y", 0x0036, 480);
+pub(crate) const OUT_OF_FOV_FILTER_Y: Register = register("OUT_OF_FOV_FILTER_Y", 0x0036, 480);
 /// Height in pixels.
-pub const FOV_HEIGHT: Field = field(OUT_OF_FOV_FILTER_Y, "HEIGHT", 0, 11);
+pub(crate) const FOV_HEIGHT: Field = field(OUT_OF_FOV_FILTER_Y, "HEIGHT", 0, 11);
 /// 0: the output line carries the sync clock; 1: trigger-out pulses.
 pub const EXT_SYNC_OUT_MODE: Register = register("EXT_SYNC_OUT_MODE", 0x003c, 0);
 /// The bit of [`EXT_SYNC_OUT_MODE`].
-pub const SYNC_OUT_IS_TRIGGER: Field = bit(EXT_SYNC_OUT_MODE, "EXT_SYNC_OUT_MODE", 0);
+pub(crate) const SYNC_OUT_IS_TRIGGER: Field = bit(EXT_SYNC_OUT_MODE, "EXT_SYNC_OUT_MODE", 0);
 /// Size of the image.
-pub const IMAGE_SIZE: Register = register("IMAGE_SIZE", 0x003e, 0x0280_01e0);
+pub(crate) const IMAGE_SIZE: Register = register("IMAGE_SIZE", 0x003e, 0x0280_01e0);
 
 // ---- system monitor, base 0x0040
 
 /// Switches of the temperature monitor.
-pub const EXT_TEMP_CONTROL: Register = register("EXT_TEMP_CONTROL", 0x0148, 0);
+pub(crate) const EXT_TEMP_CONTROL: Register = register("EXT_TEMP_CONTROL", 0x0148, 0);
 /// Reads the board's temperature sensor.
-pub const EXT_TEMP_MONITOR_SPI_EN: Field = bit(EXT_TEMP_CONTROL, "EXT_TEMP_MONITOR_SPI_EN", 2);
+pub(crate) const EXT_TEMP_MONITOR_SPI_EN: Field = bit(EXT_TEMP_CONTROL, "EXT_TEMP_MONITOR_SPI_EN", 2);
 /// The board's temperature; a sign is not known.
 pub const EVK_EXT_TEMP_VALUE: Register = volatile("EVK_EXT_TEMP_VALUE", 0x014c, 0, 0);
 /// In 1/4096 °C.
@@ -171,7 +171,7 @@ pub const EXT_TRIGGERS_ENABLE: Register = register("EXT_TRIGGERS/ENABLE", 0x01a0
 /// Trigger output.
 pub const EXT_TRIGGERS_OUT_ENABLE: Register = register("EXT_TRIGGERS/OUT_ENABLE", 0x01a4, 0);
 /// The bit of [`EXT_TRIGGERS_OUT_ENABLE`].
-pub const TRIGGER_OUT: Field = bit(EXT_TRIGGERS_OUT_ENABLE, "OUT_ENABLE", 0);
+pub(crate) const TRIGGER_OUT: Field = bit(EXT_TRIGGERS_OUT_ENABLE, "OUT_ENABLE", 0);
 /// Period of the trigger output, µs.
 pub const OUT_PULSE_PERIOD: Register = register("EXT_TRIGGERS/OUT_PULSE_PERIOD", 0x01a8, 100);
 /// Width of a pulse of the trigger output, µs.
@@ -186,74 +186,74 @@ pub const fn trigger_input(channel: u8) -> Field {
 // ---- sensor, base 0x0200
 
 /// Global switches of the sensor.
-pub const GLOBAL_CTRL: Register = register("global_ctrl", 0x0200, 0);
+pub(crate) const GLOBAL_CTRL: Register = register("global_ctrl", 0x0200, 0);
 /// Global enable.
-pub const SW_GLOBAL_EN: Field = bit(GLOBAL_CTRL, "sw_global_en", 1);
+pub(crate) const SW_GLOBAL_EN: Field = bit(GLOBAL_CTRL, "sw_global_en", 1);
 /// Reset of the bias generator, active low.
-pub const BGEN_RSTN: Field = bit(GLOBAL_CTRL, "bgen_rstn", 3);
+pub(crate) const BGEN_RSTN: Field = bit(GLOBAL_CTRL, "bgen_rstn", 3);
 /// Bias generator.
-pub const BGEN_EN: Field = bit(GLOBAL_CTRL, "bgen_en", 4);
+pub(crate) const BGEN_EN: Field = bit(GLOBAL_CTRL, "bgen_en", 4);
 
 /// Region of interest. Whether the two shadow triggers (bits 4 and 5) clear by themselves is not public.
 pub const ROI_CTRL: Register = volatile("roi_ctrl", 0x0204, 0x0000_000b, !0x30);
 /// The region applies to change detection.
-pub const ROI_TD_EN: Field = bit(ROI_CTRL, "roi_td_en", 1);
+pub(crate) const ROI_TD_EN: Field = bit(ROI_CTRL, "roi_td_en", 1);
 /// 0 holds all pixels in reset: no events.
 pub const ROI_TD_RSTN: Field = bit(ROI_CTRL, "roi_td_rstn", 3);
 /// Takes over the region's bit maps.
-pub const ROI_TD_SHADOW_TRIGGER: Field = bit(ROI_CTRL, "roi_td_shadow_trigger", 5);
+pub(crate) const ROI_TD_SHADOW_TRIGGER: Field = bit(ROI_CTRL, "roi_td_shadow_trigger", 5);
 
 /// Readout of change detection.
-pub const READOUT_CTRL: Register = register("readout_ctrl", 0x0208, 0x4000_0bff);
+pub(crate) const READOUT_CTRL: Register = register("readout_ctrl", 0x0208, 0x4000_0bff);
 /// Readout of the exposure measurement, laid out like [`READOUT_CTRL`].
-pub const ROE_CTRL: Register = register("roe_ctrl", 0x0244, 0x4000_03ff);
+pub(crate) const ROE_CTRL: Register = register("roe_ctrl", 0x0244, 0x4000_03ff);
 
 /// `ro_act_pdy_ctrl` of [`READOUT_CTRL`] or [`ROE_CTRL`].
 #[must_use]
-pub const fn act_pdy(of: Register) -> Field {
+pub(crate) const fn act_pdy(of: Register) -> Field {
     field(of, "ro_act_pdy_ctrl", 17, 3)
 }
 
 /// `ro_act_pdx_ctrl` of [`READOUT_CTRL`] or [`ROE_CTRL`].
 #[must_use]
-pub const fn act_pdx(of: Register) -> Field {
+pub(crate) const fn act_pdx(of: Register) -> Field {
     field(of, "ro_act_pdx_ctrl", 20, 3)
 }
 
 /// `ro_act_pux_ctrl` of [`READOUT_CTRL`] or [`ROE_CTRL`].
 #[must_use]
-pub const fn act_pux(of: Register) -> Field {
+pub(crate) const fn act_pux(of: Register) -> Field {
     field(of, "ro_act_pux_ctrl", 11, 3)
 }
 
 /// Illumination meter: bits 25:0 count, bit 29 tells that the count is valid.
-pub const LIFO_CTRL: Register = volatile("lifo_ctrl", 0x0214, 0, 0xc000_0000);
+pub(crate) const LIFO_CTRL: Register = volatile("lifo_ctrl", 0x0214, 0, 0xc000_0000);
 /// Illumination meter.
-pub const LIFO_EN: Field = bit(LIFO_CTRL, "lifo_en", 31);
+pub(crate) const LIFO_EN: Field = bit(LIFO_CTRL, "lifo_en", 31);
 /// What chip it is; the default is that of the variant with exposure measurement, which is the one listed.
 pub const CHIP_ID: Register = volatile("chip_id", 0x0218, 0x9020_0c03, 0);
 /// Spare bits of the sensor.
 pub const SPARE_CTRL: Register = register("spare_ctrl", 0x021c, 0);
 /// Spare bit 0.
-pub const SPARE0: Field = bit(SPARE_CTRL, "spare0", 0);
+pub(crate) const SPARE0: Field = bit(SPARE_CTRL, "spare0", 0);
 /// Shutter of the exposure measurement.
-pub const EM_SHUTTER: Field = bit(SPARE_CTRL, "em_shutter", 8);
+pub(crate) const EM_SHUTTER: Field = bit(SPARE_CTRL, "em_shutter", 8);
 /// Pull-up at the top of the readout.
-pub const RO_TOP_ACT_PU_EN: Field = bit(SPARE_CTRL, "ro_top_act_pu_en", 28);
+pub(crate) const RO_TOP_ACT_PU_EN: Field = bit(SPARE_CTRL, "ro_top_act_pu_en", 28);
 /// Removal of events out of range.
-pub const OOR_CTRL: Register = register("oor_ctrl", 0x0220, 0);
+pub(crate) const OOR_CTRL: Register = register("oor_ctrl", 0x0220, 0);
 /// Switch of [`OOR_CTRL`].
-pub const OOR_EN: Field = bit(OOR_CTRL, "oor_en", 0);
+pub(crate) const OOR_EN: Field = bit(OOR_CTRL, "oor_en", 0);
 /// The sensor's clock output.
 pub const CLK_OUT_CTRL: Register = register("clk_out_ctrl", 0x0238, 0);
 /// Clock output.
 pub const CLK_OUT_EN: Field = bit(CLK_OUT_CTRL, "clk_out_en", 0);
 /// Bypasses the clock gate.
-pub const CLK_GATE_BYPASS: Field = bit(CLK_OUT_CTRL, "clk_gate_bypass", 1);
+pub(crate) const CLK_GATE_BYPASS: Field = bit(CLK_OUT_CTRL, "clk_gate_bypass", 1);
 /// Bus between readout and interface.
-pub const ROB_CTRL: Register = register("rob_ctrl", 0x0240, 0x0014_0500);
+pub(crate) const ROB_CTRL: Register = register("rob_ctrl", 0x0240, 0x0014_0500);
 /// Two buses.
-pub const RO_DUAL_CTRL: Field = bit(ROB_CTRL, "ro_dual_ctrl", 0);
+pub(crate) const RO_DUAL_CTRL: Field = bit(ROB_CTRL, "ro_dual_ctrl", 0);
 /// Event-rate noise filter.
 pub const NFL_CTRL: Register = register("nfl_ctrl", 0x0248, 0x0000_00c8);
 /// Switch of the filter.
@@ -265,13 +265,13 @@ pub const NFL_THRESH: Register = register("nfl_thresh", 0x024c, 0x0019_0032);
 /// Events per period below which the filter drops everything.
 pub const NFL_EVT_THRESH: Field = field(NFL_THRESH, "evt_thresh", 0, 14);
 /// Length of a period, µs.
-pub const NFL_PERIOD_CNT_THRESH: Field = field(NFL_THRESH, "period_cnt_thresh", 14, 10);
+pub(crate) const NFL_PERIOD_CNT_THRESH: Field = field(NFL_THRESH, "period_cnt_thresh", 14, 10);
 
 /// Number of bias generators.
-pub const BIAS_GENERATORS: usize = 27;
+pub(crate) const BIAS_GENERATORS: usize = 27;
 
 /// What the 27 bias generators are given before anything else; also what a model of the device may start from.
-pub const BIAS_INIT: [u32; BIAS_GENERATORS] = [
+pub(crate) const BIAS_INIT: [u32; BIAS_GENERATORS] = [
     0x5900_009f,
     0x5900_009f,
     0x5900_009b,
@@ -319,26 +319,26 @@ pub const fn bias_generator(n: usize) -> Register {
 
 /// `vdac` of bias generator `n`: code of the voltage DAC.
 #[must_use]
-pub const fn bias_vdac(n: usize) -> Field {
+pub(crate) const fn bias_vdac(n: usize) -> Field {
     field(bias_generator(n), "vdac", 0, 8)
 }
 
 /// `idac` of bias generator `n`: code of the current DAC.
 #[must_use]
-pub const fn bias_idac(n: usize) -> Field {
+pub(crate) const fn bias_idac(n: usize) -> Field {
     field(bias_generator(n), "idac", 8, 13)
 }
 
 /// `type` of bias generator `n`: 1 voltage DAC, 0 current DAC.
 #[must_use]
-pub const fn bias_type(n: usize) -> Field {
+pub(crate) const fn bias_type(n: usize) -> Field {
     bit(bias_generator(n), "type", 27)
 }
 
 /// Words of the map of columns.
-pub const ROI_X_WORDS: usize = 20;
+pub(crate) const ROI_X_WORDS: usize = 20;
 /// Words of the map of rows.
-pub const ROI_Y_WORDS: usize = 15;
+pub(crate) const ROI_Y_WORDS: usize = 15;
 
 /// Word `n` of the map of columns: bit x % 32 of word x / 32 enables column x.
 #[must_use]
@@ -348,25 +348,25 @@ pub const fn roi_x(n: usize) -> Register {
 
 /// Word `n` of the map of rows: bit y % 32 of word y / 32 enables row y.
 #[must_use]
-pub const fn roi_y(n: usize) -> Register {
+pub(crate) const fn roi_y(n: usize) -> Register {
     register("td_roi_y", 0x0500 + 4 * n as u32, 0)
 }
 
 /// The four bits beyond the map of columns; they stay 0.
-pub const ROI_X_END: Register = register("td_roi_x20", 0x0450, 0);
+pub(crate) const ROI_X_END: Register = register("td_roi_x20", 0x0450, 0);
 /// The four bits beyond the map of rows; they stay 0.
-pub const ROI_Y_END: Register = register("td_roi_y15", 0x053c, 0);
+pub(crate) const ROI_Y_END: Register = register("td_roi_y15", 0x053c, 0);
 
 /// The FPGA's pattern generator, which takes the sensor's place.
 pub const TEST_PATTERN_CONTROL: Register = register("IF/TEST_PATTERN_CONTROL", 0x0740, 0);
 /// It makes events.
 pub const PATTERN_ENABLE: Field = bit(TEST_PATTERN_CONTROL, "ENABLE", 0);
 /// 0: column after column; 1: the diagonal.
-pub const PATTERN_TYPE: Field = bit(TEST_PATTERN_CONTROL, "TYPE", 4);
+pub(crate) const PATTERN_TYPE: Field = bit(TEST_PATTERN_CONTROL, "TYPE", 4);
 /// 0: change detection; 1: exposure measurement.
-pub const PATTERN_PIXEL_TYPE: Field = bit(TEST_PATTERN_CONTROL, "PIXEL_TYPE", 8);
+pub(crate) const PATTERN_PIXEL_TYPE: Field = bit(TEST_PATTERN_CONTROL, "PIXEL_TYPE", 8);
 /// The events' polarity.
-pub const PATTERN_PIXEL_POLARITY: Field = bit(TEST_PATTERN_CONTROL, "PIXEL_POLARITY", 12);
+pub(crate) const PATTERN_PIXEL_POLARITY: Field = bit(TEST_PATTERN_CONTROL, "PIXEL_POLARITY", 12);
 /// The first of two periods that take turns.
 pub const TEST_PATTERN_N_PERIOD: Register = register("IF/TEST_PATTERN_N_PERIOD", 0x0744, 0);
 /// The second.
@@ -374,13 +374,13 @@ pub const TEST_PATTERN_P_PERIOD: Register = register("IF/TEST_PATTERN_P_PERIOD",
 
 /// `VALID_RATIO` of [`TEST_PATTERN_N_PERIOD`] or [`TEST_PATTERN_P_PERIOD`]: clock cycles of 10 ns with an event, of 1024.
 #[must_use]
-pub const fn pattern_valid_ratio(of: Register) -> Field {
+pub(crate) const fn pattern_valid_ratio(of: Register) -> Field {
     field(of, "VALID_RATIO", 0, 10)
 }
 
 /// `LENGTH` of [`TEST_PATTERN_N_PERIOD`] or [`TEST_PATTERN_P_PERIOD`].
 #[must_use]
-pub const fn pattern_length(of: Register) -> Field {
+pub(crate) const fn pattern_length(of: Register) -> Field {
     field(of, "LENGTH", 16, 16)
 }
 
@@ -396,7 +396,7 @@ pub const SYSTEM_ID: Register = volatile("SYSTEM_ID", 0x0800, 0x0000_001c, 0);
 /// FPGA version: major in bits 23:16, minor in 15:8, micro in 7:0.
 pub const FPGA_VERSION: Register = volatile("FPGA_VERSION", 0x0804, 0x0003_0000, 0);
 /// FPGA build date, unix time.
-pub const FPGA_BUILD_DATE: Register = volatile("FPGA_BUILD_DATE", 0x0808, 0, 0);
+pub(crate) const FPGA_BUILD_DATE: Register = volatile("FPGA_BUILD_DATE", 0x0808, 0, 0);
 
 // ---- host interface, base 0x1400
 
@@ -405,7 +405,7 @@ pub const PKT_END_ENABLE: Register = register("PKT_END_ENABLE", 0x1400, 0x0000_0
 /// After how long it does, µs.
 pub const PKT_END_INTERVAL_US: Register = register("PKT_END_INTERVAL_US", 0x1404, 0x0400);
 /// After how much data it does.
-pub const PKT_END_DATA_COUNT: Register = register("PKT_END_DATA_COUNT", 0x1408, 0x0400);
+pub(crate) const PKT_END_DATA_COUNT: Register = register("PKT_END_DATA_COUNT", 0x1408, 0x0400);
 
 const SINGLE: &[Register] = &[
     ATIS_CONTROL,

@@ -6,11 +6,11 @@
 /// Vendor and product IDs under which an EVK1 appears; other cameras share them.
 pub const USB_IDS: [(u16, u16); 3] = [(0x04b4, 0x00f4), (0x04b4, 0x00f1), (0x04b4, 0x00bc)];
 /// Interface subclass of Treuzell cameras, which must never receive an EVK1 request.
-pub const TREUZELL_SUBCLASS: u8 = 0x19;
+pub(crate) const TREUZELL_SUBCLASS: u8 = 0x19;
 /// The interface to claim.
 pub const INTERFACE: u8 = 0;
 /// Bulk endpoint of the event stream.
-pub const EVENT_ENDPOINT: u8 = 0x81;
+pub(crate) const EVENT_ENDPOINT: u8 = 0x81;
 
 /// Reads a register: 8 bytes asked; byte 0 is [`READ_OK`], bytes 4..8 the value, big-endian. wValue is the low
 /// half of the address, wIndex the high half; so for [`WRITE_REGISTER`].
@@ -33,4 +33,4 @@ pub const BOARD_EVK1: u16 = 2;
 /// Answer of an EVK1 Gen3.1 to [`SYSTEM_ID`].
 pub const SYSTEM_GEN31: u16 = 0x1c;
 /// Answer of a board that runs its rescue image to [`SYSTEM_ID`].
-pub const SYSTEM_GOLDEN: u16 = 0x11;
+pub(crate) const SYSTEM_GOLDEN: u16 = 0x11;

@@ -15,17 +15,17 @@ use crate::registers as r;
 use crate::roi::Map;
 
 /// Start-up burst of the pixels, which the noise filter swallows.
-pub const SWALLOW: Duration = Duration::from_millis(500);
+pub(crate) const SWALLOW: Duration = Duration::from_millis(500);
 
 /// FPGA version from which a trigger output exists, as in register `FPGA_VERSION`.
-pub const TRIGGER_OUT_SINCE: u32 = 0x0003_0000;
+pub(crate) const TRIGGER_OUT_SINCE: u32 = 0x0003_0000;
 
 /// Powers the sensor down and resets the FPGA, whatever was running. The sensor's own register is not read back: the
 /// sensor may be without power.
 ///
 /// # Errors
 /// [`Evk1Error::Usb`], [`Evk1Error::ReadBack`].
-pub fn power_down(registers: &mut Registers<'_>) -> Result<(), Evk1Error> {
+pub(crate) fn power_down(registers: &mut Registers<'_>) -> Result<(), Evk1Error> {
     let mut done = FirstError::default();
     done.after(registers.set_blind(r::CLK_OUT_EN, 0));
     for off in [
@@ -133,7 +133,7 @@ pub fn init_sensor(registers: &mut Registers<'_>) -> Result<(), Evk1Error> {
 ///
 /// # Errors
 /// [`Evk1Error::Usb`], [`Evk1Error::ReadBack`].
-pub fn init_facilities(registers: &mut Registers<'_>, fpga_version: u32) -> Result<(), Evk1Error> {
+pub(crate) fn init_facilities(registers: &mut Registers<'_>, fpga_version: u32) -> Result<(), Evk1Error> {
     for channel in crate::triggers::CHANNELS {
         registers.set(r::trigger_input(channel), 0)?;
     }
@@ -213,7 +213,7 @@ fn read_events(registers: &mut Registers<'_>, buffer: &mut [u8]) -> Result<usize
 /// # Errors
 /// [`Evk1Error::Usb`]; [`Evk1Error::StillSending`] when bytes still come after 2 s on `clock`, or after more of them
 /// than any buffer on the way holds.
-pub fn clear_left_over(registers: &mut Registers<'_>, clock: &dyn Clock) -> Result<u64, Evk1Error> {
+pub(crate) fn clear_left_over(registers: &mut Registers<'_>, clock: &dyn Clock) -> Result<u64, Evk1Error> {
     const ENOUGH_BYTES: u64 = 16 << 20;
     let end = clock.now() + EMPTYING_LIMIT;
     let mut buffer = vec![0; 128 << 10];

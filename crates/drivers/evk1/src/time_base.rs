@@ -19,7 +19,7 @@ fn time_high(word: [u8; WORD]) -> Option<u32> {
 
 /// Holds back what has no time yet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Gate {
+pub(crate) enum Gate {
     /// Up to the first TIME_HIGH word: at a start, and after a loss, where the words that follow would carry a time
     /// from before it.
     AwaitTime,

@@ -13,7 +13,7 @@ use crate::registers::{
 /// `gen31_trigger_event`).
 pub const CHANNELS: [u8; 3] = [MAIN, LOOP_BACK, AUXILIARY];
 /// TRIG IN.
-pub const MAIN: u8 = 0;
+pub(crate) const MAIN: u8 = 0;
 /// The camera's own trigger output, without a wire.
 pub const LOOP_BACK: u8 = 6;
 /// The auxiliary input; its line carries the sync clock of a slave.
@@ -94,7 +94,7 @@ impl TriggerOut {
 ///
 /// # Errors
 /// [`Evk1Error::Usb`], [`Evk1Error::ReadBack`].
-pub fn write_out(
+pub(crate) fn write_out(
     registers: &mut Registers<'_>,
     pulses: Option<TriggerOut>,
 ) -> Result<(), Evk1Error> {
@@ -110,6 +110,6 @@ pub fn write_out(
 ///
 /// # Errors
 /// [`Evk1Error::Usb`].
-pub fn read_out(registers: &mut Registers<'_>) -> Result<bool, Evk1Error> {
+pub(crate) fn read_out(registers: &mut Registers<'_>) -> Result<bool, Evk1Error> {
     Ok(registers.get(TRIGGER_OUT)? == 1)
 }

@@ -83,7 +83,7 @@ impl Model {
     /// What a bias may be: for an EVK4 an offset from the value in the sensor's memory (a register of eight bits holds both
     /// together), for an EVK3 HD the register's value.
     #[must_use]
-    pub const fn bias_range(self) -> RangeInclusive<i16> {
+    pub(crate) const fn bias_range(self) -> RangeInclusive<i16> {
         match self {
             Self::Evk4 => -255..=255,
             Self::Evk3Hd | Self::SilkyVga => 0..=255,
@@ -102,7 +102,7 @@ impl Model {
 
     /// Whether it can give its time base to another camera, or take another's.
     #[must_use]
-    pub const fn shares_time_base(self) -> bool {
+    pub(crate) const fn shares_time_base(self) -> bool {
         matches!(self, Self::Evk4)
     }
 }

@@ -58,7 +58,7 @@ impl Axes {
 
     /// A vector of the device in the robot frame.
     #[must_use]
-    pub fn robot_from_device(self, v: [f64; 3]) -> [f64; 3] {
+    pub(crate) fn robot_from_device(self, v: [f64; 3]) -> [f64; 3] {
         self.0.map(|axis| {
             let (i, sign) = axis.index_and_sign();
             sign * v[i]
@@ -67,7 +67,7 @@ impl Axes {
 
     /// A vector of the robot frame on the device's axes.
     #[must_use]
-    pub fn device_from_robot(self, v: [f64; 3]) -> [f64; 3] {
+    pub(crate) fn device_from_robot(self, v: [f64; 3]) -> [f64; 3] {
         let mut out = [0.0; 3];
         for (axis, value) in self.0.into_iter().zip(v) {
             let (i, sign) = axis.index_and_sign();
@@ -78,14 +78,14 @@ impl Axes {
 
     /// A position of the device, m, as a point of the robot frame, mm.
     #[must_use]
-    pub fn point_from_metres(self, position_m: [f64; 3]) -> Point3<Robot> {
+    pub(crate) fn point_from_metres(self, position_m: [f64; 3]) -> Point3<Robot> {
         let [x, y, z] = self.robot_from_device(position_m).map(|c| c * 1e3);
         Point3::new(x, y, z)
     }
 
     /// A point of the robot frame, mm, as a position of the device, m.
     #[must_use]
-    pub fn metres_from_point(self, point: Point3<Robot>) -> [f64; 3] {
+    pub(crate) fn metres_from_point(self, point: Point3<Robot>) -> [f64; 3] {
         self.device_from_robot(point.to_array()).map(|c| c * 1e-3)
     }
 }

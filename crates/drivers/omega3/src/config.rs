@@ -124,7 +124,7 @@ impl Default for Envelope {
 impl Envelope {
     /// Motor ratio that caps the tip at `force_n`: `gravity_ratio + force_n / n_per_ratio`, at most `max_ratio`.
     #[must_use]
-    pub fn ratio_of(&self, force_n: f64) -> f64 {
+    pub(crate) fn ratio_of(&self, force_n: f64) -> f64 {
         (self.gravity_ratio + force_n / self.n_per_ratio).min(self.max_ratio)
     }
 }

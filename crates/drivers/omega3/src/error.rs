@@ -135,7 +135,7 @@ impl OmegaError {
 
 /// Whether the code means that the device is gone.
 #[must_use]
-pub const fn is_loss(code: ErrorCode) -> bool {
+pub(crate) const fn is_loss(code: ErrorCode) -> bool {
     matches!(code, ErrorCode::COM | ErrorCode::NO_DEVICE_FOUND)
 }
 

@@ -14,7 +14,7 @@ use crate::library::Library;
 pub const LIBRARY_VARIABLE: &str = "SKINRIG_LIBDRD";
 
 /// Environment variables with the root of an unpacked SDK, the first one first.
-pub const SDK_VARIABLES: [&str; 2] = ["FDSDK", "FORCEDIM_SDK"];
+pub(crate) const SDK_VARIABLES: [&str; 2] = ["FDSDK", "FORCEDIM_SDK"];
 
 /// The library's file names, the one that names its interface first.
 const NAMES: &[&str] = if cfg!(target_os = "windows") {

@@ -87,7 +87,7 @@ pub enum Trip {
 impl Trip {
     /// True when the device is gone; only opening it again helps.
     #[must_use]
-    pub const fn is_loss(&self) -> bool {
+    pub(crate) const fn is_loss(&self) -> bool {
         match self {
             Self::Call(e) => is_loss(e.code),
             Self::ForceOff(cause) => matches!(cause, ForceOffCause::UsbDisconnect),

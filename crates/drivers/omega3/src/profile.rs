@@ -52,19 +52,19 @@ impl Profile {
 
     /// Largest speed from here on, mm/s; above 0.
     #[must_use]
-    pub fn top_speed(&self) -> f64 {
+    pub(crate) fn top_speed(&self) -> f64 {
         self.pacing.speed.max(self.coming_speed()).max(self.v)
     }
 
     /// True when the end is reached and nothing moves.
     #[must_use]
-    pub fn is_done(&self) -> bool {
+    pub(crate) fn is_done(&self) -> bool {
         self.s >= self.length
     }
 
     /// Whether a stop at `length` mm is still possible.
     #[must_use]
-    pub fn can_stop_at(&self, length: f64) -> bool {
+    pub(crate) fn can_stop_at(&self, length: f64) -> bool {
         self.s + self.stopping(self.v, self.a) <= length
     }
 
@@ -81,7 +81,7 @@ impl Profile {
     }
 
     /// Ends as soon as it can stop.
-    pub fn cut_short(&mut self) {
+    pub(crate) fn cut_short(&mut self) {
         self.length = self.length.min(self.s + self.stopping(self.v, self.a));
     }
 

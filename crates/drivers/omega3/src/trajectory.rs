@@ -41,7 +41,7 @@ impl Line {
 
 /// Moves the set point from target to target.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Trajectory {
+pub(crate) struct Trajectory {
     limits: Motion,
     set_point: [f64; 3],
     line: Option<Line>,
@@ -74,7 +74,7 @@ impl Trajectory {
 
     /// True when nothing is left to do.
     #[must_use]
-    pub const fn is_still(&self) -> bool {
+    pub(crate) const fn is_still(&self) -> bool {
         self.line.is_none() && self.next.is_none()
     }
 

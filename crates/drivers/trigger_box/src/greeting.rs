@@ -60,7 +60,7 @@ pub enum GreetingError {
 
 /// The command that puts the right firmware on the box at `port`.
 #[must_use]
-pub fn flash_command(port: &str) -> String {
+pub(crate) fn flash_command(port: &str) -> String {
     format!("make -C hil/trigger_box flash PORT={port}")
 }
 
@@ -126,7 +126,7 @@ fn check(reply: &Reply, port: &str, serial: Option<&str>) -> Result<Greeted, Gre
 impl GreetingError {
     /// The same for whoever opened the device.
     #[must_use]
-    pub fn into_device_error(self, serial: &str) -> DeviceError {
+    pub(crate) fn into_device_error(self, serial: &str) -> DeviceError {
         let (role, serial) = (DeviceRole::TriggerBox, serial.to_owned());
         match self {
             Self::Link(e) => DeviceError::Lost {

@@ -72,7 +72,7 @@ impl HostFromBox {
 
     /// Times at which the exchanges excluded each other: the clock drifts more than was said.
     #[must_use]
-    pub fn contradictions(&self) -> u64 {
+    pub(crate) fn contradictions(&self) -> u64 {
         self.contradictions
     }
 

@@ -12,15 +12,15 @@ pub const FIRMWARE_VERSION: Firmware = Firmware {
     patch: 1,
 };
 /// How a box names itself.
-pub const BOX_NAME: &str = "skinrig-trigger-box";
+pub(crate) const BOX_NAME: &str = "skinrig-trigger-box";
 /// Speed of the serial line, bit/s: exact with the box's 16 MHz.
-pub const BAUD_RATE: u32 = 250_000;
+pub(crate) const BAUD_RATE: u32 = 250_000;
 /// The box's clock: ticks of 62.5 ns.
-pub const TICKS_PER_US: u64 = 16;
+pub(crate) const TICKS_PER_US: u64 = 16;
 /// The longest serial number, characters.
-pub const MAX_SERIAL: usize = 16;
+pub(crate) const MAX_SERIAL: usize = 16;
 /// The shortest period of sync trains, ms: twice a train, so that marks find room between them.
-pub const MIN_SYNC_PERIOD_MS: u16 = (2 * PulseTrain::DURATION_US).div_ceil(1_000) as u16;
+pub(crate) const MIN_SYNC_PERIOD_MS: u16 = (2 * PulseTrain::DURATION_US).div_ceil(1_000) as u16;
 
 const REPLY: u8 = 0x80;
 const HELLO: u8 = 0x01;
@@ -147,7 +147,7 @@ pub struct Ticks(pub u64);
 impl Ticks {
     /// The whole microseconds of it.
     #[must_use]
-    pub fn to_box_time(self) -> BoxTime {
+    pub(crate) fn to_box_time(self) -> BoxTime {
         BoxTime {
             us: self.0 / TICKS_PER_US,
         }

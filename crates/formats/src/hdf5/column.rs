@@ -159,7 +159,7 @@ impl IntColumn {
     }
 
     /// The error for the value at `row` of the last slice, which began at `start`.
-    pub fn bad_value(
+    pub(crate) fn bad_value(
         &self,
         start: usize,
         row: usize,

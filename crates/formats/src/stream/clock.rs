@@ -25,11 +25,11 @@ pub(super) struct TimeBase<const BITS: u32, const SHIFT: u32> {
 
 impl<const BITS: u32, const SHIFT: u32> TimeBase<BITS, SHIFT> {
     /// Half of the range: the largest step that is taken at its word.
-    pub const HALF: u32 = 1 << (BITS - 1);
+    pub(crate) const HALF: u32 = 1 << (BITS - 1);
     const RANGE_US: u64 = 1 << (BITS + SHIFT);
 
     /// A counter of which nothing was seen yet; its times count from `origin_us`.
-    pub const fn starting_at(origin_us: u64) -> Self {
+    pub(crate) const fn starting_at(origin_us: u64) -> Self {
         Self {
             high: 0,
             epoch_us: origin_us,
@@ -54,7 +54,7 @@ impl<const BITS: u32, const SHIFT: u32> TimeBase<BITS, SHIFT> {
     }
 
     /// µs of the origin and of all passed ranges.
-    pub const fn epoch_us(&self) -> u64 {
+    pub(crate) const fn epoch_us(&self) -> u64 {
         self.epoch_us
     }
 

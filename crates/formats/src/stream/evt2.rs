@@ -14,7 +14,7 @@ use super::output::{BLOCK, Output};
 use super::sink::{EventSink, Monitoring};
 
 /// Length of the time base counter, bits; its unit is 64 µs.
-pub const TIME_HIGH_BITS: u32 = 28;
+pub(crate) const TIME_HIGH_BITS: u32 = 28;
 /// Range of the stream's time, µs.
 pub const RANGE_US: u64 = 1 << 34;
 

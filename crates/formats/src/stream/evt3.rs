@@ -17,7 +17,7 @@ use super::output::Output;
 use super::sink::{EventSink, Monitoring};
 
 /// Length of the time base counter, bits; its unit is 4096 µs.
-pub const TIME_HIGH_BITS: u32 = 12;
+pub(crate) const TIME_HIGH_BITS: u32 = 12;
 /// Range of the stream's time, µs.
 pub const RANGE_US: u64 = 1 << 24;
 

@@ -40,7 +40,7 @@ impl Output {
     }
 
     /// Forgets when the current chunk began.
-    pub fn begin_chunk(&mut self) {
+    pub(crate) fn begin_chunk(&mut self) {
         self.chunk_first_us = None;
     }
 

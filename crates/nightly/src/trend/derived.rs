@@ -4,7 +4,7 @@ use super::history::{History, Point, Series};
 use crate::verdict::Verdict;
 
 /// Unit of a ratio.
-pub const RATIO: &str = "ratio";
+pub(crate) const RATIO: &str = "ratio";
 
 /// A ratio that is charted.
 #[derive(Debug, Clone, Copy)]

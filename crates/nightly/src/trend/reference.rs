@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 /// A reference of fewer nights says nothing: the series is being learnt.
-pub const FEWEST: usize = 12;
+pub(crate) const FEWEST: usize = 12;
 /// A reference of so many nights takes no more: what comes later is judged by it, however slowly it creeps.
 pub const MOST: usize = 100;
 

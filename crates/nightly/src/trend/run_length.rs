@@ -8,7 +8,7 @@ use serde::Serialize;
 /// Nights in a row that make a large change: it is found in as many.
 pub const QUICK: usize = 3;
 /// Nights in a row that make a smaller one.
-pub const SLOW: usize = 9;
+pub(crate) const SLOW: usize = 9;
 
 /// So many nights in a row beyond a limit raise an alarm.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]

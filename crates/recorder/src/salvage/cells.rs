@@ -95,7 +95,7 @@ pub fn cells(image: Image, page: &[u8]) -> Vec<Cell> {
 
 impl Cell {
     /// Whether it is too long to be kept in memory.
-    pub const fn is_long(&self) -> bool {
+    pub(crate) const fn is_long(&self) -> bool {
         self.payload > 64 << 10
     }
 
@@ -169,7 +169,7 @@ fn varint(bytes: &[u8], at: usize) -> Option<(u64, usize)> {
 }
 
 /// The serial types of a row: what its head says of its values (section 2.1), and where the first one begins.
-pub fn serial_types(payload: &[u8]) -> Option<(Vec<u64>, usize)> {
+pub(crate) fn serial_types(payload: &[u8]) -> Option<(Vec<u64>, usize)> {
     let (head, mut at) = varint(payload, 0)?;
     let head = usize::try_from(head).ok().filter(|h| *h <= payload.len())?;
     let mut types = Vec::new();

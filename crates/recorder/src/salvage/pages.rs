@@ -177,7 +177,7 @@ impl Pages {
     }
 
     /// Bytes of a page. SQLite uses all of them: sessions are made with none reserved.
-    pub const fn page_bytes(&self) -> usize {
+    pub(crate) const fn page_bytes(&self) -> usize {
         self.size
     }
 
@@ -197,7 +197,7 @@ impl Pages {
     }
 
     /// Whether some row was not read to its end because rows went on to too many pages.
-    pub const fn is_exhausted(&self) -> bool {
+    pub(crate) const fn is_exhausted(&self) -> bool {
         self.follow == 0
     }
 

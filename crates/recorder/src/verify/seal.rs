@@ -79,7 +79,7 @@ pub fn check(reader: &SessionReader, report: &mut VerifyReport) {
 }
 
 /// Makes a sealed file read-only that can still be written: its writer ended just before it did so, or one that wanted to go on with it.
-pub fn protect(path: &Path, report: &mut VerifyReport) {
+pub(crate) fn protect(path: &Path, report: &mut VerifyReport) {
     let is_writable = || std::fs::metadata(path).is_ok_and(|m| !m.permissions().readonly());
     if !is_writable() {
         return;

@@ -78,7 +78,7 @@ pub fn all(input: &ReportInput<'_>) -> Vec<Figure> {
 
 /// Error against cost, when a tradeoff was measured on the session.
 #[must_use]
-pub fn speed_accuracy(input: &ReportInput<'_>) -> Option<Figure> {
+pub(crate) fn speed_accuracy(input: &ReportInput<'_>) -> Option<Figure> {
     let result = input.tradeoff.as_ref()?.as_ref().ok()?;
     let rig = "CPU times are those of the machine that measured them.";
     Some(tradeoff::fronts(result, rig, &canvas::foot(input)))

@@ -39,7 +39,7 @@ use crate::terminal::{clock_method, metric_rows};
 ///
 /// # Errors
 /// When `value` has no JSON form (a map with keys that are not strings).
-pub fn script_json<T: Serialize>(value: &T) -> Result<String, serde_json::Error> {
+pub(crate) fn script_json<T: Serialize>(value: &T) -> Result<String, serde_json::Error> {
     let mut value = serde_json::to_value(value)?;
     show_all(&mut value);
     let text = serde_json::to_string(&value)?;

@@ -6,7 +6,7 @@ use syn::{Attribute, Expr, Ident, Lit, LitStr, Meta, Path, Result, Token, Type, 
 
 /// The attributes of a struct.
 #[derive(Default)]
-pub struct StructAttributes {
+pub(crate) struct StructAttributes {
     pub name: Option<String>,
     pub exactly_one: Vec<Vec<String>>,
     pub version: Option<String>,
@@ -20,7 +20,7 @@ pub struct StructAttributes {
 }
 
 /// The default of a key.
-pub enum DefaultText {
+pub(crate) enum DefaultText {
     /// A mapping with its own defaults.
     Own,
     /// As typed.
@@ -29,7 +29,7 @@ pub enum DefaultText {
 
 /// The attributes of a field.
 #[derive(Default)]
-pub struct FieldAttributes {
+pub(crate) struct FieldAttributes {
     pub default: Option<DefaultText>,
     pub value: Option<Expr>,
     pub min: Option<Expr>,
@@ -204,7 +204,7 @@ pub fn snake_case(name: &str) -> String {
 }
 
 /// `all_clusters` as `AllClusters`.
-pub fn pascal_case(word: &str) -> String {
+pub(crate) fn pascal_case(word: &str) -> String {
     let parts = word.split(['_', '-']).map(|part| {
         let mut letters = part.chars();
         let first = letters.next().map(|c| c.to_uppercase().to_string());

@@ -38,7 +38,7 @@ fn named(ty: &Type) -> Option<(String, Option<&Type>)> {
 }
 
 /// The type inside `Option<...>`.
-pub fn inside_option(ty: &Type) -> Option<&Type> {
+pub(crate) fn inside_option(ty: &Type) -> Option<&Type> {
     match named(ty)? {
         (name, inner) if name == "Option" => inner,
         _ => None,

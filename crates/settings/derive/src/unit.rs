@@ -48,14 +48,14 @@ const UNITS: &[Unit] = &[
 pub const SECONDS: Unit = unit("", "s", "Time", 1.0);
 
 /// The unit in which a name ends, and the name without it.
-pub fn of_name(name: &str) -> Option<(Unit, &str)> {
+pub(crate) fn of_name(name: &str) -> Option<(Unit, &str)> {
     UNITS
         .iter()
         .find_map(|u| Some((*u, name.strip_suffix(u.suffix)?)))
 }
 
 /// The unit as typed in files.
-pub fn of_text(text: &str) -> Option<Unit> {
+pub(crate) fn of_text(text: &str) -> Option<Unit> {
     UNITS.iter().find(|u| u.name == text).copied()
 }
 
@@ -81,7 +81,7 @@ fn size(dimension: &str, typed: &str) -> Option<f64> {
 
 impl Unit {
     /// A typed quantity in this unit, computed as the reader does.
-    pub fn value_of(self, text: &str) -> Option<f64> {
+    pub(crate) fn value_of(self, text: &str) -> Option<f64> {
         let (number, typed) = text.trim().split_once(' ')?;
         let number: f64 = number.parse().ok()?;
         if typed == self.name && self.per == 1.0 {

@@ -34,16 +34,16 @@ pub use ties::CAMERA_SERIALS;
 use ties::Ties;
 
 /// Serial number of the arm, as in `hil/rigs/emulated.yaml`.
-pub const ARM_SERIAL: u16 = 4711;
+pub(crate) const ARM_SERIAL: u16 = 4711;
 /// Serial number in the trigger box's EEPROM.
-pub const BOX_SERIAL: &str = "emulated";
+pub(crate) const BOX_SERIAL: &str = "emulated";
 /// Names the stand-in for libdrd in a rig file.
 pub const LIBRARY_VARIABLE: &str = "SKINRIG_EMULATED_LIBDRD";
 /// Names the port of the trigger box in a rig file.
-pub const BOX_VARIABLE: &str = "SKINRIG_EMULATED_TRIGGER_BOX";
+pub(crate) const BOX_VARIABLE: &str = "SKINRIG_EMULATED_TRIGGER_BOX";
 
 /// Names the file while which exists the lamps are off, in a rig file.
-pub const LAMPS_VARIABLE: &str = "SKINRIG_EMULATED_LAMPS_OFF";
+pub(crate) const LAMPS_VARIABLE: &str = "SKINRIG_EMULATED_LAMPS_OFF";
 
 /// What the bench is.
 #[derive(Debug, Clone)]

@@ -20,7 +20,7 @@ pub type Handed = HandedOver;
 pub type Counters = Evk1Counters;
 
 /// Names the folder of the bus in a process under test.
-pub const ROOT_VARIABLE: &str = "UMOCKDEV_DIR";
+pub(crate) const ROOT_VARIABLE: &str = "UMOCKDEV_DIR";
 
 /// A vendor request that reached a device.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -162,7 +162,7 @@ impl Remote {
     ///
     /// # Errors
     /// When it should, and nobody listens there.
-    pub fn from_environment() -> io::Result<Option<Self>> {
+    pub(crate) fn from_environment() -> io::Result<Option<Self>> {
         std::env::var_os(ROOT_VARIABLE)
             .map(|root| Self::connect(Path::new(&root)))
             .transpose()

@@ -33,7 +33,7 @@ use rustix::time::{ClockId, clock_gettime};
 const LAMPS_OFF: &str = "lamps-off";
 
 /// How far cameras lag behind the present at least, ns.
-pub const LATENCY_NS: i64 = 2_000_000;
+pub(crate) const LATENCY_NS: i64 = 2_000_000;
 
 /// How long tip positions are remembered, ns: as long as a camera may lag behind a source that is late. One that finds its press
 /// forgotten would see nothing but noise.

@@ -127,12 +127,12 @@ pub fn last_error() -> i32 {
 }
 
 /// Remembers an error of the calling thread.
-pub fn set_error(code: ErrorCode) {
+pub(crate) fn set_error(code: ErrorCode) {
     LAST_ERROR.set(code.0);
 }
 
 /// Allows or forbids the guarded calls.
-pub fn set_expert(on: bool) {
+pub(crate) fn set_expert(on: bool) {
     EXPERT.store(on, Ordering::SeqCst);
 }
 

@@ -134,7 +134,7 @@ impl Journal {
 
 /// Whether a function only reads.
 #[must_use]
-pub fn is_reading(name: &str) -> bool {
+pub(crate) fn is_reading(name: &str) -> bool {
     // Behind the prefix, `dhd` or `drd`.
     let verb = name.get(3..).unwrap_or_default();
     ["Get", "Is", "Error"].iter().any(|v| verb.starts_with(v)) || name == "drdWaitForTick"

@@ -47,7 +47,7 @@ pub use page::{ArmState, Mode};
 pub const ARM_VARIABLE: &str = "SKINRIG_EMULATED_ARM";
 
 /// Set to the arm's directory, it makes an executable that links this crate the firmware of that arm.
-pub const FIRMWARE_VARIABLE: &str = "SKINRIG_EMULATED_ARM_FIRMWARE";
+pub(crate) const FIRMWARE_VARIABLE: &str = "SKINRIG_EMULATED_ARM_FIRMWARE";
 
 /// Names of the files in an arm's directory.
 mod file {
@@ -58,7 +58,7 @@ mod file {
     /// The configuration, JSON.
     pub const CONFIG: &str = "arm.json";
     /// The journal of calls.
-    pub const JOURNAL: &str = "journal.txt";
+    pub(crate) const JOURNAL: &str = "journal.txt";
     /// The copy of the library.
-    pub const LIBRARY: &str = "libdrd.so";
+    pub(crate) const LIBRARY: &str = "libdrd.so";
 }

@@ -4,7 +4,7 @@
 pub type Band = Vec<[f64; 4]>;
 
 /// `w' C w` for weights of four neighbours.
-pub fn quadratic(c: &Band, first: usize, w: &[f64; 4]) -> f64 {
+pub(crate) fn quadratic(c: &Band, first: usize, w: &[f64; 4]) -> f64 {
     let mut sum = 0.0;
     for i in 0..4 {
         sum += w[i] * w[i] * c[first + i][0];
@@ -39,7 +39,7 @@ pub fn factor(a: &Band) -> Option<Band> {
 }
 
 /// Solves `l l' x = b`.
-pub fn solve(l: &Band, b: &[f64]) -> Vec<f64> {
+pub(crate) fn solve(l: &Band, b: &[f64]) -> Vec<f64> {
     let n = l.len();
     let mut x = b.to_vec();
     for i in 0..n {
@@ -58,7 +58,7 @@ pub fn solve(l: &Band, b: &[f64]) -> Vec<f64> {
 }
 
 /// The band of the inverse of `l l'` (Takahashi, Fagan and Chin 1973).
-pub fn inverse_band(l: &Band) -> Band {
+pub(crate) fn inverse_band(l: &Band) -> Band {
     let n = l.len();
     let mut z = vec![[0.0; 4]; n];
     for i in (0..n).rev() {

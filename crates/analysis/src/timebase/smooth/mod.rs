@@ -31,11 +31,11 @@ const MAD_TO_SIGMA: f64 = 1.482_602_218_505_602;
 /// Rounds of "fit, then choose the inliers anew".
 const ROUNDS: usize = 8;
 /// Rate differences wander by no more than this over a session: 20 ppm, a cheap crystal over tens of kelvins.
-pub const WANDER: f64 = 20e-6;
+pub(crate) const WANDER: f64 = 20e-6;
 
 /// The map.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Smooth {
+pub(crate) struct Smooth {
     grid: Grid,
     coefficients: Vec<f64>,
     /// Posterior covariances of coefficients with themselves and the next three, µs².
@@ -64,7 +64,7 @@ impl Smooth {
     }
 
     /// As [`Self::fit`], with the drift between two times on the first clock, µs, instead of the first and last point used.
-    pub fn fit_with_drift(
+    pub(crate) fn fit_with_drift(
         points: &[Point],
         step_us: f64,
         floor_us: f64,
@@ -148,7 +148,7 @@ impl Smooth {
     }
 
     /// Ends of the spline's steps, ascending: between them the map is nearly straight.
-    pub fn knots(&self) -> Vec<f64> {
+    pub(crate) fn knots(&self) -> Vec<f64> {
         let g = self.grid;
         let steps = 0..=g.steps;
         steps.map(|k| g.start_us + k as f64 * g.step_us).collect()

@@ -47,7 +47,7 @@ impl Figure {
     }
 
     /// The standard error 1.96 of which are half of the 95 % interval, few degrees of freedom included.
-    pub fn stated_se(self) -> f64 {
+    pub(crate) fn stated_se(self) -> f64 {
         self.se * student_quantile(0.975, self.free) / 1.96
     }
 }

@@ -15,7 +15,7 @@ const EVEN_SHARE: f64 = 0.125;
 const LINE_BELOW: usize = 8;
 
 /// What the points say of the coefficients, averaged over all smoothnesses.
-pub struct Posterior {
+pub(crate) struct Posterior {
     pub grid: Grid,
     pub span_us: (f64, f64),
     pub mean: Vec<f64>,

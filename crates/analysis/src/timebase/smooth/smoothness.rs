@@ -8,7 +8,7 @@ use super::grid::Grid;
 const LOWEST_POWER: f64 = -2.0;
 const HIGHEST_POWER: f64 = 12.0;
 /// Coefficients that no penalty holds: those of a parabola.
-pub const FREE: usize = 3;
+pub(crate) const FREE: usize = 3;
 
 /// How a rate wanders.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -20,7 +20,7 @@ enum Kind {
 }
 
 /// One smoothness: its maximum and what is left of uncertainty there.
-pub struct Candidate {
+pub(crate) struct Candidate {
     pub log_likelihood: f64,
     pub variance: f64,
     pub coefficients: Vec<f64>,
@@ -93,7 +93,7 @@ impl Data {
     }
 
     /// All smoothnesses but the limit; none of so few points that a line is made of them. `mean`: information on a coefficient.
-    pub fn wandering(&self, mean: f64) -> Vec<Candidate> {
+    pub(crate) fn wandering(&self, mean: f64) -> Vec<Candidate> {
         let mut out = Vec::new();
         for (kind, high) in [
             (Kind::Third, HIGHEST_POWER),
@@ -176,7 +176,7 @@ impl Data {
     }
 
     /// With an infinite penalty: a parabola is left, or the line.
-    pub fn parabola(&self) -> Option<Candidate> {
+    pub(crate) fn parabola(&self) -> Option<Candidate> {
         let size = self.right.len();
         let middle = 0.5 * (size - 1) as f64;
         let scale = middle.max(1.0);

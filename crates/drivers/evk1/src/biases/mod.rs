@@ -53,7 +53,7 @@ const fn bias(
 }
 
 /// The reference of the two contrast thresholds, mV; not to be changed.
-pub const DIFF: &str = "bias_diff";
+pub(crate) const DIFF: &str = "bias_diff";
 
 /// All biases that have a name, in the order of a bias file. `bias_diff` accepts its default alone.
 pub const BIASES: [Bias; 7] = [
@@ -235,7 +235,7 @@ pub fn write(registers: &mut Registers<'_>, values: &Values) -> Result<(), Evk1E
 ///
 /// # Errors
 /// [`Evk1Error::Usb`].
-pub fn read_as(registers: &mut Registers<'_>, bias: &Bias, mv: i64) -> Result<String, Evk1Error> {
+pub(crate) fn read_as(registers: &mut Registers<'_>, bias: &Bias, mv: i64) -> Result<String, Evk1Error> {
     let found = registers.read(bias.register())?;
     Ok(if bias.encode(mv) == Ok(found) {
         mv.to_string()

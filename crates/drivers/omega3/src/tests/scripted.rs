@@ -9,7 +9,7 @@ use crate::sdk::{Answer, CallError, Generator, Pace, Quantity, Reading, Sdk};
 
 /// One scripted device and its library.
 #[derive(Debug)]
-pub struct Scripted {
+pub(crate) struct Scripted {
     pub script: Mutex<Script>,
 }
 

@@ -59,7 +59,7 @@ pub struct Model {
 
 impl Model {
     /// Sets what the board's temperature sensor reports, in 1/4096 °C.
-    pub fn set_temperature(&mut self, steps: u32) {
+    pub(crate) fn set_temperature(&mut self, steps: u32) {
         self.registers.set(r::TEMPERATURE, steps);
     }
 
@@ -131,11 +131,11 @@ impl Evk1 {
     }
 
     /// The FPGA has booted.
-    pub fn is_booted(&self) -> bool {
+    pub(crate) fn is_booted(&self) -> bool {
         self.plugged.elapsed() >= Duration::from_millis(self.config.boot_ms)
     }
 
-    pub fn oscillator(&self) -> Oscillator {
+    pub(crate) fn oscillator(&self) -> Oscillator {
         Oscillator::new(self.config.drift_ppm)
     }
 
@@ -174,7 +174,7 @@ impl Evk1 {
     }
 
     /// Waits for the next run of the time base; `None` when the camera is gone.
-    pub fn next_run(&self, after: u64) -> Option<Run> {
+    pub(crate) fn next_run(&self, after: u64) -> Option<Run> {
         let mut model = self.lock();
         loop {
             if model.unplugged {

@@ -4,7 +4,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// An oscillator that is a little fast or slow.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Oscillator {
+pub(crate) struct Oscillator {
     /// Parts per billion by which it is fast.
     drift_ppb: i64,
 }
@@ -17,7 +17,7 @@ impl Oscillator {
     }
 
     /// Whole microseconds that it counts in `ns` of true time.
-    pub const fn count_us(self, ns: i64) -> u64 {
+    pub(crate) const fn count_us(self, ns: i64) -> u64 {
         // Whole and broken seconds apart, so that no product leaves 64 bits in any run.
         let (whole, rest) = (ns / 1_000_000_000, ns % 1_000_000_000);
         let drift = whole * self.drift_ppb + rest * self.drift_ppb / 1_000_000_000;

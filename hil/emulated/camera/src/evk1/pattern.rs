@@ -17,7 +17,7 @@ const CYCLES_PER_US: f64 = 100.0;
 
 /// What the registers make of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Pattern {
+pub(crate) struct Pattern {
     /// Events per µs of the camera's time.
     per_us: f64,
     /// A diagonal instead of columns.

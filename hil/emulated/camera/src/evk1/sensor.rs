@@ -30,7 +30,7 @@ impl Roi {
         bit(&self.columns, x) && bit(&self.rows, y)
     }
 
-    pub fn is_full(&self) -> bool {
+    pub(crate) fn is_full(&self) -> bool {
         let all = |words: &[u32]| words.iter().all(|w| *w == u32::MAX);
         all(&self.columns) && all(&self.rows)
     }
@@ -59,7 +59,7 @@ impl Sync {
 
 /// What the registers say while a packet is made.
 #[derive(Debug, Clone)]
-pub struct Gates {
+pub(crate) struct Gates {
     /// Pixels send events.
     pub pixels: bool,
     /// The pattern generator sends events in their place.

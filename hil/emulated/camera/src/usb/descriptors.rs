@@ -2,7 +2,7 @@
 
 /// The descriptors of one device with one configuration and one interface.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Descriptors {
+pub(crate) struct Descriptors {
     pub vendor: u16,
     pub product: u16,
     pub interface_class: u8,
@@ -24,7 +24,7 @@ const COMPANION: u8 = 0x30;
 const BULK: u8 = 2;
 
 impl Descriptors {
-    pub const fn is_super_speed(&self) -> bool {
+    pub(crate) const fn is_super_speed(&self) -> bool {
         self.speed_mbit >= 5000
     }
 

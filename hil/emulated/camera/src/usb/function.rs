@@ -15,7 +15,7 @@ pub enum Reply {
 }
 
 /// A device behind the bus.
-pub trait Function: Send + Sync {
+pub(crate) trait Function: Send + Sync {
     /// What it says about itself.
     fn descriptors(&self) -> &Descriptors;
 

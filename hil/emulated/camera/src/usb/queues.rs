@@ -16,7 +16,7 @@ use super::usbfs::Urb;
 
 /// A transfer under way: the URB and its address in the process under test.
 #[derive(Debug, Clone, Copy)]
-pub struct Submitted {
+pub(crate) struct Submitted {
     pub address: u64,
     pub urb: Urb,
 }
@@ -116,7 +116,7 @@ impl Queues {
     }
 
     /// Somebody else holds the interface from now on.
-    pub fn occupy(&self) {
+    pub(crate) fn occupy(&self) {
         self.lock().claimed_by = Some(SOMEBODY);
     }
 
@@ -206,7 +206,7 @@ impl Queues {
     }
 
     /// Cancels the transfer whose URB is at `address`; what it has got so far goes with it.
-    pub fn discard(&self, file: u64, address: u64) -> Result<(), Errno> {
+    pub(crate) fn discard(&self, file: u64, address: u64) -> Result<(), Errno> {
         let mut state = self.lock();
         let Some(open) = state.files.get_mut(&file) else {
             return Err(Errno::INVAL);
@@ -232,7 +232,7 @@ impl Queues {
     }
 
     /// The oldest finished transfer.
-    pub fn reap(&self, file: u64) -> Result<Finished, Errno> {
+    pub(crate) fn reap(&self, file: u64) -> Result<Finished, Errno> {
         let mut state = self.lock();
         let gone = state.unplugged;
         let open = state.files.get_mut(&file).ok_or(Errno::NODEV)?;
@@ -303,7 +303,7 @@ impl Queues {
     }
 
     /// Waits until more than `bytes` are free, at most for `patience`.
-    pub fn wait_for_room(&self, bytes: usize, patience: Duration) -> bool {
+    pub(crate) fn wait_for_room(&self, bytes: usize, patience: Duration) -> bool {
         if self.free() > bytes {
             return true;
         }
@@ -332,17 +332,17 @@ impl Queues {
     }
 
     /// The next transfer of the data endpoint that has more than `bytes` ends that much early; they follow in the next.
-    pub fn cut_next(&self, bytes: usize) {
+    pub(crate) fn cut_next(&self, bytes: usize) {
         self.lock().cut = Some(bytes);
     }
 
     /// Whether resets of the port fail.
-    pub fn fail_resets(&self, on: bool) {
+    pub(crate) fn fail_resets(&self, on: bool) {
         self.lock().resets_fail = on;
     }
 
     /// The transfer of the data endpoint after `transfers` more fails, with what it holds.
-    pub fn break_after(&self, transfers: u32) {
+    pub(crate) fn break_after(&self, transfers: u32) {
         self.lock().broken = Some(transfers);
     }
 

@@ -12,7 +12,7 @@ use rustix::pipe::fcntl_setpipe_size;
 
 /// The file that stands for a device.
 #[derive(Debug)]
-pub struct Readiness {
+pub(crate) struct Readiness {
     fifo: File,
     full: bool,
 }

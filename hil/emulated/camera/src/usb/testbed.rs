@@ -14,7 +14,7 @@ const SOCKET_PATH: usize = 107;
 
 /// The folder; removed with this value.
 #[derive(Debug)]
-pub struct TestBed(tempfile::TempDir);
+pub(crate) struct TestBed(tempfile::TempDir);
 
 /// Where a device is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

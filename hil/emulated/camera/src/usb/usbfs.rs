@@ -15,34 +15,34 @@ const fn read(nr: u64, size: u64) -> u64 {
     number(2, nr, size)
 }
 
-pub const RESET_ENDPOINT: u64 = read(3, 4);
-pub const SET_INTERFACE: u64 = read(4, 8);
-pub const SET_CONFIGURATION: u64 = read(5, 4);
-pub const GET_DRIVER: u64 = write(8, 260);
-pub const SUBMIT_URB: u64 = read(10, URB_BYTES as u64);
-pub const DISCARD_URB: u64 = none(11);
-pub const REAP_URB_NO_DELAY: u64 = write(13, 8);
-pub const CLAIM_INTERFACE: u64 = read(15, 4);
-pub const RELEASE_INTERFACE: u64 = read(16, 4);
-pub const RESET: u64 = none(20);
-pub const CLEAR_HALT: u64 = read(21, 4);
-pub const GET_CAPABILITIES: u64 = read(26, 4);
-pub const DISCONNECT_CLAIM: u64 = read(27, 264);
+pub(crate) const RESET_ENDPOINT: u64 = read(3, 4);
+pub(crate) const SET_INTERFACE: u64 = read(4, 8);
+pub(crate) const SET_CONFIGURATION: u64 = read(5, 4);
+pub(crate) const GET_DRIVER: u64 = write(8, 260);
+pub(crate) const SUBMIT_URB: u64 = read(10, URB_BYTES as u64);
+pub(crate) const DISCARD_URB: u64 = none(11);
+pub(crate) const REAP_URB_NO_DELAY: u64 = write(13, 8);
+pub(crate) const CLAIM_INTERFACE: u64 = read(15, 4);
+pub(crate) const RELEASE_INTERFACE: u64 = read(16, 4);
+pub(crate) const RESET: u64 = none(20);
+pub(crate) const CLEAR_HALT: u64 = read(21, 4);
+pub(crate) const GET_CAPABILITIES: u64 = read(26, 4);
+pub(crate) const DISCONNECT_CLAIM: u64 = read(27, 264);
 
 /// Zero packet, bulk continuation, no packet size limit, scatter-gather, reap after disconnect.
-pub const CAPABILITIES: u32 = 0x1f;
+pub(crate) const CAPABILITIES: u32 = 0x1f;
 
-pub const URB_BYTES: usize = 56;
+pub(crate) const URB_BYTES: usize = 56;
 const CONTROL: u8 = 2;
 const BULK: u8 = 3;
 
 /// `struct usbdevfs_urb`, kept as bytes so that it goes back as it came.
 #[derive(Debug, Clone, Copy)]
-pub struct Urb([u8; URB_BYTES]);
+pub(crate) struct Urb([u8; URB_BYTES]);
 
 /// What a URB asks for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Transfer {
+pub(crate) enum Transfer {
     Control,
     BulkIn(u8),
     BulkOut(u8),
@@ -118,7 +118,7 @@ impl Setup {
     }
 
     /// Defined by the device's maker.
-    pub const fn is_vendor(&self) -> bool {
+    pub(crate) const fn is_vendor(&self) -> bool {
         self.request_type & 0x60 == 0x40
     }
 }

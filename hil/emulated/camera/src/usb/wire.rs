@@ -66,7 +66,7 @@ impl Wire {
     }
 
     /// Reads the process's memory.
-    pub fn read_memory(&mut self, address: u64, length: usize) -> io::Result<Vec<u8>> {
+    pub(crate) fn read_memory(&mut self, address: u64, length: usize) -> io::Result<Vec<u8>> {
         if length > LONGEST {
             return Err(io::Error::other(format!(
                 "expected a transfer of at most {LONGEST} bytes, found {length}"
@@ -80,7 +80,7 @@ impl Wire {
     }
 
     /// Writes the process's memory, at the latest with the result.
-    pub fn write_memory(&mut self, address: u64, bytes: &[u8]) -> io::Result<()> {
+    pub(crate) fn write_memory(&mut self, address: u64, bytes: &[u8]) -> io::Result<()> {
         self.held
             .extend_from_slice(&message([WRITE_MEM, address, bytes.len() as u64]));
         if bytes.len() <= 4096 {

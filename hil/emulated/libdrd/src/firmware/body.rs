@@ -16,7 +16,7 @@ pub fn gravity(mass_kg: f64, tilt_deg: f64) -> Vector {
 
 /// The tip and everything that moves with it, taken as one mass.
 #[derive(Debug, Clone)]
-pub struct Body {
+pub(crate) struct Body {
     /// True position of the tip, m.
     pub position: Vector,
     /// m/s.

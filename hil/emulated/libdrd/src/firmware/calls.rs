@@ -11,7 +11,7 @@ use crate::wire::{Call, Control, Reply};
 
 /// Who asks.
 #[derive(Debug, Clone, Copy)]
-pub struct Caller {
+pub(crate) struct Caller {
     /// Number of the connection.
     pub connection: u64,
     /// Its process.

@@ -64,7 +64,7 @@ impl Faults {
     }
 
     /// A move or tracked target was accepted.
-    pub fn move_began(&mut self, now_ns: u64) {
+    pub(crate) fn move_began(&mut self, now_ns: u64) {
         for waiting in &mut self.waiting {
             if let Waiting::IntoMove(s, fault) = *waiting {
                 *waiting = Waiting::At(later(now_ns, s), fault);
@@ -119,7 +119,7 @@ impl Faults {
     }
 
     /// Whether a close fails; one failure less is left.
-    pub fn close_fails(&mut self) -> bool {
+    pub(crate) fn close_fails(&mut self) -> bool {
         self.active.iter_mut().any(|f| match f {
             Fault::CloseFails(left) => count_down(left),
             _ => false,

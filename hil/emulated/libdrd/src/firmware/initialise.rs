@@ -27,7 +27,7 @@ pub struct Initialisation {
 
 impl World {
     /// Begins a calibration, or also a sweep.
-    pub fn begin_initialisation(&mut self, sweep: bool) {
+    pub(crate) fn begin_initialisation(&mut self, sweep: bool) {
         let mut way = vec![self.config.reach_centre_m];
         if sweep {
             for axis in 0..3 {

@@ -83,7 +83,7 @@ impl Regulation {
     }
 
     /// One iteration of `dt` seconds: the force that the motors are told, gravity compensation included.
-    pub fn iterate(
+    pub(crate) fn iterate(
         &mut self,
         config: &ArmConfig,
         settings: &Settings,

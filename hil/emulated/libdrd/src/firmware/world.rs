@@ -205,14 +205,14 @@ impl World {
     }
 
     /// Starts the regulation loop where the arm is.
-    pub fn start_regulation(&mut self) {
+    pub(crate) fn start_regulation(&mut self) {
         self.regulation = Some(Regulation::new(self.body.position));
         self.commanded = gravity_compensation(&self.settings);
         self.power_on();
     }
 
     /// Lets happen what is due.
-    pub fn let_faults_happen(&mut self) {
+    pub(crate) fn let_faults_happen(&mut self) {
         let touching = norm(self.body.contact_force) > 0.0;
         for event in self.faults.due(self.t_ns, self.body.position[2], touching) {
             self.happen(event);
