@@ -84,7 +84,11 @@ impl Silences {
 
 /// The contacts that stand out of the counts, s on the host's clock, in order. `listed_s` are contact and release of the listed
 /// presses.
-pub(crate) fn contacts_s(rates: &RateHistogram, clock: &ClockFit, listed_s: &[(f64, f64)]) -> Vec<f64> {
+pub(crate) fn contacts_s(
+    rates: &RateHistogram,
+    clock: &ClockFit,
+    listed_s: &[(f64, f64)],
+) -> Vec<f64> {
     let bin_s = rates.bin_us() as f64 * 1e-6;
     let reach = (RISE_S / bin_s).round().max(1.0) as usize;
     let mut sums = vec![0.0];

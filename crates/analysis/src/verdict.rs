@@ -202,7 +202,10 @@ fn idle_events(view: &PressView) -> Option<IdleEvents> {
 
 /// The rule that leaves a valid press out because of where its rays meet, if any.
 #[must_use]
-pub(crate) fn location_rule(outcome: &LocationOutcome, settings: &AnalysisSettings) -> Option<Judgement> {
+pub(crate) fn location_rule(
+    outcome: &LocationOutcome,
+    settings: &AnalysisSettings,
+) -> Option<Judgement> {
     let plain = |rule: &str| Some(Judgement::excluded(rule.to_owned(), rule.to_owned()));
     match *outcome {
         LocationOutcome::Missing => plain("no view"),
@@ -235,7 +238,7 @@ pub(crate) fn is_done_as_planned(press: &PressResult) -> bool {
         || press.rule.as_deref().is_some_and(is_rule_on_data)
 }
 
-/// True for the rules of [`from_data`] and [`location_rule`] that exclude a press for what the cameras saw of it;
+/// True for the rules of [`from_data`] and `location_rule` that exclude a press for what the cameras saw of it;
 /// false for what the journal or a hand left out.
 #[must_use]
 pub fn is_rule_on_data(rule: &str) -> bool {
@@ -266,7 +269,10 @@ pub fn put(row: &mut PressResult, judgement: Judgement) {
 /// interval of the RMSE of those that count (without an interval: when the two differ at all), or when nothing
 /// counts. `rmse`: with and without exclusions.
 #[must_use]
-pub(crate) fn weight_of_exclusions(presses: &[PressResult], rmse: [&Estimate; 2]) -> Option<String> {
+pub(crate) fn weight_of_exclusions(
+    presses: &[PressResult],
+    rmse: [&Estimate; 2],
+) -> Option<String> {
     let [with, without] = rmse;
     let all = without.value?;
     let left_out = without.n.saturating_sub(with.n);

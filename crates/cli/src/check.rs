@@ -91,7 +91,7 @@ pub fn check(args: &ProtocolArgs, json: bool) -> Outcome {
 /// `skinrig plan`.
 ///
 /// # Errors
-/// See [`load`] and [`sample_size::propose`]; [`Failure::internal`] when the SVG cannot be written.
+/// See [`load`] and `sample_size::propose`; [`Failure::internal`] when the SVG cannot be written.
 pub fn plan(args: &PlanArgs, json: bool) -> Outcome {
     if let (Some(difference_mm), Some(session)) = (args.detect.detect, &args.detect.from) {
         return sample_size::propose(difference_mm, session, &args.detect, json);

@@ -139,7 +139,11 @@ fn where_and_when(tracker: &ProgressTracker, waited: Duration) -> String {
 
 /// How long the user still waits, and the rig time that passes meanwhile where that is another one.
 #[must_use]
-pub(crate) fn eta_text(elapsed: HostDuration, rig: Option<HostDuration>, waited: Duration) -> String {
+pub(crate) fn eta_text(
+    elapsed: HostDuration,
+    rig: Option<HostDuration>,
+    waited: Duration,
+) -> String {
     let Some(rig) = rig.filter(|_| elapsed.0 > 0) else {
         return "-".into();
     };

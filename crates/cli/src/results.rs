@@ -350,7 +350,7 @@ pub fn check_limit(results: &Results, max_rmse_mm: Option<f64>) -> Outcome {
 /// `skinrig analyze`.
 ///
 /// # Errors
-/// See [`analyze_session`], [`write_results`], [`check_limit`].
+/// See [`analyze_session`], `write_results`, [`check_limit`].
 pub fn analyze(args: &AnalyzeArgs, json: bool) -> Outcome {
     let choices = Choices {
         overrides: &args.overrides,
@@ -404,7 +404,7 @@ fn replaced(results: &Results, out: Option<&Path>) -> Option<String> {
 /// `skinrig report`.
 ///
 /// # Errors
-/// See [`analyze_session`], [`write_results`].
+/// See [`analyze_session`], `write_results`.
 pub fn report(args: &ReportArgs, json: bool) -> Outcome {
     let variant = match &args.analysis {
         None => None,

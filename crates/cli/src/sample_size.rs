@@ -20,7 +20,12 @@ const FEW_LOCATIONS: u32 = 12;
 ///
 /// # Errors
 /// [`Failure::input`] for a session that cannot be analysed, without presses that score, or that says too little.
-pub(crate) fn propose(difference_mm: f64, session: &Path, args: &DetectArgs, json: bool) -> Outcome {
+pub(crate) fn propose(
+    difference_mm: f64,
+    session: &Path,
+    args: &DetectArgs,
+    json: bool,
+) -> Outcome {
     let analysis = analyze_session(session, Choices::default())?.analysis;
     let refused = |e: &dyn std::fmt::Display| Failure::input(format!("{}: {e}", session.display()));
     let sample = errors(&analysis).map_err(|e| refused(&e))?;

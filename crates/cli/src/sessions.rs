@@ -153,7 +153,7 @@ pub(crate) fn originals(all: &[SessionSummary]) -> Vec<&SessionSummary> {
         .collect()
 }
 
-/// A remark on every copy that [`originals`] leaves out.
+/// A remark on every copy that `originals` leaves out.
 #[must_use]
 pub fn copies(all: &[SessionSummary]) -> Vec<String> {
     let mut remarks = Vec::new();

@@ -40,7 +40,7 @@ impl Operator {
     /// Listens from now on. What is asked for before the run begins is heard when it does.
     ///
     /// # Errors
-    /// As [`on_ctrl_c`].
+    /// As `on_ctrl_c`.
     pub fn listen() -> Result<Self, String> {
         Self::answering(OF_RUN, false)
     }

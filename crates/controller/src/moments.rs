@@ -43,7 +43,11 @@ impl Settling {
 
     /// Settled a band closer than the guard demands of the motion that follows ([`SETTLED_SHARE`]).
     #[must_use]
-    pub(crate) fn before_a_motion(target: Point3<Skin>, limits: &RunLimits, after: HostTime) -> Self {
+    pub(crate) fn before_a_motion(
+        target: Point3<Skin>,
+        limits: &RunLimits,
+        after: HostTime,
+    ) -> Self {
         Self {
             tolerance_mm: SETTLED_SHARE * limits.position_tolerance_mm,
             ..Self::new(target, limits, after)
@@ -64,12 +68,6 @@ impl Settling {
         if sample.t - since >= self.time && self.settled.is_none() {
             self.settled = Some(sample.t);
         }
-    }
-
-    /// Where to.
-    #[must_use]
-    pub const fn target(&self) -> Point3<Skin> {
-        self.target
     }
 
     /// True when the newest sample is within the tolerance.

@@ -74,11 +74,11 @@ pub struct StreamInspection {
     pub last_us: Option<u64>,
     /// Seconds that had been added to the camera's time (HDF5).
     pub ts_offset_s: Option<f64>,
-    /// Silences longer than the threshold: no CD event and no trigger edge. At most [`LIST_LIMIT`] of them.
+    /// Silences longer than the threshold: no CD event and no trigger edge. At most `LIST_LIMIT` of them.
     pub gaps: Vec<Gap>,
     /// Number of such silences.
     pub gap_count: u64,
-    /// Steps of the time base that are neither progress nor a wrap. At most [`LIST_LIMIT`] of them; all are
+    /// Steps of the time base that are neither progress nor a wrap. At most `LIST_LIMIT` of them; all are
     /// counted in `stats`.
     pub discontinuities: Vec<Discontinuity>,
     previous_us: Option<u64>,

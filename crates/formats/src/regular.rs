@@ -52,7 +52,7 @@ pub fn open(path: &Path) -> io::Result<File> {
     File::open(path)
 }
 
-/// Reads a text file of at most [`MAX_TEXT_BYTES`] whole.
+/// Reads a text file of at most `MAX_TEXT_BYTES` whole.
 ///
 /// # Errors
 /// As [`open`], when reading fails, and for a longer file.

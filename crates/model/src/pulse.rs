@@ -2,7 +2,7 @@
 //!
 //! # On the wire
 //!
-//! A train is 32 pulses ([`PULSES_PER_TRAIN`]). Pulse `k = 0..32` rises `k *` 400 µs ([`PULSE_PERIOD_US`]) after
+//! A train is 32 pulses ([`PULSES_PER_TRAIN`]). Pulse `k = 0..32` rises `k *` 400 µs (`PULSE_PERIOD_US`) after
 //! the train's first rising edge; its width tells its meaning:
 //!
 //! | pulse | width | what |
@@ -10,7 +10,7 @@
 //! | 0 | 300 µs | start; its rising edge is the instant that the train stands for |
 //! | 1..=3 | 100 µs for 0, 200 µs for 1 | kind, most significant bit first: 1..=5 a mark ([`MarkKind::code`]), 6 a sync train ([`SYNC_CODE`]); 0 and 7 are never sent |
 //! | 4..=20 | likewise | 17 bits, most significant first: the press of a mark, or the running number of a sync train modulo 2^17 |
-//! | 21..=31 | likewise | 11 check bits, most significant first: [`check_bits`] of the 20 data bits |
+//! | 21..=31 | likewise | 11 check bits, most significant first: `check_bits` of the 20 data bits |
 //!
 //! Afterwards the line stays low until 34 periods ([`PulseTrain::DURATION_US`], 13.6 ms) have passed since the
 //! first edge. All widths are far above the 500 ns minimum of the camera's trigger input.
@@ -19,7 +19,7 @@
 //!
 //! The 31 bits are a word of the even-weight BCH(31, 21) code with generator
 //! `(x + 1)(x^10 + x^9 + x^8 + x^6 + x^5 + x^3 + 1)`, the code of POCSAG paging (ITU-R M.584): any two words
-//! differ in at least 6 bits. Check bits are XORed with [`CHECK_MASK`], because the code is cyclic: without the
+//! differ in at least 6 bits. Check bits are XORed with `CHECK_MASK`, because the code is cyclic: without the
 //! mask a train read one pulse late could again be a word; with it every such shift is at least 4 bits away from
 //! all words. [`decode_marks`] says what that buys.
 

@@ -497,7 +497,9 @@ impl Journal {
     }
 
     /// Final counts, when the session is complete enough to be sealed: (what is needed, what there is) otherwise.
-    pub(crate) async fn sealable(&mut self) -> Result<Result<SessionTotals, (String, String)>, Fault> {
+    pub(crate) async fn sealable(
+        &mut self,
+    ) -> Result<Result<SessionTotals, (String, String)>, Fault> {
         let ends: i64 = sqlx::query_scalar("SELECT count(*) FROM run_end")
             .fetch_one(&mut self.conn)
             .await?;

@@ -20,22 +20,22 @@ pub enum Cell {
     Value(Estimate),
 }
 
-/// One row: what the session says without reduction and at [`FACTOR`].
+/// One row: what the session says without reduction and at `FACTOR`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Row {
     /// Which quantity.
     pub metric: Metric,
     /// All events.
     pub session: Cell,
-    /// One event in [`FACTOR`] kept, chosen at random by exact count as in the public code: emulated.
+    /// One event in `FACTOR` kept, chosen at random by exact count as in the public code: emulated.
     pub reduced: Cell,
     /// Lo Preti et al. 2022, as given in the paper.
     pub msows: &'static str,
     /// The paper without reduction.
     pub paper: &'static str,
-    /// The paper at [`FACTOR`].
+    /// The paper at `FACTOR`.
     pub paper_reduced: &'static str,
-    /// Marks of the footnotes ([`crate::published::FOOTNOTES`]).
+    /// Marks of the footnotes (`crate::published::FOOTNOTES`).
     pub notes: &'static str,
 }
 

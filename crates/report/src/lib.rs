@@ -5,7 +5,7 @@
 //! means per location) are in one place, [`mod@derive`], with their formulas.
 //!
 //! User strings (prototype, operator, notes, file names) are escaped wherever they land: by minijinja's
-//! auto-escape in HTML, by the [`svg`] builder in figures, and by [`page::script_json`] in script data.
+//! auto-escape in HTML, by the [`svg`] builder in figures, and by `page::script_json` in script data.
 //!
 //! Hooks for browser tests: every section, figure, button and the press table carries a `data-testid`.
 

@@ -2,7 +2,7 @@
 //!
 //! "The paper" is Koolani et al., "An Event-Based Opto-Tactile Skin" (Frontiers); table and figure names are
 //! its own. Numbers only: what a cell says in words is said here in our own. Where published numbers
-//! contradict each other, both stand here and a [`Footnote`] says so.
+//! contradict each other, both stand here and a `Footnote` says so.
 
 use serde::Serialize;
 

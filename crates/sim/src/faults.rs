@@ -44,7 +44,7 @@ pub enum Fault {
         /// 1 to 100.
         percent: u32,
     },
-    /// From then on the tip is so much higher than the robot reports (negative: lower); it gets there at [`HEIGHT_OFF_MM_S`].
+    /// From then on the tip is so much higher than the robot reports (negative: lower); it gets there at `HEIGHT_OFF_MM_S`.
     HeightOff {
         /// When it begins.
         when: When,
@@ -53,7 +53,7 @@ pub enum Fault {
     },
     /// The tip stays where it is, whatever the robot is told; its pose stream goes on.
     IndenterStuck(When),
-    /// For [`SPIKE_NS`] the robot reports [`SPIKE_N`] more than it feels.
+    /// For `SPIKE_NS` the robot reports `SPIKE_N` more than it feels.
     ForceSpike(When),
     /// No pose sample comes any more, and no error either.
     PosesStale(When),
@@ -84,7 +84,7 @@ pub enum Fault {
         /// When.
         when: When,
     },
-    /// [`STORM_PIXELS`] pixels of a camera send [`STORM_PER_MS`] events per millisecond each, for [`STORM_NS`].
+    /// [`STORM_PIXELS`] pixels of a camera send [`STORM_PER_MS`] events per millisecond each, for `STORM_NS`.
     HotPixelStorm {
         /// Which.
         camera: CameraId,
@@ -100,7 +100,7 @@ pub enum Fault {
         /// By how much, µs.
         by_us: u32,
     },
-    /// A camera grows hotter by [`HOT_C`] within [`HOT_RISE_NS`], stays so for [`HOT_NS`], and cools down as fast.
+    /// A camera grows hotter by `HOT_C` within `HOT_RISE_NS`, stays so for `HOT_NS`, and cools down as fast.
     CameraHot {
         /// Which.
         camera: CameraId,
@@ -166,7 +166,7 @@ pub enum MarkFate {
     Lost,
     /// It arrives twice, one after the other.
     Doubled,
-    /// It arrives [`DELAY_NS`] late.
+    /// It arrives `DELAY_NS` late.
     Delayed,
 }
 

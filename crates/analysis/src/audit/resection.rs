@@ -45,7 +45,11 @@ pub(crate) struct Resection {
 }
 
 /// Fits `drawn` to the pairs, which count as many times as there are `places`. `None` with fewer than 3 pairs.
-pub(crate) fn resect(drawn: &CameraModel, pairs: &[(f64, Point2)], places: usize) -> Option<Resection> {
+pub(crate) fn resect(
+    drawn: &CameraModel,
+    pairs: &[(f64, Point2)],
+    places: usize,
+) -> Option<Resection> {
     if pairs.len() < 3 {
         return None;
     }

@@ -28,7 +28,11 @@ pub(crate) struct ShiftedRest {
 
 /// Looks for a shift that begins within the session and stays to its end, in the streams of `cameras`, with the cameras of
 /// `as_is`.
-pub(crate) fn shifted_rest(path: &Path<'_>, as_is: &Judged<'_>, cameras: &[usize]) -> Option<ShiftedRest> {
+pub(crate) fn shifted_rest(
+    path: &Path<'_>,
+    as_is: &Judged<'_>,
+    cameras: &[usize],
+) -> Option<ShiftedRest> {
     let n = path.touches.len();
     let shifts: Vec<i32> = (-MOST_SHIFT..=MOST_SHIFT).collect();
     let loss = |i: usize, by: i32| -> f64 {

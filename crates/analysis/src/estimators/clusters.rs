@@ -32,7 +32,7 @@ impl Clusters {
         }
     }
 
-    /// See [`super::PressEstimator::sight`].
+    /// See `super::PressEstimator::sight`.
     pub fn sight(&mut self, events: &[KeptEvent]) -> Sighting {
         for event in events {
             self.grid

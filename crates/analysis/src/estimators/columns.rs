@@ -69,7 +69,7 @@ impl Median {
         }
     }
 
-    /// See [`super::PressEstimator::sight`].
+    /// See `super::PressEstimator::sight`.
     pub fn sight(&mut self, events: &[KeptEvent]) -> Sighting {
         self.columns.fill(events);
         let total = u64::from(self.columns.events());

@@ -43,7 +43,7 @@ impl<R: Real> Peak<R> {
         }
     }
 
-    /// See [`super::PressEstimator::sight`].
+    /// See `super::PressEstimator::sight`.
     pub fn sight(&mut self, events: &[KeptEvent]) -> Sighting {
         self.columns.fill(events);
         if self.columns.events() == 0 {

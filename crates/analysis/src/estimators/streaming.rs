@@ -132,7 +132,7 @@ impl<R: Real> Streaming<R> {
         *median
     }
 
-    /// See [`super::PressEstimator::sight`].
+    /// See `super::PressEstimator::sight`.
     pub fn sight(&mut self, events: &[KeptEvent], from_us: u32) -> Sighting {
         self.restart(from_us);
         for event in events {

@@ -231,7 +231,11 @@ impl<'a> Replay<'a> {
 
     /// The rows of a region, per camera: those next to each other that hold most of what the calibrating presses
     /// add to the idle rate; of equal ones the first. The whole crop without calibrating presses.
-    pub(crate) fn region_rows(&self, settings: &AnalysisSettings, region: Region) -> [(u16, u16); 2] {
+    pub(crate) fn region_rows(
+        &self,
+        settings: &AnalysisSettings,
+        region: Region,
+    ) -> [(u16, u16); 2] {
         let parts = match region {
             Region::Full => return settings.crop_v,
             Region::Half => 2,

@@ -100,7 +100,11 @@ impl Check {
     }
 
     /// Not checked, and what would let it be.
-    pub(crate) fn not_checked_yet(self, why: impl Into<String>, next: impl Into<String>) -> Finding {
+    pub(crate) fn not_checked_yet(
+        self,
+        why: impl Into<String>,
+        next: impl Into<String>,
+    ) -> Finding {
         self.end(Verdict::NotChecked, why, Some(next.into()))
     }
 }

@@ -161,7 +161,8 @@ pub(crate) const IMAGE_SIZE: Register = register("IMAGE_SIZE", 0x003e, 0x0280_01
 /// Switches of the temperature monitor.
 pub(crate) const EXT_TEMP_CONTROL: Register = register("EXT_TEMP_CONTROL", 0x0148, 0);
 /// Reads the board's temperature sensor.
-pub(crate) const EXT_TEMP_MONITOR_SPI_EN: Field = bit(EXT_TEMP_CONTROL, "EXT_TEMP_MONITOR_SPI_EN", 2);
+pub(crate) const EXT_TEMP_MONITOR_SPI_EN: Field =
+    bit(EXT_TEMP_CONTROL, "EXT_TEMP_MONITOR_SPI_EN", 2);
 /// The board's temperature; a sign is not known.
 pub const EVK_EXT_TEMP_VALUE: Register = volatile("EVK_EXT_TEMP_VALUE", 0x014c, 0, 0);
 /// In 1/4096 °C.

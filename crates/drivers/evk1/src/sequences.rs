@@ -133,7 +133,10 @@ pub fn init_sensor(registers: &mut Registers<'_>) -> Result<(), Evk1Error> {
 ///
 /// # Errors
 /// [`Evk1Error::Usb`], [`Evk1Error::ReadBack`].
-pub(crate) fn init_facilities(registers: &mut Registers<'_>, fpga_version: u32) -> Result<(), Evk1Error> {
+pub(crate) fn init_facilities(
+    registers: &mut Registers<'_>,
+    fpga_version: u32,
+) -> Result<(), Evk1Error> {
     for channel in crate::triggers::CHANNELS {
         registers.set(r::trigger_input(channel), 0)?;
     }
@@ -213,7 +216,10 @@ fn read_events(registers: &mut Registers<'_>, buffer: &mut [u8]) -> Result<usize
 /// # Errors
 /// [`Evk1Error::Usb`]; [`Evk1Error::StillSending`] when bytes still come after 2 s on `clock`, or after more of them
 /// than any buffer on the way holds.
-pub(crate) fn clear_left_over(registers: &mut Registers<'_>, clock: &dyn Clock) -> Result<u64, Evk1Error> {
+pub(crate) fn clear_left_over(
+    registers: &mut Registers<'_>,
+    clock: &dyn Clock,
+) -> Result<u64, Evk1Error> {
     const ENOUGH_BYTES: u64 = 16 << 20;
     let end = clock.now() + EMPTYING_LIMIT;
     let mut buffer = vec![0; 128 << 10];

@@ -22,7 +22,7 @@ pub enum TimeBase {
 /// Settings that a camera can take.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Wanted {
-    /// Values by name, in the unit of [`Model::bias_range`]; others keep their default.
+    /// Values by name, in the unit of `Model::bias_range`; others keep their default.
     pub biases: BTreeMap<String, i16>,
     /// Trigger edges are part of the stream.
     pub trigger: bool,

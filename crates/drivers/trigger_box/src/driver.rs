@@ -139,7 +139,7 @@ impl SerialTriggerBox {
     /// Sync trains with this period in ms while the box is armed; `None` ends them.
     ///
     /// # Errors
-    /// [`DeviceError::Refused`] for a period below twice a train ([`MIN_SYNC_PERIOD_MS`]), [`DeviceError::Lost`].
+    /// [`DeviceError::Refused`] for a period below twice a train (`MIN_SYNC_PERIOD_MS`), [`DeviceError::Lost`].
     pub fn set_sync(&mut self, period_ms: Option<u16>) -> Result<(), DeviceError> {
         if let Some(found) = period_ms.filter(|&ms| ms < MIN_SYNC_PERIOD_MS) {
             return Err(self.refused(

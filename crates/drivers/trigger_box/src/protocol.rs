@@ -63,7 +63,7 @@ pub enum Request {
     },
     /// Send sync trains by itself.
     Sync {
-        /// ms; 0 ends them, else at least [`MIN_SYNC_PERIOD_MS`].
+        /// ms; 0 ends them, else at least `MIN_SYNC_PERIOD_MS`.
         period_ms: u16,
         /// The count that the next train carries.
         first: u32,
@@ -319,7 +319,7 @@ pub struct Hello {
     pub ticks_per_us: u8,
     /// Its serial number; empty when it was never given one.
     pub serial: String,
-    /// [`BOX_NAME`].
+    /// `BOX_NAME`.
     pub name: String,
 }
 

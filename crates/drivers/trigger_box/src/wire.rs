@@ -38,7 +38,10 @@ const BUSY_INTERVAL: Duration = Duration::from_millis(50);
 ///
 /// # Errors
 /// [`OpenError`].
-pub(crate) fn dial_patiently(dial: &mut dyn Dial, patience: Duration) -> Result<Box<dyn Wire>, OpenError> {
+pub(crate) fn dial_patiently(
+    dial: &mut dyn Dial,
+    patience: Duration,
+) -> Result<Box<dyn Wire>, OpenError> {
     let end = Instant::now() + patience;
     loop {
         match dial.dial() {

@@ -45,7 +45,7 @@ pub struct Reference {
 }
 
 impl Reference {
-    /// The reference made of `samples`, in the order of the nights; `None` for fewer than [`FEWEST`]. `counts`: the values are
+    /// The reference made of `samples`, in the order of the nights; `None` for fewer than `FEWEST`. `counts`: the values are
     /// counts of events that come one by one.
     #[must_use]
     pub fn of(samples: &[Sample], counts: bool) -> Option<Self> {

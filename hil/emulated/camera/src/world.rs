@@ -10,7 +10,7 @@
 //! tip T_NS X_MM Y_MM Z_MM            where the robot's tip is, in the robot's frame
 //! ```
 //!
-//! Lines of one connection come in time order. Cameras lag behind the present by [`LATENCY_NS`], so that an edge
+//! Lines of one connection come in time order. Cameras lag behind the present by `LATENCY_NS`, so that an edge
 //! finds its place in the stream. A process whose own time may fall further behind, such as a simulated microcontroller
 //! on a busy machine, writes `time` at least every millisecond of it: cameras then never pass what it has
 //! announced, and its edges keep their exact places. A line that cannot be read is answered with `error: ...` and ends

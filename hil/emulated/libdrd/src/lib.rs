@@ -24,7 +24,7 @@
 //! two libraries. Without an arm the library finds no device.
 //!
 //! Cargo does not build the binaries of a dependency, so the firmware runs from whatever executable links
-//! this crate: started again with [`FIRMWARE_VARIABLE`] set, it becomes the firmware before its `main`. The
+//! this crate: started again with `FIRMWARE_VARIABLE` set, it becomes the firmware before its `main`. The
 //! binary `drd-firmware` is the same for use from a shell.
 #![cfg(unix)]
 

@@ -235,7 +235,11 @@ pub fn write(registers: &mut Registers<'_>, values: &Values) -> Result<(), Evk1E
 ///
 /// # Errors
 /// [`Evk1Error::Usb`].
-pub(crate) fn read_as(registers: &mut Registers<'_>, bias: &Bias, mv: i64) -> Result<String, Evk1Error> {
+pub(crate) fn read_as(
+    registers: &mut Registers<'_>,
+    bias: &Bias,
+    mv: i64,
+) -> Result<String, Evk1Error> {
     let found = registers.read(bias.register())?;
     Ok(if bias.encode(mv) == Ok(found) {
         mv.to_string()
