@@ -156,7 +156,9 @@ impl Kind {
             Self::Duration(ty) => quote!(f.as_quantity().map(<#ty>::from_secs_f64)),
             Self::List(of) => {
                 let of = of.read();
-                quote!(f.items().iter().map(|f| #of).collect::<Option<Vec<_>>>())
+                // All items are read, so that the findings of each appear.
+                quote!(f.items().iter().map(|f| #of).collect::<Vec<_>>()
+                    .into_iter().collect::<Option<Vec<_>>>())
             }
             Self::Tuple(of, _) => {
                 let of = of.read();
