@@ -282,7 +282,7 @@ mod tests {
             .build()
             .unwrap();
         runtime.block_on(async {
-            for version in 1..=schema::SCHEMA_VERSION {
+            for version in 1..=crate::SCHEMA_VERSION {
                 let path = folder.path().join(format!("{version}.session.sqlite"));
                 let mut old = schema::create_version(&path, version).await.unwrap();
                 let path = folder.path().join(format!("{version}-now.session.sqlite"));

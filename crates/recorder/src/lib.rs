@@ -34,6 +34,7 @@ mod insert;
 mod left;
 mod leg;
 mod lock;
+mod migrations;
 mod pose;
 mod prepare;
 mod prepared;
@@ -53,6 +54,7 @@ pub use codec::Codec;
 pub use error::RecorderError;
 pub use left::Sealed;
 pub use lock::writer_of;
+pub use migrations::SCHEMA_VERSION;
 pub use queue::QueueLoad;
 pub use reader::SessionReader;
 pub use rows::{
@@ -60,7 +62,6 @@ pub use rows::{
     PressTally, Seal, SessionTotals,
 };
 pub use salvage::{LostBytes, SalvageReport, SalvagedTable, salvage};
-pub use schema::SCHEMA_VERSION;
 pub use tags::{LaterNote, Saying, Sayings, TAGS_SUFFIX, is_tag, say, sayings, tags_path};
 pub use verify::{ChunkScanner, VerifyReport, verify};
 pub use writer::SessionWriter;

@@ -3,88 +3,18 @@
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
-use std::sync::LazyLock;
 use std::time::{Duration, Instant};
 
-use sqlx::migrate::{Migration, MigrationType, Migrator};
 use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection, SqliteJournalMode, SqliteSynchronous};
-use sqlx::{ConnectOptions, Connection, Row, SqlSafeStr, Sqlite, Transaction};
+use sqlx::{ConnectOptions, Connection, Row, Sqlite, Transaction};
 
 use crate::beside::{beside, refuse_special_files, refuse_super_journal};
 use crate::error::RecorderError;
+use crate::migrations::{MIGRATOR, SCHEMA_VERSION};
 use crate::query::{Fault, each_row};
-
-/// The schema version that this build writes, and the newest that it reads (`PRAGMA user_version`).
-pub const SCHEMA_VERSION: u32 = 10;
 
 /// `skrg` in ASCII (`PRAGMA application_id`).
 pub(crate) const APPLICATION_ID: u32 = u32::from_be_bytes(*b"skrg");
-
-/// Every migration, oldest first: version, description and SQL. Written out: the macro that reads the folder would build SQLite a
-/// second time, for the compiler.
-const MIGRATIONS: [(i64, &str, &str); SCHEMA_VERSION as usize] = [
-    (
-        20261121000000,
-        "session",
-        include_str!("../../../migrations/20261121000000_session.sql"),
-    ),
-    (
-        20261121120000,
-        "box report",
-        include_str!("../../../migrations/20261121120000_box_report.sql"),
-    ),
-    (
-        20261121140000,
-        "preflight",
-        include_str!("../../../migrations/20261121140000_preflight.sql"),
-    ),
-    (
-        20261121150000,
-        "operator",
-        include_str!("../../../migrations/20261121150000_operator.sql"),
-    ),
-    (
-        20261121160000,
-        "leg",
-        include_str!("../../../migrations/20261121160000_leg.sql"),
-    ),
-    (
-        20261121170000,
-        "gap",
-        include_str!("../../../migrations/20261121170000_gap.sql"),
-    ),
-    (
-        20261121180000,
-        "headline",
-        include_str!("../../../migrations/20261121180000_headline.sql"),
-    ),
-    (
-        20261122100000,
-        "faults",
-        include_str!("../../../migrations/20261122100000_faults.sql"),
-    ),
-    (
-        20261122110000,
-        "previous seal",
-        include_str!("../../../migrations/20261122110000_previous_seal.sql"),
-    ),
-    (
-        20261122120000,
-        "completed leg",
-        include_str!("../../../migrations/20261122120000_completed_leg.sql"),
-    ),
-];
-
-pub(crate) static MIGRATOR: LazyLock<Migrator> = LazyLock::new(|| migrator(&MIGRATIONS));
-
-/// A migrator of these migrations: version, description and SQL of each.
-fn migrator(migrations: &[(i64, &'static str, &'static str)]) -> Migrator {
-    let migrations = migrations.iter().map(|&(version, description, sql)| {
-        let kind = MigrationType::Simple;
-        Migration::new(version, description.into(), kind, sql.into_sql_str(), false)
-    });
-    Migrator::with_migrations(migrations.collect())
-}
 
 /// Bytes of a page, the largest that SQLite knows. Every page of camera bytes costs three system calls on its way
 /// through the log: 64 KiB took in 500 MB/s where 16 KiB took in 380 (`cargo bench -p skinrig-bench --bench ingest`).
@@ -143,7 +73,9 @@ pub(crate) async fn create_version(path: &Path, version: u32) -> sqlx::Result<Sq
     File::create_new(path)?;
     let mut conn = new_file(path).await?;
     let first = MIGRATOR.iter().take(version as usize).cloned().collect();
-    Migrator::with_migrations(first).run(&mut conn).await?;
+    sqlx::migrate::Migrator::with_migrations(first)
+        .run(&mut conn)
+        .await?;
     Ok(conn)
 }
 
@@ -400,20 +332,6 @@ fn check_first_page(path: &Path) -> Result<Mode, RecorderError> {
 mod tests {
     use super::*;
 
-    #[test]
-    fn every_file_of_the_folder_is_a_migration() {
-        let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../migrations");
-        let mut files: Vec<String> = std::fs::read_dir(folder)
-            .unwrap()
-            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
-            .filter(|name| name.ends_with(".sql"))
-            .collect();
-        files.sort();
-        let name = |(version, description, _): (i64, &str, &str)| {
-            format!("{version}_{}.sql", description.replace(' ', "_"))
-        };
-        assert_eq!(files, MIGRATIONS.map(name));
-    }
     use crate::beside::SUPER_JOURNAL_END;
 
     struct NoBytes;

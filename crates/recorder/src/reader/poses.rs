@@ -105,7 +105,7 @@ mod tests {
     use sqlx::{Connection as _, Row as _, SqliteConnection};
 
     use super::EXPLAINED;
-    use crate::schema::MIGRATOR;
+    use crate::migrations::MIGRATOR;
 
     #[test]
     fn a_block_is_found_without_a_walk_over_the_others() {

@@ -1,0 +1,95 @@
+//! The migrations of a session file, oldest first.
+
+use std::sync::LazyLock;
+
+use sqlx::SqlSafeStr;
+use sqlx::migrate::{Migration, MigrationType, Migrator};
+
+/// The schema version that this build writes, and the newest that it reads (`PRAGMA user_version`).
+pub const SCHEMA_VERSION: u32 = 10;
+
+/// Every migration, oldest first: version, description and SQL. Written out: the macro that reads the folder would build SQLite a
+/// second time, for the compiler.
+const MIGRATIONS: [(i64, &str, &str); SCHEMA_VERSION as usize] = [
+    (
+        20261121000000,
+        "session",
+        include_str!("../../../migrations/20261121000000_session.sql"),
+    ),
+    (
+        20261121120000,
+        "box report",
+        include_str!("../../../migrations/20261121120000_box_report.sql"),
+    ),
+    (
+        20261121140000,
+        "preflight",
+        include_str!("../../../migrations/20261121140000_preflight.sql"),
+    ),
+    (
+        20261121150000,
+        "operator",
+        include_str!("../../../migrations/20261121150000_operator.sql"),
+    ),
+    (
+        20261121160000,
+        "leg",
+        include_str!("../../../migrations/20261121160000_leg.sql"),
+    ),
+    (
+        20261121170000,
+        "gap",
+        include_str!("../../../migrations/20261121170000_gap.sql"),
+    ),
+    (
+        20261121180000,
+        "headline",
+        include_str!("../../../migrations/20261121180000_headline.sql"),
+    ),
+    (
+        20261122100000,
+        "faults",
+        include_str!("../../../migrations/20261122100000_faults.sql"),
+    ),
+    (
+        20261122110000,
+        "previous seal",
+        include_str!("../../../migrations/20261122110000_previous_seal.sql"),
+    ),
+    (
+        20261122120000,
+        "completed leg",
+        include_str!("../../../migrations/20261122120000_completed_leg.sql"),
+    ),
+];
+
+pub(crate) static MIGRATOR: LazyLock<Migrator> = LazyLock::new(|| migrator(&MIGRATIONS));
+
+/// A migrator of these migrations: version, description and SQL of each.
+fn migrator(migrations: &[(i64, &'static str, &'static str)]) -> Migrator {
+    let migrations = migrations.iter().map(|&(version, description, sql)| {
+        let kind = MigrationType::Simple;
+        Migration::new(version, description.into(), kind, sql.into_sql_str(), false)
+    });
+    Migrator::with_migrations(migrations.collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_file_of_the_folder_is_a_migration() {
+        let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../migrations");
+        let mut files: Vec<String> = std::fs::read_dir(folder)
+            .unwrap()
+            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+            .filter(|name| name.ends_with(".sql"))
+            .collect();
+        files.sort();
+        let name = |(version, description, _): (i64, &str, &str)| {
+            format!("{version}_{}.sql", description.replace(' ', "_"))
+        };
+        assert_eq!(files, MIGRATIONS.map(name));
+    }
+}
