@@ -227,7 +227,7 @@ fn a_circle_is_found_also_through_what_a_module_hands_on() {
         "mod a; mod b; mod c; pub use b::B; #[cfg(test)] mod t;",
     );
     write("a.rs", "use crate::B; pub struct A(B);");
-    write("b.rs", "pub struct B; fn f() -> crate::c::C { todo!() }");
+    write("b.rs", "pub struct B; fn f(c: crate::c::C) {}");
     write(
         "c.rs",
         "pub struct C; #[cfg(test)] mod tests { use crate::a::A; }",

@@ -1,7 +1,7 @@
 //! What a session says of its rig, for whoever analyses it.
 
 use serde::{Deserialize, Serialize};
-use serde_json::{Value, json};
+use serde_json::{Map, Value};
 use skinrig_model::{AnalysisSettings, PressId, RigGeometry};
 
 /// What `RunHeader::rig_json` holds.
@@ -57,13 +57,17 @@ fn name_thresholds(study: &mut Value) {
     let Some(study) = study.as_object_mut() else {
         return;
     };
-    let (Some(ends), Some(Value::Number(count))) =
-        (study.remove("threshold_range"), study.get("thresholds"))
-    else {
-        return;
-    };
-    let grid = json!({ "from": ends[0], "to": ends[1], "count": count });
-    study.insert("thresholds".to_owned(), grid);
+    let mut grid = Map::new();
+    if let Some(ends) = study.remove("threshold_range") {
+        grid.insert("from".to_owned(), ends[0].clone());
+        grid.insert("to".to_owned(), ends[1].clone());
+    }
+    if let Some(count) = study.get("thresholds").filter(|v| v.is_number()) {
+        grid.insert("count".to_owned(), count.clone());
+    }
+    if !grid.is_empty() {
+        study.insert("thresholds".to_owned(), Value::Object(grid));
+    }
 }
 
 #[cfg(test)]
@@ -105,7 +109,9 @@ mod tests {
             assert!(text.contains(today), "{text}");
             text.replace(today, before)
         });
-        for text in [text, old, older] {
+        let half = older.replace(r#","thresholds":6"#, "");
+        assert_ne!(half, older);
+        for text in [text, old, older, half] {
             let read: RigDocument = serde_json::from_str(&text).unwrap();
             assert_eq!(read.analysis, settings);
         }
