@@ -3,12 +3,12 @@
 use std::error::Error;
 use std::path::Path;
 
-use skinrig::rig_document::RigDocument;
 use skinrig_controller::{ControlHandle, RecordSink, RunReport, SinkFault, execute};
 use skinrig_device::Rig;
 use skinrig_model::{CameraId, Record, RunHeader};
 use skinrig_protocol::{Plan, Protocol};
 use skinrig_recorder::SessionWriter;
+use skinrig_results::RigDocument;
 
 /// What a helper fails with: a test only shows it.
 pub type Fault = Box<dyn Error>;

@@ -67,6 +67,16 @@ const ALLOWED: &[(&str, &[&str])] = &[
         ],
     ),
     (
+        "skinrig-results",
+        &[
+            "skinrig-analysis",
+            "skinrig-formats",
+            "skinrig-model",
+            "skinrig-protocol",
+            "skinrig-recorder",
+        ],
+    ),
+    (
         "skinrig-export",
         &[
             "skinrig-analysis",
@@ -90,6 +100,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "skinrig-sim",
             "skinrig-controller",
             "skinrig-recorder",
+            "skinrig-results",
             "skinrig-analysis",
             "skinrig-compare",
             "skinrig-report",

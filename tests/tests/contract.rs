@@ -4,7 +4,6 @@
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
-use skinrig::rig_document::RigDocument;
 use skinrig_device::contract::{self, IndenterContract};
 use skinrig_device::{
     Clock, DeviceError, EventCamera, Indenter, IndenterCapabilities, MotionLimits, Rig, RobotSample,
@@ -14,6 +13,7 @@ use skinrig_model::{
     PoseSample, Record, RigidTransform, Robot, RunEnd, Setting, SimLevel, Skin,
 };
 use skinrig_recorder::{SessionReader, SessionWriter};
+use skinrig_results::RigDocument;
 use skinrig_sim::{SimConfig, simulated_rig};
 use skinrig_tests::{header, planned, record};
 use tempfile::TempDir;

@@ -2,9 +2,9 @@
 
 use proptest::prelude::*;
 use skinrig::results::{Choices, analyze_session};
-use skinrig::source::Rescan;
 use skinrig_model::{CameraId, Record, SimLevel};
 use skinrig_recorder::{SessionReader, verify};
+use skinrig_results::Rescan;
 use skinrig_sim::{Fault, SimConfig, When, simulated_rig};
 use skinrig_tests::{planned, record};
 

@@ -12,7 +12,6 @@ use rayon::prelude::*;
 use skinrig::fault::Saboteur;
 use skinrig::results::{Choices, analyze_session};
 use skinrig::rig::{self, gates};
-use skinrig::source::Rescan;
 use skinrig_analysis::Analysis;
 use skinrig_analysis::result::PressResult;
 use skinrig_controller::{
@@ -21,6 +20,7 @@ use skinrig_controller::{
 use skinrig_model::{CameraId, HostTime, PressId, PressTiming, Record, RunEnd, SimLevel};
 use skinrig_protocol::{FaultKind, FaultPhase, FaultTime, Plan, PlantedFault, Protocol};
 use skinrig_recorder::{SessionReader, SessionWriter, verify};
+use skinrig_results::Rescan;
 use skinrig_sim::{SimConfig, simulated_rig};
 use skinrig_tests::{header, planned};
 

@@ -3,7 +3,6 @@
 
 use std::time::Duration;
 
-use skinrig::source::Rescan;
 use skinrig_device::RealClock;
 use skinrig_emulated_camera::Evk1Config as Emulated;
 use skinrig_emulated_camera::config::Content;
@@ -11,6 +10,7 @@ use skinrig_emulated_camera::harness::on_bus;
 use skinrig_evk1::{Evk1, Evk1Config};
 use skinrig_model::{CameraId, PressVerdict, Record, SimLevel};
 use skinrig_recorder::{SessionReader, verify};
+use skinrig_results::Rescan;
 use skinrig_sim::{SimConfig, in_real_time, simulated_rig};
 use skinrig_tests::{planned, record};
 

@@ -7,6 +7,7 @@ use std::process::{ExitCode, Termination};
 use skinrig_nightly::NightExit;
 use skinrig_protocol::Diagnostics;
 use skinrig_recorder::RecorderError;
+use skinrig_results::ResultsError;
 
 /// How the program ended. The numbers are part of the interface and do not change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -110,6 +111,16 @@ impl Failure {
     /// A limit that was not met.
     pub fn limit(message: impl fmt::Display) -> Self {
         Self::new(Exit::Limit, message)
+    }
+}
+
+impl From<ResultsError> for Failure {
+    fn from(error: ResultsError) -> Self {
+        match error {
+            ResultsError::Session(error) => Self::session(error),
+            ResultsError::Settings(found) => Self::findings(&found),
+            other => Self::input(other),
+        }
     }
 }
 

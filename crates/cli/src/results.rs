@@ -3,20 +3,15 @@
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 
-use skinrig_analysis::motion::MotionCourse;
-use skinrig_analysis::reference_code::reference_code;
-use skinrig_analysis::result::{Motion, PressResult};
 use skinrig_analysis::tradeoff::Tradeoff;
-use skinrig_analysis::{Analysis, EarlierAttempt, Keep, LegStart, SessionInput};
-use skinrig_model::{AnalysisSettings, CameraId, HostTime, RigGeometry, RunHeader, TriggerEdge};
-use skinrig_recorder::{AttemptRow, RecorderError, SessionReader};
+use skinrig_analysis::{Analysis, LegStart};
+use skinrig_recorder::SessionReader;
 use skinrig_report::{Provenance, ReportInput, Variant};
+use skinrig_results::{Aligned, Analyzed, Session};
 
 use crate::analyses;
 use crate::args::{AnalyzeArgs, ReportArgs};
 use crate::exit::{Exit, Failure, Outcome};
-use crate::rig_document::RigDocument;
-use crate::source::SessionEvents;
 
 /// The results of one session.
 pub struct Results {
@@ -58,45 +53,13 @@ pub struct Choices<'a> {
     pub name: Option<&'a str>,
 }
 
-/// A session ready to be analysed.
-pub(crate) struct Opened {
-    pub(crate) reader: SessionReader,
-    pub(crate) header: RunHeader,
-    pub(crate) input: SessionInput,
-    pub(crate) events: SessionEvents,
-    /// How the settings differ from the session's own.
-    pub(crate) variant: Option<Variant>,
-}
-
-/// Opens a session with the settings it was recorded with or with others.
-///
-/// # Errors
-/// [`Failure::input`] for files that are no readable session or settings that do not parse.
-pub(crate) fn open(path: &Path, choices: Choices<'_>) -> Result<Opened, Failure> {
-    let unreadable = Failure::session;
-    let reader = SessionReader::open(path).map_err(unreadable)?;
-    let header = reader.header().map_err(unreadable)?;
-    let document: RigDocument = serde_json::from_str(&header.rig_json).map_err(|e| {
-        Failure::input(format!(
-            "{}: expected the description of the rig in the session, found: {e}\n  \
-             next: `skinrig verify` says whether the file is damaged",
-            path.display()
-        ))
-    })?;
-    let own = document.analysis.clone();
-    let settings = settings(&header, document.analysis, choices)?;
-    let changes = settings != own || choices.reference_code || choices.name.is_some();
-    let variant = changes.then(|| variant(choices));
-    let mut input = session_input(&reader, settings, document.geometry).map_err(unreadable)?;
-    skinrig_analysis::legs::align(&mut input);
-    let events = SessionEvents::new(path, header.stream_formats, &input.legs);
-    Ok(Opened {
-        reader,
-        header,
-        input,
-        events,
-        variant,
-    })
+impl<'a> Choices<'a> {
+    const fn of_session(&self) -> skinrig_results::Choices<'a> {
+        skinrig_results::Choices {
+            overrides: self.overrides,
+            reference_code: self.reference_code,
+        }
+    }
 }
 
 fn variant(choices: Choices<'_>) -> Variant {
@@ -108,140 +71,40 @@ fn variant(choices: Choices<'_>) -> Variant {
     }
 }
 
+/// Opens a session with the settings it was recorded with or with others, aligned; and how the settings differ.
+///
+/// # Errors
+/// [`Failure::input`] for files that are no readable session or settings that do not parse.
+pub(crate) fn open(
+    path: &Path,
+    choices: Choices<'_>,
+) -> Result<(Aligned, Option<Variant>), Failure> {
+    let session = Session::open(path, choices.of_session())?;
+    let changes = session.is_changed || choices.name.is_some();
+    let variant = changes.then(|| variant(choices));
+    Ok((session.recorded()?.align(), variant))
+}
+
 /// Analyses a session, with the settings it was recorded with or with others.
 ///
 /// # Errors
 /// [`Failure::input`] for files that are no readable session or settings that do not parse.
 pub fn analyze_session(path: &Path, choices: Choices<'_>) -> Result<Results, Failure> {
-    let session = open(path, choices)?;
-    // The public code judges calibrating presses too.
-    let keep = if choices.reference_code {
-        Keep::All
-    } else {
-        Keep::Scored
-    };
-    let (input, events) = (&session.input, &session.events);
-    let (mut analysis, kept) =
-        skinrig_analysis::analyze_and_keep(input, events, keep).map_err(Failure::input)?;
-    analysis.reference = choices
-        .reference_code
-        .then(|| reference_code(input, &analysis, &kept));
-    analysis.motion = motion(&session.reader, &analysis).map_err(Failure::session)?;
+    let (aligned, variant) = open(path, choices)?;
+    let Analyzed {
+        session,
+        legs,
+        analysis,
+    } = aligned.analyze()?;
     let mut provenance = crate::provenance::provenance(&session.reader, &session.header, &analysis)
         .map_err(Failure::session)?;
-    provenance.variant = session.variant;
+    provenance.variant = variant;
     Ok(Results {
         session: path.to_owned(),
         analysis,
-        legs: session.input.legs,
+        legs,
         provenance,
         tradeoff: crate::tradeoff_file::beside_session(path),
-    })
-}
-
-/// The robot's path against its commands, in full around the presses that the report looks at closely.
-fn motion(reader: &SessionReader, analysis: &Analysis) -> Result<Option<Motion>, RecorderError> {
-    let close = |p: &&PressResult| analysis.zooms.iter().any(|z| z.press == p.press);
-    let presses = analysis.presses.iter().filter(close);
-    let mut course = MotionCourse::new(presses.filter_map(|p| Some((p.press, p.timing?))));
-    let ever = (HostTime(i64::MIN), HostTime(i64::MAX));
-    reader.for_each_pose_block(ever.0, ever.1, |samples| course.push(samples))?;
-    Ok(course.finish())
-}
-
-/// The settings of the session's own protocol or schedule, with the choices.
-fn settings(
-    header: &RunHeader,
-    recorded: AnalysisSettings,
-    choices: Choices<'_>,
-) -> Result<AnalysisSettings, Failure> {
-    if let Some(other) = choices
-        .overrides
-        .iter()
-        .find(|o| !o.trim_start().starts_with("analysis."))
-    {
-        return Err(Failure::input(format!(
-            "--set {other}: expected a key below `analysis.`; a recorded session's other values cannot change"
-        )));
-    }
-    if choices.overrides.is_empty() && !choices.reference_code {
-        return Ok(recorded);
-    }
-    let mut all = header.overrides.clone();
-    if choices.reference_code {
-        all.extend(skinrig_protocol::REFERENCE_CODE.map(str::to_owned));
-    }
-    all.extend_from_slice(choices.overrides);
-    if let Some(old) = choices.overrides.iter().find(|o| {
-        let key = o.trim_start().split('=').next().unwrap_or_default();
-        key.trim_end() == "analysis.exclude_presses"
-    }) {
-        return Err(Failure::input(format!(
-            "--set {old}: expected `analysis.exclude_press_numbers`, which counts presses from 1, found the key of earlier versions, \
-             which counts from 0"
-        )));
-    }
-    let text = header.protocol_text.as_bytes();
-    let loader = skinrig_formats::regular::read_text;
-    if header.rig_kind == "imported" {
-        skinrig_protocol::schedule::Schedule::parse_recorded(&header.protocol_name, text, &all)
-            .map(|s| s.analysis)
-            .map_err(|found| Failure::findings(&found))
-    } else {
-        skinrig_protocol::Protocol::parse_recorded(&header.protocol_name, text, &all, &loader)
-            .map(|p| p.analysis)
-            .map_err(|found| Failure::findings(&found))
-    }
-}
-
-fn session_input(
-    reader: &SessionReader,
-    settings: AnalysisSettings,
-    rig: RigGeometry,
-) -> Result<SessionInput, RecorderError> {
-    let (mut planned, mut outcomes, mut earlier) = (Vec::new(), Vec::new(), Vec::new());
-    for (press, mut attempts) in reader.presses()? {
-        planned.push(press);
-        outcomes.push(attempts.pop().and_then(|last| last.outcome));
-        earlier.extend(attempts.iter().filter_map(earlier_attempt));
-    }
-    let (pose_interval_us, crossing_se_us) = crate::contacts::timing(reader, &outcomes)?;
-    let descents = crate::contacts::descents(reader, &outcomes)?;
-    let [one, two] = CameraId::ALL;
-    let further = reader.legs()?.into_iter().skip(1);
-    let legs = further.map(|leg| LegStart::recorded(leg.origin, leg.camera_origin_us));
-    let legs = legs.collect();
-    Ok(SessionInput {
-        planned,
-        outcomes,
-        earlier,
-        edges: [
-            on_time(reader.trigger_edges(one)?, rig.trigger_delay_us[0]),
-            on_time(reader.trigger_edges(two)?, rig.trigger_delay_us[1]),
-        ],
-        marks: reader.marks_sent()?,
-        box_reports: reader
-            .box_reports()?
-            .into_iter()
-            .map(|(_, said)| said)
-            .collect(),
-        gaps: [reader.gaps(one)?, reader.gaps(two)?],
-        recorded: [reader.recorded(one)?, reader.recorded(two)?],
-        pose_interval_us,
-        crossing_se_us,
-        descents,
-        legs,
-        rig,
-        settings,
-    })
-}
-
-/// `None` of one that never began.
-fn earlier_attempt(attempt: &AttemptRow) -> Option<EarlierAttempt> {
-    let timing = attempt.outcome.as_ref().and_then(|o| o.timing);
-    Some(EarlierAttempt {
-        begun: attempt.intent.or(timing.map(|t| t.approach))?,
-        clear: timing.map(|t| t.clear),
     })
 }
 
@@ -429,31 +292,4 @@ pub fn report(args: &ReportArgs, json: bool) -> Outcome {
         outln!("{}", paths.1.display());
     }
     check_limit(&results, None)
-}
-
-/// Edges at the instants at which they reached the camera's input: it stamps them so much later. An edge within that time of
-/// the camera's first microsecond is put on it.
-fn on_time(mut edges: Vec<TriggerEdge>, delay_us: u16) -> Vec<TriggerEdge> {
-    for edge in &mut edges {
-        edge.t_us = edge.t_us.saturating_sub(u64::from(delay_us));
-    }
-    edges
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn edges_are_moved_to_when_they_reached_the_camera() {
-        let edge = |t_us| TriggerEdge {
-            t_us,
-            channel: 0,
-            rising: true,
-        };
-        let edges = || vec![edge(2), edge(1_000_003), edge((1 << 34) + 1)];
-        assert_eq!(on_time(edges(), 0), edges());
-        let moved = vec![edge(0), edge(1_000_000), edge((1 << 34) - 2)];
-        assert_eq!(on_time(edges(), 3), moved);
-    }
 }

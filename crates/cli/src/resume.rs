@@ -24,11 +24,11 @@ use crate::paths;
 use crate::progress::ProgressView;
 use crate::rig::tolerated::Tolerated;
 use crate::rig::{self, bench, gates, planted};
-use crate::rig_document::RigDocument;
 use crate::run::{close, conclude};
 use crate::signals::Operator;
 use crate::sink::{Foreknowledge, SessionSink};
-use crate::source::Rescan;
+use skinrig_results::Rescan;
+use skinrig_results::RigDocument;
 
 /// An unfinished session as it lies there.
 struct Unfinished {

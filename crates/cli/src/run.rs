@@ -24,9 +24,9 @@ use crate::paths;
 use crate::progress::ProgressView;
 use crate::results::{self};
 use crate::rig::{self, RepeatedOperator, bench, gates, planted};
-use crate::rig_document::RigDocument;
 use crate::signals::Operator;
 use crate::sink::{Foreknowledge, SessionSink};
+use skinrig_results::RigDocument;
 
 /// What is to be recorded, before the rig adds what it knows.
 pub struct Intent<'a> {

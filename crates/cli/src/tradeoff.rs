@@ -10,7 +10,7 @@ use skinrig_report::tradeoff::{label, page, protocol_lines, terminal_table};
 use crate::analyses::tradeoff_path;
 use crate::args::{CostKind, TradeoffArgs};
 use crate::exit::{Exit, Failure, Outcome};
-use crate::results::{Choices, Opened, not_official, open, write};
+use crate::results::{Choices, not_official, open, write};
 use crate::tradeoff_file::FORMAT;
 
 /// CPU time of this thread, s.
@@ -81,17 +81,11 @@ pub fn tradeoff(args: &TradeoffArgs, json: bool) -> Outcome {
         reference_code: false,
         name: None,
     };
-    let Opened {
-        input,
-        events,
-        header,
-        variant,
-        ..
-    } = open(&args.session, choices)?;
+    let (aligned, variant) = open(&args.session, choices)?;
     if let (Some(variant), Some(out)) = (&variant, &args.out) {
         not_official(&tradeoff_path(&args.session, None), out, variant)?;
     }
-    let mut rig = rig_in_words(&header.rig_name);
+    let mut rig = rig_in_words(&aligned.session.header.rig_name);
     if let Some(variant) = &variant {
         rig += &format!(
             " Not the session's own settings: {}.",
@@ -103,7 +97,7 @@ pub fn tradeoff(args: &TradeoffArgs, json: bool) -> Outcome {
         repeats: args.repeats,
         least_located: args.min_located.map(|percent| percent / 100.0),
     };
-    let measured = measure(&input, &events, plan, &mut thread_cpu_s);
+    let measured = measure(&aligned.input, &aligned.events, plan, &mut thread_cpu_s);
     let result = measured.map_err(|e| match e {
         AnalysisError::Invalid(_) => Failure::limit(e),
         other => Failure::input(other),

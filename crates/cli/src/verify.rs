@@ -9,7 +9,7 @@ use skinrig_recorder::{RecorderError, SessionReader, verify as recheck};
 use crate::args::SessionArg;
 use crate::exit::{Exit, Failure, Outcome};
 use crate::export;
-use crate::source::Rescan;
+use skinrig_results::Rescan;
 
 /// Recomputes everything in a session, and holds the files of a bundle against its manifest.
 ///

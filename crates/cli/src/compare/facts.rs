@@ -10,7 +10,7 @@ use skinrig_protocol::Protocol;
 use skinrig_recorder::SessionReader;
 
 use crate::exit::Failure;
-use crate::rig_document::RigDocument;
+use skinrig_results::RigDocument;
 
 /// Keys of a protocol that are compared elsewhere, or that name it only.
 const NOT_OF_PROTOCOL: [&str; 10] = [

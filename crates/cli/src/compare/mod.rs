@@ -14,7 +14,7 @@ use skinrig_report::compare as report;
 
 use crate::args::CompareArgs;
 use crate::exit::{Exit, Failure, Outcome};
-use crate::results::{Choices, Opened, open, write};
+use crate::results::{Choices, open, write};
 
 /// The name of the page when none is given.
 const PAGE: &str = "comparison.html";
@@ -165,9 +165,8 @@ fn only_locating(settings: AnalysisSettings) -> AnalysisSettings {
 fn again(found: &inputs::Found, settings: &AnalysisSettings) -> Result<Subject, Failure> {
     let mut subject = found.subject.clone();
     for (session, path) in subject.sessions.iter_mut().zip(&found.paths) {
-        let Opened {
-            mut input, events, ..
-        } = open(path, Choices::default())?;
+        let (aligned, _) = open(path, Choices::default())?;
+        let (mut input, events) = (aligned.input, aligned.events);
         let own = input.settings.exclude_press_numbers.clone();
         input.settings = AnalysisSettings {
             exclude_press_numbers: own,

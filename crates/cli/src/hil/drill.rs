@@ -9,7 +9,7 @@ use skinrig_device::{Indenter, RealClock};
 use skinrig_hil::{Bench, Drilled, Trouble};
 use skinrig_model::{Point3, Robot};
 use skinrig_nightly::{Evidence, EvidenceKind};
-use skinrig_omega3::Omega;
+use skinrig_omega3::{Omega, Remark};
 
 use super::hold::HOLDING;
 use super::real_bench::RealBench;
@@ -42,9 +42,10 @@ pub fn watchdog(bench: &mut RealBench) -> Result<Drilled, Trouble> {
     std::thread::sleep(LEFT_ALONE);
     // Whoever of watchdog and supervisor brakes it, from here on nobody else does.
     let (mut omega, after) = reopen(bench, killed)?;
-    let live = omega.remarks().iter().any(|r| r.contains("were live"));
-    let why = omega.remarks().iter().find(|r| r.contains("went off"));
-    let note = why.cloned();
+    let live = omega.remarks().contains(&Remark::MotorsWereLive);
+    let why = omega.remarks().iter();
+    let why = why.filter(|r| matches!(r, Remark::MotorsWentOff(_)));
+    let note = why.map(ToString::to_string).next();
     let at = place(&mut omega)?;
     Ok(Drilled {
         braked_within_s: (!live).then_some(after.as_secs_f64()),

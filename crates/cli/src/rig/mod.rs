@@ -19,7 +19,7 @@ use skinrig_sim::{SimConfig, in_real_time, simulated_rig};
 
 use crate::exit::Failure;
 use crate::recording::SessionRecording;
-use crate::rig_document::RigDocument;
+use skinrig_results::RigDocument;
 
 /// The simulated rig for `protocol`, with those faults on purpose that meet devices; its name tells all of them.
 #[must_use]

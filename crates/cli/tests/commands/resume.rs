@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 
 use serde_json::Value;
-use skinrig::source::Rescan;
 use skinrig_model::{Record, RunHeader};
 use skinrig_recorder::{SessionReader, SessionWriter};
+use skinrig_results::Rescan;
 
 use crate::support::{Lab, SMALL, files, only, read_json, show, skinrig, text};
 

@@ -46,7 +46,8 @@ fn alignment(subjects: &[Subject]) -> Option<Difference> {
         _ => "not certified".to_owned(),
     };
     let values = each(subjects, status);
-    if values.iter().any(|v| v.contains("INVALID")) {
+    let is_invalid = |s: &Subject| s.sessions.iter().any(|x| !x.analysis.is_valid());
+    if subjects.iter().any(is_invalid) {
         let reason = "a session is INVALID: none of its numbers is to be used";
         return Some(blocked(
             difference(

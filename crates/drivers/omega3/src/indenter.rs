@@ -12,6 +12,7 @@ use crate::error::OmegaError;
 use crate::load;
 use crate::open::seen;
 use crate::owner::Owner;
+use crate::remark::Remark;
 use crate::sdk::Sdk;
 use crate::stream::{CAPACITY, Stream};
 
@@ -22,7 +23,7 @@ pub struct Omega {
     identity: DeviceIdentity,
     capabilities: IndenterCapabilities,
     config: Arc<OmegaConfig>,
-    remarks: Vec<String>,
+    remarks: Vec<Remark>,
 }
 
 impl Omega {
@@ -43,7 +44,7 @@ impl Omega {
             &words,
             clock,
         )?;
-        omega.remarks.extend(advice);
+        omega.remarks.extend(advice.map(Remark::Library));
         Ok(omega)
     }
 
@@ -81,7 +82,7 @@ impl Omega {
 
     /// What the operator should know about this robot and this library.
     #[must_use]
-    pub fn remarks(&self) -> &[String] {
+    pub fn remarks(&self) -> &[Remark] {
         &self.remarks
     }
 }
@@ -135,7 +136,7 @@ impl Indenter for Omega {
         check_wanted(&self.identity.serial, &self.config, wanted)?;
         let mut settings = self.owner.configure(*wanted)?;
         // What the operator was told belongs to the record of the session.
-        settings.extend(self.remarks.iter().map(|text| seen("remark", text)));
+        settings.extend(self.remarks.iter().map(|remark| seen("remark", remark)));
         Ok(settings)
     }
 

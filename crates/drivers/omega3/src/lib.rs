@@ -26,6 +26,7 @@ pub mod open;
 mod owner;
 pub mod profile;
 mod regulation;
+mod remark;
 pub mod sdk;
 mod span;
 mod stream;
@@ -36,6 +37,7 @@ mod weighing;
 pub use config::OmegaConfig;
 pub use error::OmegaError;
 pub use indenter::Omega;
+pub use remark::Remark;
 
 #[cfg(test)]
 mod tests;

@@ -11,6 +11,7 @@ use crate::brake::brake;
 use crate::config::{Initialise, OmegaConfig, Patience, RedundantEncoders, Watchdog};
 use crate::enumerate::{self, Found};
 use crate::error::OmegaError;
+use crate::remark::Remark;
 use crate::sdk::{Answer, CallError, Quantity, Sdk};
 
 /// An open robot. Its motors are off.
@@ -29,7 +30,7 @@ pub struct Opened {
     /// What was set or read, for the record of the session.
     pub settings: Vec<Setting>,
     /// What the operator should know.
-    pub remarks: Vec<String>,
+    pub remarks: Vec<Remark>,
 }
 
 /// Opens the robot of `config` and brings it to a known, braked state. `guard` is called with its serial number before
@@ -201,17 +202,13 @@ impl Procedure<'_> {
                     next,
                 );
             }
-            opened
-                .remarks
-                .push(format!("type {number} is taken for an omega.3"));
+            opened.remarks.push(Remark::OtherType(number));
         }
         let firmware = self.call("ask for its firmware", self.sdk.firmware(self.id))?;
         opened.firmware = enumerate::firmware_text(firmware);
         match self.sdk.check_memory(self.id) {
             Some(answer) => self.call("check its controller's memory", answer)?,
-            None => opened
-                .remarks
-                .push("this SDK cannot check the controller's memory".to_owned()),
+            None => opened.remarks.push(Remark::MemoryNotChecked),
         }
         let mode = self.call("ask how it is connected", self.sdk.com_mode(self.id))?;
         opened.settings.push(seen("com_mode", mode));
@@ -244,18 +241,13 @@ impl Procedure<'_> {
                 let next = "press the force button on its base or switch it off at the mains";
                 return self.unfit("motors off", live.to_string(), next);
             }
-            opened
-                .remarks
-                .push("the motors were live when the robot was opened; it was braked".to_owned());
+            opened.remarks.push(Remark::MotorsWereLive);
         }
         if let Some(cause) = status
             .force_off_cause()
             .filter(|cause| *cause != ForceOffCause::None)
         {
-            opened.remarks.push(format!(
-                "motors last went off because of {}",
-                cause_words(cause)
-            ));
+            opened.remarks.push(Remark::MotorsWentOff(cause));
         }
         Ok(())
     }
@@ -278,11 +270,7 @@ impl Procedure<'_> {
                 "have the robot serviced; a robot that never reported 1 has none: write `redundant_encoders: reported` in the rig file",
             ),
             (RedundantEncoders::Reported, Some(0)) => {
-                opened.remarks.push(
-                    "status word 13 is 0: no redundant encoders, or their check failed; if this robot reported 1 before, have it \
-                     serviced and write `redundant_encoders: required` in the rig file"
-                        .to_owned(),
-                );
+                opened.remarks.push(Remark::NoRedundantEncoders);
                 Ok(())
             }
             (RedundantEncoders::Reported, _) => Ok(()),
@@ -342,8 +330,7 @@ impl Procedure<'_> {
                 opened.settings.push(setting);
             }
             Err(NotSet::Call(e)) if has_no_watchdog(&e) && self.config.supervisor.is_some() => {
-                let words = "no watchdog in this device: only the supervisor brakes the arm if this program dies";
-                opened.remarks.push(words.to_owned());
+                opened.remarks.push(Remark::NoWatchdog);
             }
             Err(NotSet::Call(e)) if has_no_watchdog(&e) => {
                 return self.unfit(
@@ -359,8 +346,7 @@ impl Procedure<'_> {
         let threshold = self.call("read its velocity threshold", threshold)?;
         opened.settings.push(seen("velocity_threshold", threshold));
         if threshold == 0 {
-            let words = "the device's velocity trip is off (threshold 0)";
-            opened.remarks.push(words.to_owned());
+            opened.remarks.push(Remark::NoVelocityTrip);
         }
         Ok(())
     }
@@ -395,9 +381,7 @@ impl Procedure<'_> {
             let next = "power-cycle the robot and try again";
             return self.unfit("an initialised robot", "one that is still not", next);
         }
-        opened
-            .remarks
-            .push("the robot initialised itself".to_owned());
+        opened.remarks.push(Remark::InitialisedItself);
         Ok(())
     }
 }

@@ -4,6 +4,7 @@ use skinrig_drd_abi::ErrorCode;
 
 use super::scripted::Scripted;
 use crate::OmegaConfig;
+use crate::Remark;
 use crate::config::{Initialise, Patience, RedundantEncoders, SupervisorCommand, Watchdog};
 use crate::enumerate;
 use crate::open::open;
@@ -118,7 +119,7 @@ fn initialisation_needs_word_that_the_sample_is_off_and_ends_braked() {
         opened
             .remarks
             .iter()
-            .any(|r| r.contains("initialised itself"))
+            .any(|r| *r == Remark::InitialisedItself)
     );
 }
 
@@ -143,7 +144,7 @@ fn redundant_encoders_are_reported_and_required_only_where_the_rig_says_so() {
         match open(&sdk, &config, |_| Ok(())) {
             Ok(opened) => {
                 assert!(opens, "{word:?} {wanted:?}");
-                let there = opened.remarks.iter().any(|r| r.contains("word 13 is 0"));
+                let there = opened.remarks.contains(&Remark::NoRedundantEncoders);
                 assert_eq!(there, remarked, "{word:?} {wanted:?}");
                 let recorded = opened.settings.iter().any(|s| {
                     s.name == "redundant_encoders"
@@ -175,12 +176,7 @@ fn without_a_watchdog_a_supervisor_is_enough() {
         ..OmegaConfig::default()
     };
     let opened = open(&sdk, &config, |_| Ok(())).unwrap();
-    assert!(
-        opened
-            .remarks
-            .iter()
-            .any(|r| r.contains("only the supervisor"))
-    );
+    assert!(opened.remarks.iter().any(|r| *r == Remark::NoWatchdog));
 }
 
 #[test]
@@ -215,7 +211,7 @@ fn motors_left_live_by_a_dead_program_are_braked_first() {
     sdk.with(|s| s.live = true);
     let opened = open(&sdk, &OmegaConfig::default(), |_| Ok(())).unwrap();
     assert!(!sdk.with(|s| s.live));
-    assert!(opened.remarks.iter().any(|r| r.contains("were live")));
+    assert!(opened.remarks.contains(&Remark::MotorsWereLive));
 }
 
 #[test]

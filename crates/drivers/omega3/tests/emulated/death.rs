@@ -7,11 +7,11 @@ use std::time::Duration;
 
 use emulated_libdrd::{EmulatedArm, Fault, Mode, When};
 use skinrig_device::Indenter;
-use skinrig_omega3::OmegaConfig;
 use skinrig_omega3::config::{SupervisorCommand, Watchdog};
 use skinrig_omega3::enumerate;
 use skinrig_omega3::load::load;
 use skinrig_omega3::supervisor::supervise;
+use skinrig_omega3::{OmegaConfig, Remark};
 
 use crate::support::*;
 
@@ -188,7 +188,7 @@ fn without_both_the_stand_in_keeps_its_force() {
     assert_eq!(arm.state().expect("lives").mode, Mode::Force);
     // Whoever opens it next brakes it first.
     let omega = open(&arm);
-    assert!(omega.remarks().iter().any(|r| r.contains("were live")));
+    assert!(omega.remarks().contains(&Remark::MotorsWereLive));
     assert_eq!(arm.state().expect("lives").mode, Mode::Brake);
 }
 

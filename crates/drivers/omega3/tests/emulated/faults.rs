@@ -4,7 +4,7 @@ use emulated_libdrd::{ArmConfig, DeviceConfig, EmulatedArm, Fault, Mode, Setting
 use skinrig_device::{DeviceError, Indenter, RealClock};
 use skinrig_drd_abi::ErrorCode;
 use skinrig_omega3::config::Initialise;
-use skinrig_omega3::{Omega, OmegaError};
+use skinrig_omega3::{Omega, OmegaError, Remark};
 
 use crate::support::*;
 
@@ -92,12 +92,7 @@ fn an_uninitialised_arm_is_refused_unless_the_sample_is_off() {
     let omega = Omega::open(config, RealClock::start()).expect("initialises and opens");
     let state = arm.state().expect("lives");
     assert!(state.initialised && state.mode == Mode::Brake, "{state:?}");
-    assert!(
-        omega
-            .remarks()
-            .iter()
-            .any(|r| r.contains("initialised itself"))
-    );
+    assert!(omega.remarks().contains(&Remark::InitialisedItself));
 }
 
 #[test]

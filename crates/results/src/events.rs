@@ -10,7 +10,7 @@ use skinrig_recorder::{ChunkScanner, SessionReader};
 
 /// The events of a session file, decoded chunk by chunk. Each pass opens the file anew, so that both cameras
 /// can be read at once.
-pub(crate) struct SessionEvents {
+pub struct SessionEvents {
     path: PathBuf,
     formats: [StreamFormat; 2],
     /// By how much the times of each further leg are moved, by where they were recorded.

@@ -1,0 +1,139 @@
+//! An open session: its header, its rig, and the settings of its analysis.
+
+use std::path::{Path, PathBuf};
+
+use skinrig_analysis::{EarlierAttempt, LegStart, SessionInput};
+use skinrig_model::{AnalysisSettings, CameraId, RigGeometry, RunHeader, TriggerEdge};
+use skinrig_recorder::{AttemptRow, RecorderError, SessionReader};
+
+use crate::contacts;
+use crate::error::ResultsError;
+use crate::rig_document::RigDocument;
+use crate::settings::Choices;
+use crate::stages::Recorded;
+
+/// An open session.
+pub struct Session {
+    /// Where the file is.
+    pub path: PathBuf,
+    /// The file.
+    pub reader: SessionReader,
+    /// Who recorded it, with what and how.
+    pub header: RunHeader,
+    /// The settings of the analysis.
+    pub settings: AnalysisSettings,
+    /// Whether they differ from those that it was recorded with.
+    pub is_changed: bool,
+    pub(crate) reference_code: bool,
+    rig: RigGeometry,
+}
+
+impl Session {
+    /// Opens a session with the settings that it was recorded with, or with others.
+    ///
+    /// # Errors
+    /// [`ResultsError`] for a file that is no readable session, and for settings that do not parse.
+    pub fn open(path: &Path, choices: Choices<'_>) -> Result<Self, ResultsError> {
+        let reader = SessionReader::open(path)?;
+        let header = reader.header()?;
+        let rig: RigDocument =
+            serde_json::from_str(&header.rig_json).map_err(|source| ResultsError::Rig {
+                path: path.to_owned(),
+                source,
+            })?;
+        let settings = choices.settings(&header, rig.analysis.clone())?;
+        Ok(Self {
+            path: path.to_owned(),
+            reader,
+            is_changed: settings != rig.analysis || choices.reference_code,
+            settings,
+            reference_code: choices.reference_code,
+            header,
+            rig: rig.geometry,
+        })
+    }
+
+    /// Reads everything that the analysis needs but the events.
+    ///
+    /// # Errors
+    /// [`ResultsError::Session`] when the file cannot be read.
+    pub fn recorded(self) -> Result<Recorded, ResultsError> {
+        let input = self.input()?;
+        Ok(Recorded {
+            session: self,
+            input,
+        })
+    }
+
+    fn input(&self) -> Result<SessionInput, RecorderError> {
+        let reader = &self.reader;
+        let (mut planned, mut outcomes, mut earlier) = (Vec::new(), Vec::new(), Vec::new());
+        for (press, mut attempts) in reader.presses()? {
+            planned.push(press);
+            outcomes.push(attempts.pop().and_then(|last| last.outcome));
+            earlier.extend(attempts.iter().filter_map(earlier_attempt));
+        }
+        let (pose_interval_us, crossing_se_us) = contacts::timing(reader, &outcomes)?;
+        let descents = contacts::descents(reader, &outcomes)?;
+        let [one, two] = CameraId::ALL;
+        let further = reader.legs()?.into_iter().skip(1);
+        let legs = further.map(|leg| LegStart::recorded(leg.origin, leg.camera_origin_us));
+        let [delay_1, delay_2] = self.rig.trigger_delay_us;
+        let reports = reader.box_reports()?.into_iter();
+        Ok(SessionInput {
+            planned,
+            outcomes,
+            earlier,
+            edges: [
+                on_time(reader.trigger_edges(one)?, delay_1),
+                on_time(reader.trigger_edges(two)?, delay_2),
+            ],
+            marks: reader.marks_sent()?,
+            box_reports: reports.map(|(_, report)| report).collect(),
+            gaps: [reader.gaps(one)?, reader.gaps(two)?],
+            recorded: [reader.recorded(one)?, reader.recorded(two)?],
+            pose_interval_us,
+            crossing_se_us,
+            descents,
+            legs: legs.collect(),
+            rig: self.rig,
+            settings: self.settings.clone(),
+        })
+    }
+}
+
+/// `None` for an attempt that never began.
+fn earlier_attempt(attempt: &AttemptRow) -> Option<EarlierAttempt> {
+    let timing = attempt.outcome.as_ref().and_then(|o| o.timing);
+    Some(EarlierAttempt {
+        begun: attempt.intent.or(timing.map(|t| t.approach))?,
+        clear: timing.map(|t| t.clear),
+    })
+}
+
+/// Edges at the instants at which they reached the camera's input: it stamps them so much later. An edge within that time of
+/// the camera's first microsecond is put on it.
+fn on_time(mut edges: Vec<TriggerEdge>, delay_us: u16) -> Vec<TriggerEdge> {
+    for edge in &mut edges {
+        edge.t_us = edge.t_us.saturating_sub(u64::from(delay_us));
+    }
+    edges
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn edges_are_moved_to_when_they_reached_the_camera() {
+        let edge = |t_us| TriggerEdge {
+            t_us,
+            channel: 0,
+            rising: true,
+        };
+        let edges = || vec![edge(2), edge(1_000_003), edge((1 << 34) + 1)];
+        assert_eq!(on_time(edges(), 0), edges());
+        let moved = vec![edge(0), edge(1_000_000), edge((1 << 34) - 2)];
+        assert_eq!(on_time(edges(), 3), moved);
+    }
+}
